@@ -1,30 +1,30 @@
-# The loop of whoever changes urdfkin; CONTRIBUTING.md says when to run what.
+# Commands for contributors; CONTRIBUTING.md describes when to run them.
 PATH := $(CURDIR)/.venv/bin:$(PATH)
 .PHONY: help setup nvcc format check fast test long search docs site bench
 
-help:  ## this list
+help:  ## list all targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
 
-setup:  ## .venv with urdfkin and all that its tests need
+setup:  ## create .venv with urdfkin and the packages for its tests
 	sh -c '. scripts/environment.sh; make_environment "[test]"' scripts/setup
 
-nvcc:  ## CUDA's compiler in .venv/nvcc, for the long tests of exported code and scripts/benchmark_gpu.py
+nvcc:  ## install CUDA's compiler in .venv/nvcc, for the long tests of exported code and scripts/benchmark_gpu.py
 	sh -c '. scripts/environment.sh; install_nvcc' scripts/setup
 
-format:  ## write Python as it is written here
+format:  ## format Python files, and apply the automatic fixes of ruff
 	ruff format .
 	ruff check --fix .
 
-check:  ## format, lint, types, changelog
+check:  ## check format, lint, types and changelog
 	ruff format --check .
 	ruff check .
 	mypy
 	python scripts/changelog_gate.py
 
-fast:  ## the quick tests: a minute on two quiet cores
+fast:  ## the quick tests: one minute on two idle cores
 	pytest -q -n 2 -m "not slow and not browser"
 
-test: check  ## everything that must pass, but the long tests
+test: check  ## all checks and tests except the long tests
 	urdfkin warm
 	pytest -q -n 2 --dist worksteal -m "not long"
 
@@ -32,10 +32,10 @@ long:  ## the long tests: processes, mutants, fuzzing, packages, browsers
 	urdfkin warm
 	pytest -q -n 2 --dist worksteal -m long
 
-search:  ## the quick tests, their properties on examples that were never tried
+search:  ## the quick tests, with new random examples for property tests
 	pytest -q -n 2 -m "not slow and not browser" --hypothesis-profile=search
 
-docs:  ## the pages that are generated from the code, then the site
+docs:  ## generate the pages that are made from code, then the site
 	python scripts/make_pages.py
 	python scripts/make_tour.py
 	python scripts/make_architecture.py
@@ -46,8 +46,8 @@ docs:  ## the pages that are generated from the code, then the site
 	python scripts/measure_start.py
 	$(MAKE) site
 
-site:  ## the documentation as a site, in site/index.html: no network, now or later
+site:  ## build the documentation site in site/index.html; needs no network
 	mkdocs build --strict
 
-bench:  ## beside Pinocchio, in seconds
+bench:  ## compare the speed with Pinocchio, in seconds
 	python scripts/benchmark.py --quick

@@ -1,7 +1,7 @@
-"""Derive the Denavit-Hartenberg table of a URDF, in the form of a datasheet.
+"""Derive the Denavit-Hartenberg table of a URDF, and print it like a data sheet.
 
-You learn that `snap` rounds an angle of 1.5708 in the URDF to a right angle. Every table is compared with
-Pinocchio.
+You learn that `snap` rounds an angle of 1.5708 in the URDF to a right angle, and that every table is compared
+with Pinocchio.
 """
 
 import numpy as np

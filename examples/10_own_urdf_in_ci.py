@@ -1,6 +1,7 @@
 """Check your own URDF in CI: first its text, then every quantity of every frame against Pinocchio.
 
-You learn that `check` checks the text and `validate` checks the numbers. Two commands have the same names.
+You learn that `check` checks the text and `validate` checks the numbers. The commands `urdfkin check` and
+`urdfkin validate` do the same.
 """
 
 import urdfkin

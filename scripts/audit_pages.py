@@ -54,10 +54,10 @@ _AXE_SECONDS = 600
 #: Violations of other severities are printed only.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Numbers of presses of the Tab key on a page, and of printed pages to draw.
+#: Maximum number of presses of the Tab key on a page, and of printed pages that are drawn.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
-#: Chromium reports a mouse, because the site's theme hides some elements without one.
+#: The site's theme hides some elements if Chromium reports no mouse.
 _MOUSE = (
     "--blink-settings=primaryHoverType=2,availableHoverTypes=2,primaryPointerType=4,availablePointerTypes=4"
 )
@@ -252,10 +252,12 @@ def look(
                 faults.append(what)
             else:
                 print(f"  note {where}: {what[:300]}", flush=True)
-    faults += [f"table {name}: {inner} pixels wide in {room}" for name, inner, room in browser.js(_CUT)]
+    faults += [
+        f"table {name}: {inner} pixels wide, but its box has {room}" for name, inner, room in browser.js(_CUT)
+    ]
     if output is not None:
         for k in range(browser.js("return document.querySelectorAll('canvas').length")):
-            # The browser draws a view when it is on the screen.
+            # The browser draws a 3D view only while the view is on the screen.
             browser.js("document.querySelectorAll('canvas')[arguments[0]].scrollIntoView()", k)
             browser.settle()
         browser.js("scrollTo(0, 0)")

@@ -3,12 +3,12 @@
     python scripts/benchmark.py [--quick] [--json FILE] [--plot FILE] [--only batch single ...] [--no-peers]
 
 Each round times every library once. Ratios are therefore reliable even on a machine with other load, but
-absolute times are not. The script prints medians, minima and ratios of medians. The script compares the
-results first. The script fails if results differ. It does not fail if something is slow. Libraries that are
-not installed are listed and left out.
+absolute times are not. The script prints medians, minima and ratios of medians. The script first compares the
+results of all libraries, and fails if they differ. A slow library does not cause a failure. A library that is
+not installed is listed, but not measured.
 
-`--only where` splits the time of a batch and of a single call into parts. `--only first` measures the first
-use of each quantity.
+`--only where` measures the time of each step of a batch and of a single call. `--only first` measures the
+first call of each quantity, in a new process.
 """
 
 import argparse
@@ -53,10 +53,10 @@ QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_
 
 
 def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
-    """Measure everything and return it as data; raise DifferenceError if results of contenders differ."""
+    """Measure everything; raise DifferenceError if two contenders have different results."""
     name, frame = SUBJECTS[0]
     n, rounds = plan.configurations, plan.rounds
-    ways: dict[str, Iterator[Row]] = {  # generators, which measure later
+    ways: dict[str, Iterator[Row]] = {  # each generator measures when it is read
         **{name: measured.contest_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
         "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
         "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),

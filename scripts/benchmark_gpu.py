@@ -1,15 +1,17 @@
-"""Measure the CUDA code of a robot on a GPU: configurations a second against batch size, in both precisions.
+"""Measure the CUDA code of a robot on a GPU: configurations per second for each batch size and precision.
 
     python scripts/benchmark_gpu.py panda --json gpu.jsonl      # needs nvcc, a C++ compiler and a GPU
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The share of the memory's bandwidth is the number of bytes that a configuration
-reads and writes, divided by the bytes that a copy in the GPU's memory reads and writes in the same time. If
-PyTorch with CUDA is installed, its export is measured too, called directly and by `torch.compile`; if PyTorch
-Kinematics is installed, its Jacobian. Their numbers are checked before their times.
+median of several launches. The share of the memory's bandwidth is a ratio of two data rates: that of the
+code, and that of a copy in the GPU's memory. A data rate counts the bytes that are read and written.
 
-nvcc of the package registry is enough: `make nvcc` installs it into the checkout's environment.
+If PyTorch with CUDA is installed, the program also measures the export for PyTorch, called directly and by
+`torch.compile`. If PyTorch Kinematics is installed, the program also measures its Jacobian. The numbers of
+both libraries are checked before the times are measured.
+
+The program needs nvcc, which `make nvcc` installs into the checkout's environment.
 
 Exit 1: a number is outside its bound. 2: no GPU, no nvcc, or the program does not compile.
 """

@@ -20,7 +20,7 @@ _ARGUED = re.compile(r"^No-changelog: +\S", re.MULTILINE | re.IGNORECASE)
 
 
 class CannotTellError(Exception):
-    """Error if the branch cannot be compared; the message states the reason."""
+    """The branch cannot be compared with main; the message states the reason."""
 
 
 def git(root: Path, *words: str) -> str:

@@ -1,10 +1,11 @@
 """Check that results have equal bits: for a single configuration and in a batch, before and after a change.
 
-    python scripts/check_bits.py [ROBOT ...]           # compare single, prepared, batched, joint, interpreted
+    python scripts/check_bits.py [ROBOT ...]           # compare all kinds of calls of this run
     python scripts/check_bits.py --write before.npz    # also store the results
     python scripts/check_bits.py --against before.npz  # also compare with stored results
 
-The script checks every robot of the catalogue, every quantity and all three reference frames. Fused
+The script checks every robot of the catalogue, every quantity and all three reference frames. The kinds of
+calls are single calls, prepared evaluators, batches, several frames in one pass, and plain Python. Fused
 multiply-adds are explicit, and urdfkin has its own sine and cosine, so digests are equal on every machine. If
 results differ from the stored results, the script prints the largest difference as a fraction of the stored
 bound.
@@ -38,13 +39,13 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import bound_of
 
-#: Sizes of batches: part of a block of eight, one block, a little more, many blocks and a remainder.
+#: Sizes of batches: less than a block of eight, one block, one block and a rest, many blocks and a rest.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
 #: Numbers of configurations and of frames whose results are stored.
 KEPT, FRAMES = 9, 6
-#: Index of the configuration that is computed in both ways.
+#: Index of the configuration that is computed in plain Python and by kernels.
 INTERPRETED = 3
 WAYS: tuple[Way, ...] = ("interpreted", "compiled")
 
@@ -101,7 +102,7 @@ def same(x: FloatArray, y: FloatArray) -> bool:
 
 
 def differing(subject: Subject, now: Arrays) -> Iterator[str]:
-    """Yield the results in batches, of prepared frames and of several frames that differ from other calls."""
+    """Yield the results of batches, prepared evaluators or several frames that differ from single calls."""
     frame = subject.frames[0]
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
@@ -128,7 +129,7 @@ def differing(subject: Subject, now: Arrays) -> Iterator[str]:
 
 
 def differing_interpreted(subject: Subject) -> Iterator[str]:
-    """Yield the results that differ between Python's numbers and the kernels."""
+    """Yield the results that differ between plain Python and the kernels."""
     for what, quantity, reference, inputs in subject.results():
         row, found = [x[INTERPRETED] for x in inputs], []
         for way in WAYS:
@@ -169,7 +170,7 @@ def share(what: str, now: Arrays, stored: Arrays) -> float:
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # Zeros of different signs have other bits, but the difference 0.
+    # 0 and -0 have different bits, and their difference is 0.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 

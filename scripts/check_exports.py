@@ -14,9 +14,8 @@
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
 compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
 configuration and in batches. It also runs with NumPy, and with NumPy as an array API namespace, in both
-precisions. GCC compiles CUDA's host functions. The leaves come in a random order, always the same one, so
-that a stopped run has checked a sample. Exit 1: a number is outside the derived bound, or a compiler prints a
-warning.
+precisions. GCC compiles CUDA's host functions. The leaf links have a fixed random order, so that a stopped
+run has checked a random sample. Exit 1: a number is outside its bound, or a compiler prints a warning.
 """
 
 import argparse
@@ -50,8 +49,8 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
-#: Largest nv for a Hessian in a file for one library, because PyTorch's gradcheck differentiates each number.
-#: A file for any array library has it in PyTorch only, because JAX compiles its many numbers for minutes.
+#: Files for robots with more joint velocities contain no Hessian, because its check in PyTorch is slow.
+#: JAX does not check the Hessian of a file for any array library, because its compilation takes minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -92,7 +91,7 @@ def _largest(found: Sequence[float], count: int) -> float:
 
 
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
-    """Yield the main tip of each robot, then the other leaves in a fixed random order."""
+    """Yield the tip frame of each robot, then the other leaf links in a fixed random order."""
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame

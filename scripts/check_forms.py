@@ -46,7 +46,7 @@ SAMPLES = 4
 #: Octave's symbolic package takes 20 s for six joints, so it only computes 6 tables with at most 4 joints.
 FEW, SMALL = 6, 4
 _STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-#: The first line of Octave's program for a format.
+#: First line of the program that Octave runs, for each format.
 _FIRST = {
     "matlab-symbolic": "try, pkg load symbolic, catch, disp('missing'), exit(0), end",
     "matlab-rst": f"addpath('{Path(__file__).parent / 'forms' / 'octave'}');",
@@ -154,7 +154,7 @@ def as_urdf(jobs: Sequence[Job], folder: Path) -> Poses:
     found = Poses()
     for job in jobs:
         base, *_, tip = link_names(job.table)
-        with warnings.catch_warnings():  # the robot's own limits and axes cause warnings
+        with warnings.catch_warnings():  # hide warnings about the robot's limits and axes
             warnings.simplefilter("ignore", urdfkin.UrdfWarning)
             path = urdfkin.load(to_urdf(job.table), verify=False).chain(tip, base)
         order = [job.table.joint_names.index(name) for name in path.joint_names]

@@ -6,9 +6,9 @@
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. If a
 check takes longer than `--patience`, the script does not check larger documents of the same kind.
 
-For each kind of content there is a function. It takes a size in bytes and returns a URDF of about this size,
-in which the content repeats. A faulty exporter or an attacker could write such files. Most are rejected. The
-time and memory of the rejection must be proportional to the size of the file.
+Each kind of content has a function that takes a size in bytes. The function returns a URDF of about this
+size, in which the content repeats. A faulty exporter or an attacker could write such files. urdfkin rejects
+most of these files. The time and memory of the rejection must be proportional to the size of the file.
 """
 
 import argparse
@@ -78,7 +78,7 @@ KINDS: dict[str, Kind] = {
     "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
     "bad numbers": _many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
     "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
-    # inputs with many comments that suppress findings
+    # many comments that suppress findings
     "comments that silence nothing": _many("<!-- urdfkin: ignore[x{i}] y -->\n"),
     "comments behind each other": _many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
     "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),
@@ -108,7 +108,7 @@ KINDS: dict[str, Kind] = {
     "one long value": lambda n: _robot(f'{_LINK}<material file="{"a" * n}"/>'),
     "openings of expressions": lambda n: _robot(f'{_LINK}<material file="{"${" * (n // 2)}"/>'),
     "references in a value": lambda n: _robot(f'{_LINK}<material file="{"&amp;" * (n // 5)}"/>'),
-    # inputs with long or much content between elements
+    # long or much content between elements
     "text": _many("words "),
     "lines": _many("\n"),
     "lines, then a broken tag": lambda n: _robot(_LINK + "\n" * n + "<"),

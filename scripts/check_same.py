@@ -32,7 +32,7 @@ from urdfkin.comparison.result import Sameness, Verdict
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 
-#: Largest rounding error of a placement in a robot of some metres (m, and entries of a rotation).
+#: Maximum rounding error of a placement in a robot of a few metres (m, and entries of a rotation matrix).
 ROUNDING = 1e-10
 
 
@@ -47,7 +47,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     said = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
-    # Rounding to four digits may leave a file unchanged, so the verdict of this change is not checked.
+    # Rounding to four digits may not change a file, so both verdicts are correct.
     said["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
     # The frame with the largest distance, without frames that moved on their bodies
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
@@ -86,12 +86,12 @@ def summary(some: list[dict[str, Any]]) -> Iterator[str]:
         widths = [one["upper"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
         found = [one["lower"] / one["truth"] for one in bounded if one["change"] == what and one["truth"]]
         if widths:
-            above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (most)"
+            above = f"{statistics.median(widths) - 1:.1%} (median), {max(widths) - 1:.1%} (largest)"
             yield f"{what}: {len(widths)}; the upper bound is {above} above the result of the search,"
-            yield f"  the lower {1 - min(found):.1%} below"
+            yield f"  the lower bound at most {1 - min(found):.1%} below"
     seconds = [one["seconds"] for one in some if one["change"] in UNLIKE]
     if seconds:
-        yield f"seconds with bounds: median {statistics.median(seconds):.1f}, most {max(seconds):.1f}"
+        yield f"seconds with bounds: median {statistics.median(seconds):.1f}, largest {max(seconds):.1f}"
     yield from (f"WRONG: {json.dumps(one)}" for one in (*wrong, *missed))
 
 

@@ -50,7 +50,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
     ),
     "api/singularities.md": (
         "Singular values",
-        "Singular values within guaranteed bounds, manipulability, and the reason for a singularity.",
+        "Singular values with guaranteed bounds, manipulability, and the reason for a singularity.",
         "singular_values urdfkin.verify.singular_values.SingularValues "
         "urdfkin.verify.singularity.Singularity",
     ),

@@ -9,7 +9,7 @@ There are several families of files:
 |---|---|
 | mutants | mutants of the shipped robots |
 | names, prefixes, versions, ..., everything | random robots with one kind of unusual content, or all kinds |
-| MJCF | free bodies, equalities and default classes; MuJoCo checks them independently |
+| MJCF | free bodies, equality constraints and default classes; MuJoCo checks them independently |
 
 Each robot passes through `check` and `load`. Every quantity is computed in every reference frame, for bases
 near to and far from the origin, and compared with Pinocchio. The tests run in a worker process, which is
@@ -98,7 +98,7 @@ class Worker:
 
 
 def work(seed: int, pipe: Connection) -> None:
-    """Run as the worker process: receive a family and a number, send the outcome, and repeat."""
+    """Main function of the worker process: receive a family and a number, send the outcome, and repeat."""
     from scripts.fuzzing.judge import judge
 
     nothing = os.open(os.devnull, os.O_WRONLY)
@@ -119,7 +119,7 @@ def fuzz(
 
     def run(_: int) -> None:
         worker = Worker(partial(work, seed), timeout)
-        for family, number in waiting:  # all threads take from the same iterator
+        for family, number in waiting:
             word, details = worker.judge(family, number)
             counts[word] += 1
             if word not in GOOD:

@@ -50,8 +50,8 @@ def usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    """Process n robots in parts, and return the usage after each part."""
-    # All kernels are loaded first, because a kernel that is loaded later would look like a leak.
+    """Process n robots in several groups, and return the usage after each group."""
+    # A kernel that is loaded later would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), only("compiled"):
         warnings.simplefilter("ignore")
         found = []

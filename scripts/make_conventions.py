@@ -4,8 +4,8 @@ For each row, the script compares a library's result with several candidate defi
 motion. It writes the definition that matches. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
-first runs each installed library on all robots of the catalogue, in the library's convention. The script
-writes the results to the same file.
+first runs each installed library on all robots of the catalogue, in the library's convention, and writes the
+results to conventions.toml.
 
     python scripts/make_conventions.py
     python scripts/make_conventions.py --measure
@@ -58,7 +58,7 @@ ARM = _robot(  # the joints are in reverse alphabetical order
     _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
 )
-#: A robot that shows the order of coordinates: two limbs at the base, a third limb at the first.
+#: A robot that shows the order of coordinates: joints z and a at the base, and joint k after z.
 LIMBS = _robot(
     _joint("z", "revolute", "base", "l1"),
     _joint("a", "revolute", "base", "l2"),
@@ -92,7 +92,7 @@ _TABLES = (
     ("urdfkin", "pinocchio", "mujoco", "drake", "idyntree", "rtb", "kdl"),
     ("isaaclab", "isaaclab3", "isaacgym", "newton", "newton-usd", "usd", "ros"),
 )
-#: The package on PyPI of a library in tests/model/conventions/libraries.py, if its name is another one.
+#: Name of a library's package in the package index, if it differs from the library's name.
 _DISTRIBUTIONS = {
     "pinocchio": "pin",
     "rtb": "roboticstoolbox-python",
@@ -158,7 +158,7 @@ class MeasuredMotion:
         return R, T[0][:3, 3], rate[:3, 3], w, rate_2[:3, 3], alpha
 
     def velocity_readings(self) -> dict[str, FloatArray]:
-        """Return the frame's velocity by six definitions: two orders of its parts, three points with axes."""
+        """Return the velocity by six definitions: two row orders, three choices of point and axes."""
         R, p, v, w, _, _ = self.motion()
         points = {
             "of the frame's origin, in world axes": (v, w),

@@ -33,10 +33,10 @@ PAGE, FIGURES, LISTED = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json
 DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Largest difference (m, and entries of a rotation matrix) of a pose that counts as right.
-#: Libraries in double precision differ by less than 1e-14, and misread elements by more than 1e-3.
+#: Maximum difference (m, and entries of a rotation matrix) of a correct pose.
+#: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
 RIGHT = 1e-9
-#: Time limit (s) for all features; it begins again after a crash or a timeout.
+#: Time limit (s) of a process that answers the remaining features.
 _SECONDS = 60
 _QUOTED = 160
 VERDICTS = {
@@ -98,7 +98,7 @@ def environment(folder: Path, library: str) -> Path:
 
 
 def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a library's answer to each case; after a case that ends its process, start a new process."""
+    """Yield a library's answer to each case; start a new process after a crash or a timeout."""
     todo = list(cases)
     while todo:
         try:

@@ -3,7 +3,7 @@
     python scripts/make_pages.py                  # all pages
     python scripts/make_pages.py findings judge   # some pages
 
-Run this script after a change of an equation, of a code, of a robot or of a schema. Tests compare the pages
+Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
 with the output of this script. The accuracy study and the enclosures take minutes, so tests check only a part
 of their numbers. The figures of docs/performance.md and its picture are those of docs/performance.json, which
 `python scripts/benchmark.py --json docs/performance.json` writes.
@@ -26,7 +26,7 @@ from scripts.pages import DOCS, inserted, table
 from urdfkin.compiled.preload import only
 from urdfkin.kinematics.registry import table as equations
 from urdfkin.model.configuration import draw_base
-from urdfkin.report.words import nearer_counts
+from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
@@ -34,7 +34,7 @@ from urdfkin.urdf.findings import WRITTEN_OUT, shortened
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.pages import page as page_of
-from urdfkin.validation.accuracy import AccuracyLine, Judgement, judge
+from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, accuracy_study
 from urdfkin.validation.document import VALIDATION
 from urdfkin.verify.exact.enclosure import Enclosures
 from urdfkin.verify.pinocchio import version
@@ -123,7 +123,7 @@ def reports() -> dict[str, str]:
     for title, part in parts.items():
         rows = []
         for name, entry in part["properties"].items():
-            # An entry without a description has that of its type.
+            # An entry without a description has the description of its type.
             kind = whole["$defs"].get(entry.get("$ref", "").rpartition("/")[2], {})
             rows.append((f"`{name}`", _type(entry), _cell(entry.get("description") or kind["description"])))
         heads = ("entry", "type", "meaning")
@@ -166,24 +166,25 @@ SAMPLES, ENCLOSED = 10, 5
 
 
 def study() -> dict[str, str]:
-    judgements = {
-        f"{name}: {kind}": judge(urdfkin.load(name), samples=SAMPLES) for name, kind in STUDIED.items()
+    studies = {
+        f"{name}: {kind}": accuracy_study(urdfkin.load(name), samples=SAMPLES)
+        for name, kind in STUDIED.items()
     }
     for name in MOVING:
         base = draw_base(SAMPLES, np.random.default_rng([0, 1]))
-        judgements[f"{name} on a moving base"] = judge(urdfkin.load(name), samples=SAMPLES, base=base)
-    return study_parts(judgements)
+        studies[f"{name} on a moving base"] = accuracy_study(urdfkin.load(name), samples=SAMPLES, base=base)
+    return study_parts(studies)
 
 
-def study_parts(judgements: dict[str, Judgement]) -> dict[str, str]:
-    lines = [line for judgement in judgements.values() for line in plain(judgement)["lines"]]
+def study_parts(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
+    lines = [line for study in studies.values() for line in plain(study)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
 The typical errors are compared in each line of the tables:
-{nearer_counts(lines)}. Equal errors are
+{more_accurate_counts(lines)}. Equal errors are
 the same double. The median ratio of urdfkin's typical error to Pinocchio's is
 {median(ratios):.2f}. The ratios lie between {min(ratios):.2f} and {max(ratios):.2f}."""
-    sections = [f"## {name}\n\n{_errors(judgement.lines)}" for name, judgement in judgements.items()]
+    sections = [f"## {name}\n\n{_errors(study.lines)}" for name, study in studies.items()]
     return {"counts": counts, "tables": "\n\n".join(sections)}
 
 
@@ -229,12 +230,12 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # A step is the distance of two doubles at the largest absolute value of all ends.
+            # A step is the distance of neighbouring doubles at the largest end of an interval.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
             )
-            # Numbers with an interval of width 0 do not count.
+            # Exact results have intervals of width 0 and do not count.
             inside = [
                 np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
                 for side in ("urdfkin", "pinocchio")
@@ -253,9 +254,9 @@ def _of_chains() -> Iterator[tuple[object, ...]]:
 
 
 def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
-    """Return the enclosures of random motions, and the processor time of one in ms."""
+    """Return the enclosures of random motions, and the processor time (ms) of one motion."""
     found, times = [], []
-    for seed in (0, *range(count)):  # the first one is not timed
+    for seed in (0, *range(count)):  # the first motion is not timed
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
         q, begin = robot.sample(1, seed)[0], time.process_time()
         found.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))

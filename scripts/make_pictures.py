@@ -96,7 +96,7 @@ def photograph_viewer(folder: Path) -> None:
                     browser.wait("return document.getElementById('fold') !== null")
                     browser.js("document.getElementById('fold').click()")
                 time.sleep(5)
-                # Drawing takes seconds: stop after the current picture.
+                # Drawing takes seconds, so stop after the current picture.
                 browser.js("window.requestAnimationFrame = () => 0")
                 time.sleep(2)
                 keep(browser, f"{name}{theme}")

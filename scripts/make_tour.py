@@ -57,7 +57,7 @@ def plane(axes: Any, title: str) -> None:
 
 
 def one_link(figure: Any) -> None:
-    """Draw a turning link and its endpoint's velocity (figure 7.1)."""
+    """Draw a rotating link and its endpoint's velocity (figure 7.1)."""
     axes = figure.subplots()
     a1, rate = 0.8, 1.2
     circle = link_endpoint(np.linspace(0, 2 * np.pi, 200), a1)
@@ -122,7 +122,7 @@ def integral_of_w(figure: Any) -> None:
 
 
 def euler_singularity(figure: Any) -> None:
-    """Plot the condition number of Omega, from angle rates to angular velocity, against the middle angle."""
+    """Plot the condition number of Omega (angle rates to angular velocity) against the middle angle."""
     axes = figure.subplots()
     middle = np.linspace(0.0, np.pi, 1801)[1:-1]
     for name, color, dashes, label in (("ZYZ", BLUE, "-", "ZYZ"), ("xyz", ORANGE, "--", "roll, pitch, yaw")):
@@ -165,7 +165,7 @@ def convergence(figure: Any) -> None:
 
 
 def acceleration_parts(figure: Any) -> None:
-    """Draw a point that slides on a turning arm, and the terms of its acceleration (7.125)."""
+    """Draw a point that slides on a rotating arm, and the terms of its acceleration (7.125)."""
     axes = figure.subplots()
     theta, w, alpha = 0.5, 1.4, 1.8
     z = np.array([0.0, 0.0, 1.0])

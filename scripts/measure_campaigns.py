@@ -25,7 +25,7 @@ from urdfkin.validation.cluster import connected
 from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.robot_input import subject
-from urdfkin.validation.store import opened
+from urdfkin.validation.store import open_store
 
 
 def store(*robots: Any, **how: Any) -> ValidationReport:
@@ -62,7 +62,7 @@ def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> No
     wall: dict[str, list[float]] = {name: [] for name in ways}
     processor: dict[str, list[float]] = {name: [] for name in ways}
     for name in ways * rounds:
-        begin, before = time.perf_counter(), sum(os.times()[:4])  # with the finished children
+        begin, before = time.perf_counter(), sum(os.times()[:4])  # includes finished child processes
         report = WAYS[name](robots, samples=samples)
         wall[name].append(time.perf_counter() - begin)
         processor[name].append(sum(os.times()[:4]) - before)
@@ -72,7 +72,7 @@ def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> No
     for name in ways:
         a_second = [results / median(seconds[name]) for seconds in (wall, processor)]
         share = median(p / s for p, s in zip(processor[name], processor[ways[0]], strict=True))
-        print(f"{name}: {a_second[0]:,.0f} results/s, {a_second[1]:,.0f} a second of processor;", end=" ")
+        print(f"{name}: {a_second[0]:,.0f} results/s, {a_second[1]:,.0f} per processor second;", end=" ")
         print(f"processor time {share:.3f} of {ways[0]}")
 
 
@@ -90,7 +90,7 @@ def measure_chunk() -> None:
     found = run_chunk(chunk)
     print(f"a chunk of {chunk.configurations} samples: {cost(lambda _: run_chunk(chunk), 3):.0f} ms")
     manifest = Manifest.of([robot], cut.samples, 0, "now")
-    with tempfile.TemporaryDirectory() as folder, opened(Path(folder) / "s", manifest, print) as kept:
+    with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as kept:
         print(f"time to store it: {cost(lambda i: kept.keep(0, i, found)):.2f} ms")
         print(f"time to read it: {cost(lambda i: kept.answer(0, i)):.2f} ms")
     print(f"time to add two: {cost(lambda _: found + found):.2f} ms")

@@ -1,7 +1,8 @@
 """Measure the times to write, open, search and expand a report of thousands of robots in Chromium.
 
-The script validates a few robots, and copies their results many times under other names. It prints medians
-over several runs, each with a new browser profile. The script needs Debian's chromium and chromium-driver.
+The script validates a few robots, and copies their results many times under other names. The script
+prints medians over several runs, each with a new browser profile. The script needs Debian's chromium and
+chromium-driver.
 
     python scripts/measure_page.py --robots 2000
 """
@@ -33,7 +34,7 @@ _UNFOLD = """
 
 
 def fleet(robots: int) -> Document:
-    """Return a report of `robots` robots: the results of a few, under many names."""
+    """Return a report of `robots` robots: the results of a few robots, under many names."""
     document = validate(list(_ROBOTS), samples=10).as_dict()
     few = islice(cycle(document["robots"]), robots)
     document["robots"] = [robot | {"source": f"fleet/{i:04}.urdf"} for i, robot in enumerate(few)]
@@ -66,8 +67,8 @@ if __name__ == "__main__":
             (page.parent / place).write_text(text, encoding="utf-8")
             for place, text in as_files(fleet(given.robots), page.name)
         ]
-        print(f"written: {time.process_time() - begin:.1f} s of processor, {len(sizes)} files,", end=" ")
-        print(f"the page {sizes[-1] / 1e6:.2f} MB, {sum(sizes) / 1e6:.0f} MB together")
+        print(f"written: {time.process_time() - begin:.1f} s of processor time, {len(sizes)} files,", end=" ")
+        print(f"the page {sizes[-1] / 1e6:.2f} MB, {sum(sizes) / 1e6:.0f} MB in total")
         rounds = [measured(page, Path(folder) / f"profile-{i}", given.robots) for i in range(given.rounds)]
     for name in rounds[0]:
         print(f"{name}: {median(times[name] for times in rounds):.0f} ms", end=" ")

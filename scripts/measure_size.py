@@ -20,7 +20,7 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
-    """Return the sizes in bytes of a package and its needs, without those that only `without` needs."""
+    """Return the sizes (bytes) of a package and its dependencies, except those that only `without` needs."""
     found: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()
     waiting = [(name, frozenset(extras))]

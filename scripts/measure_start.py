@@ -32,8 +32,8 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 @dataclass(frozen=True)
 class Row:
     what: str  # name of the process on the page
-    words: tuple[str, ...]  # arguments of the interpreter; ROBOT stands for a URDF outside the catalogue
-    most: float = math.inf  # limit of the time, in multiples of the time of `import numpy, pinocchio`
+    words: tuple[str, ...]  # arguments of the interpreter; ROBOT is the path of a URDF file
+    most: float = math.inf  # limit of the time; 1 is the time of `import numpy, pinocchio`
     fresh: bool = False  # whether the process starts with an empty kernel cache
 
 
@@ -44,10 +44,15 @@ ROWS = (
     Row("`urdfkin --help`", ("-c", _COMMAND, "--help")),
     Row("`urdfkin info MY.urdf`", ("-c", _COMMAND, "info", "ROBOT"), 1.3),
     Row("`urdfkin jacobian MY.urdf --q random`", _JACOBIAN, 2.0),
-    Row("the same with a fresh cache", _JACOBIAN, 2.5, fresh=True),
+    Row("`urdfkin jacobian MY.urdf --q random`, empty kernel cache", _JACOBIAN, 2.5, fresh=True),
     Row("`urdfkin same panda panda`", ("-c", _COMMAND, "same", "panda", "panda"), 2.5),
     Row("`import urdfkin`, `load`, `jacobian` in Python", ("-c", _NOTEBOOK, "ROBOT"), 2.0),
-    Row("the same with a fresh cache", ("-c", _NOTEBOOK, "ROBOT"), 2.5, fresh=True),
+    Row(
+        "`import urdfkin`, `load`, `jacobian` in Python, empty kernel cache",
+        ("-c", _NOTEBOOK, "ROBOT"),
+        2.5,
+        fresh=True,
+    ),
 )
 
 
@@ -86,7 +91,7 @@ def main() -> int:
         (row.what, f"{x:.2f}", f"{x / found[0]:.2f}", f"{row.most:.1f}" if math.isfinite(row.most) else "")
         for row, x in zip(ROWS, found, strict=True)
     ]
-    heads = ("", "processor time, s", "times `import numpy, pinocchio`", "at most")
+    heads = ("", "processor time, s", "ratio to the first row", "allowed ratio")
     figures = table(heads, rows, left=1)
     print(figures)
     insert(PAGE, start=figures)

@@ -6,10 +6,10 @@
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_slips.toml
 
 The script runs the quick tests near the mutated file. With --slow it then runs the slow tests near this file,
-and with --whole the whole test suite. The script prints every undetected mutant. Mutants that
-docs/mutation.md lists as harmless are skipped. In the past, no test detected the named mutants. A named
-mutant replaces a text of a file, and one given test must now fail. Exit 0: all mutants are detected or
-harmless. 1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
+and with --whole all other quick tests. The script prints every undetected mutant, and skips the mutants
+that docs/mutation.md lists as harmless. In the past, no test detected the named mutants. A named mutant
+replaces a text of a file, and one given test must now fail. Exit 0: all mutants are detected or harmless.
+1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
 """
 
 import argparse
@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # pytest's exit code if no test was collected
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: Numba compiles the source of these files, so a mutant made on import has no effect.
+#: Numba compiles the source text of these files, so a changed syntax tree has no effect.
 #: tests/laws/test_mutation.py mutates them without the compiler.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",
@@ -53,7 +53,7 @@ def files(parts: list[str]) -> list[Path]:
     found = {name: path for name, path in below.items() if name not in COMPILED}
     for part in parts:
         if not any(name.startswith(part) for name in found):
-            raise ValueError(f"{part}: no file below {PACKAGE.name}/ that can be mutated begins so")
+            raise ValueError(f"{part}: no file below {PACKAGE.name}/ with this prefix can be mutated")
     return [path for name, path in found.items() if not parts or name.startswith(tuple(parts))]
 
 
@@ -109,7 +109,7 @@ def named_slips() -> list[Named]:
 
 @cache
 def argued() -> dict[tuple[str, str], str]:
-    """Return the reason of each harmless mutant, by its function and its text."""
+    """Return the reason why each mutant is harmless, by the mutant's function and text."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)
@@ -168,13 +168,13 @@ def judge_named(slip: Named, *, timeout: float) -> Outcome:
     texts = json.dumps([slip.before, slip.after])
     word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
-        word = "not run"  # the test failed for another reason than the mutant
+        word = "not run"  # the test failed, but not because of the mutant
     file = slip.file.relative_to(ROOT).as_posix()
     mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
     return Outcome(mutant, word, by)
 
 
-#: This server imports the foreign libraries once, which takes longer than most tests.
+#: The fork server imports the foreign libraries once, because this takes longer than most tests.
 _READY = multiprocessing.get_context("forkserver")
 _READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 

@@ -1,7 +1,7 @@
 """List words that readers did not understand, each with a plain form, and list sentences that are too long.
 
-    python scripts/plain_words.py [PATH ...] # words of the list; exit 1 if there is one python
-    scripts/plain_words.py --long [PATH ...] # sentences of more than 30 words, for information
+    python scripts/plain_words.py [PATH ...]         # words of the list; exit 1 if there is one
+    python scripts/plain_words.py --long [PATH ...]  # sentences of more than 30 words, for information
 
 The script reads the text of pages, docstrings, comments and messages. CONTRIBUTING.md states the rules of
 style.

@@ -3,10 +3,10 @@
     python scripts/run_exported.py torch robot_torch.py robot_array.py
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
-It runs each file's own check; a file for any array library runs in the namespace of the named library.
-Derivatives of the Jacobian by PyTorch and JAX are compared with the Hessian's true values in the file, within
-the Hessian's bound, if the file has a Hessian. For the first file of PyTorch code, the script also compiles
-the functions with `torch.compile`. `scripts/check_exports.py --library` calls this script.
+The script runs each file's own check. A file of the format `array` runs with the named library. If a file has
+a Hessian, the derivatives of the Jacobian by PyTorch or JAX are compared with the Hessian's true values in
+the file, within the Hessian's bound. For the first file of PyTorch code, the script also compiles the
+functions with `torch.compile`. `scripts/check_exports.py --library` calls this script.
 """
 
 import importlib
@@ -19,7 +19,7 @@ from typing import Any
 
 
 def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
-    """Yield the largest error of each check as a share of its bound; 0 or inf for a check without one."""
+    """Yield each check's largest error as a share of its bound; 0 or inf for a check without numbers."""
     scope = runpy.run_path(path)
     if library == "jax":
         import jax
@@ -61,7 +61,7 @@ def of_compiled(scope: dict[str, Any]) -> float:
 
     found = 0.0
     for name, letters in scope["INPUTS"].items():
-        if name == "hessian":  # its many numbers take minutes to compile
+        if name == "hessian":  # the compilation takes minutes
             continue
         compiled = torch.compile(scope[name], fullgraph=True)
         inputs = [scope["GIVEN"][letter] for letter in letters]

@@ -2,20 +2,22 @@
 
     python scripts/survey_converters.py TOOL[=PYTHON]... [--robots NAME...]
 
-PYTHON is the interpreter of an environment with the tool; its default is this interpreter. A tool that reads
-MJCF gets what MuJoCo writes for the URDF. A tool that reads USD gets what the tool named in `TOOLS` writes
-for it, so that tool must be given too. usd-core and usd-exchange have modules of the same names, so each tool
-belongs in an environment of its own:
+PYTHON is the interpreter of an environment with the tool (default: this interpreter). A tool that reads MJCF
+gets the MJCF file that MuJoCo makes of the URDF. For a tool that reads USD, `TOOLS` names the tool that
+writes the USD file; give both tools. Install each tool in its own environment, because usd-core and
+usd-exchange contain modules with equal names:
 
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
     python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
 
-With one tool, a row of the table has the verdict and two sizes. With several tools, it has a cell for each,
-with the largest distance of the models as they are written. These bounds are computed without boxes, which
-saves time, so they may be larger. The long verdicts then go to standard error.
+With one tool, a row of the table shows the verdict, the largest distance and the largest angle. With several
+tools, a row has one cell for each tool, with the largest distance between the unchanged models; long verdicts
+are printed to standard error. To save time, the bounds are computed without branch and bound, so they may be
+larger.
 
-Shapes are removed first: a converter would look for meshes. MuJoCo refuses a moving body without mass, so it
-is told to give such a body a small one, and to correct impossible inertias.
+The script removes shapes, because a converter would search for their meshes. MuJoCo refuses a moving body
+without mass, so the script sets options with which MuJoCo gives such a body a small mass and corrects
+impossible inertias.
 """
 
 import argparse
@@ -30,7 +32,7 @@ from xml.etree import ElementTree
 
 import urdfkin
 from scripts.pages import table
-from urdfkin.comparison.bounds import MOST
+from urdfkin.comparison.bounds import MOST_BOXES
 from urdfkin.comparison.result import Sameness, Verdict, angle, length
 from urdfkin.urdf.catalogue import catalogue
 
@@ -89,7 +91,7 @@ TOOLS = {
         ".urdf",
     ),
 }
-#: Short words for a verdict, by its beginning; the first that fits.
+#: Short form of a verdict, by the verdict's first words; the first match counts.
 _SHORT = {
     "same up to": "single precision",
     "same": "same",
@@ -102,7 +104,7 @@ _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true
 
 
 class RefusalError(Exception):
-    """A converter refuses a robot, or its result is not compared; the message is a cell of the table."""
+    """A converter refuses a robot, or its result cannot be compared; the message is printed in the table."""
 
 
 def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
@@ -129,7 +131,7 @@ def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sa
         files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
         try:
             source = _loaded(files[0]) if TOOLS[tool].reads else robot
-            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MOST)
+            return urdfkin.same(source, _loaded(files[1]), boxes=0 if len(pythons) > 1 else MOST_BOXES)
         except urdfkin.UrdfkinError as error:
             raise RefusalError(f"not compared: {error.what}") from None
 
@@ -178,7 +180,7 @@ def wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Itera
 
 
 def _loaded(file: Path) -> urdfkin.Robot:
-    """Return the robot of a file; a root link without mass gives a stage with several articulations."""
+    """Return the robot of a file. If a USD file has several articulations, read all of them."""
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:

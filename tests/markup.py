@@ -1,14 +1,14 @@
-"""An HTML page as tests see it: its elements, its skeleton without words, its text, its scripts."""
+"""The elements, the text and the scripts of an HTML page."""
 
 from html.parser import HTMLParser
 
 
 class Page(HTMLParser):
-    """What is on a page, in order.
+    """The content of an HTML page, in file order.
 
     Attributes:
         elements: Tags with their attributes.
-        skeleton: Tags with the names of their attributes, ends, comments, declarations and instructions.
+        skeleton: Tags with the names of their attributes, end tags, comments, declarations and instructions.
         words: Pieces of text outside scripts and styles.
         prose: Text outside scripts, styles and code.
         scripts: Texts of scripts and styles.
@@ -53,9 +53,8 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        """The words, one blank between them."""
         return " ".join(" ".join(self.words).split())
 
     def all(self, tag: str) -> list[dict[str, str | None]]:
-        """The attributes of every element of a kind."""
+        """Return the attributes of every element with a tag."""
         return [attributes for name, attributes in self.elements if name == tag]

@@ -1,7 +1,7 @@
-"""What Pinocchio says about a `KinematicTree`: the one place where tests of chains and tables ask it.
+"""Pinocchio's results for a `KinematicTree`, for tests of chains and tables.
 
-The model is built joint by joint from the tree, without any URDF, so that a test of geometry does not lean
-on a reader or a writer. Followers are free joints in the model and coupled outside.
+The model is built joint by joint from the tree, without a URDF, so the tests do not depend on a reader or a
+writer. Mimic joints are independent joints in the model, and coupled by G.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ class TreeOracle:
     def __init__(self, tree: KinematicTree) -> None:
         self.tree = tree
         self.model = pin.Model()
-        poses = [(0, pin.SE3.Identity())]  # of each link: the pinocchio joint it moves with, and where
-        self.slots = list[int]()  # pinocchio's index of each moving joint, in the tree's order
+        poses = [(0, pin.SE3.Identity())]  # Pinocchio's joint of each link, and the link's pose in it
+        self.slots = list[int]()  # Pinocchio's index of each moving joint, in the order of the tree
         for joint in tree.joints:
             carrier, placement = poses[joint.parent]
             here = placement * pin.SE3(joint.T_parent_joint)
@@ -43,7 +43,6 @@ class TreeOracle:
             self.G[row, tree.q_index[leader]] = joint.mimic.multiplier if joint.mimic else 1.0
 
     def frame(self, link: str) -> int:
-        """Pinocchio's index of a link's frame."""
         return int(self.model.getFrameId(link, pin.FrameType.BODY))
 
     def placement(self, q: FloatArray, tip: str, base: str) -> FloatArray:
@@ -60,7 +59,7 @@ class TreeOracle:
         pin.computeJointJacobians(self.model, self.data, self.G @ q + self.offset)
         pin.updateFramePlacements(self.model, self.data)
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        # A robot of one joint gets a vector from Pinocchio's binding.
+        # For one joint, Pinocchio returns a vector.
         J = np.reshape(pin.getFrameJacobian(self.model, self.data, self.frame(tip), reference), (6, -1))
         return np.asarray(J @ self.G)
 
@@ -75,5 +74,4 @@ class TreeOracle:
 
 
 def worst(a: FloatArray, b: FloatArray, axes: Sequence[int] | None = None) -> float:
-    """The largest difference of two arrays."""
     return float(np.abs(a - b).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""What tests read: records and trees of texts, modules of files, and values that must not be None."""
+"""Functions that read records and trees from texts, import files, and check for None."""
 
 from __future__ import annotations
 
@@ -18,13 +18,11 @@ T = TypeVar("T")
 
 
 def present(value: T | None) -> T:
-    """Return a value that must not be None."""
     assert value is not None
     return value
 
 
 def module_of(path: Path) -> ModuleType:
-    """Import a file."""
     spec = present(importlib.util.spec_from_file_location(path.stem, path))
     found = importlib.util.module_from_spec(spec)
     present(spec.loader).exec_module(found)
@@ -32,7 +30,7 @@ def module_of(path: Path) -> ModuleType:
 
 
 def records(data: bytes) -> RobotRecord:
-    """What a text says."""
+    """Return the records of a URDF."""
     report = Reporter("<text>", data)
     urdf = read_urdf(report)
     if urdf is None:
@@ -41,5 +39,5 @@ def records(data: bytes) -> RobotRecord:
 
 
 def tree_of(data: bytes, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
-    """The tree that it stands for."""
+    """Return the kinematic tree of a URDF."""
     return read_tree(records(data), mimic=mimic, root_joint=root_joint)

@@ -18,10 +18,10 @@ def test_load_of_a_file_with_mimic_joints_and_warnings_runs_through_at_most_19_f
     assert len(files) <= 19, files
 
 
-def test_same_of_two_urdf_files_runs_through_at_most_35_files() -> None:
+def test_same_of_two_urdf_files_runs_through_at_most_33_files() -> None:
     files = files_of_same(A, B)
     assert {"robot/loading.py", "comparison/verdict.py"} <= set(files)
-    assert len(files) <= 35, files
+    assert len(files) <= 33, files
 
 
 def test_a_call_counts_and_code_that_runs_during_an_import_does_not() -> None:

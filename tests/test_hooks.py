@@ -1,7 +1,4 @@
-"""How repositories of robots take urdfkin in, step by step and without a network.
-
-pre-commit clones and builds it and guards a commit; the GitHub Action installs it and annotates lines.
-"""
+"""Repositories of robots use urdfkin through pre-commit and through the GitHub Action, without a network."""
 
 from __future__ import annotations
 
@@ -22,9 +19,9 @@ from packaging.requirements import Requirement
 yaml = pytest.importorskip("yaml", reason="pip install pre-commit, which brings it")
 
 ROOT = Path(__file__).parents[1]
-#: What builds urdfkin, and what the hook installs: pure Python, as is all that these need.
+#: Packages, in pure Python, that build urdfkin or that the hook installs
 PACKAGES = ("hatchling", "click")
-#: What a build needs of the repository.
+#: Files and folders of the repository that a build needs
 SOURCES = (
     "pyproject.toml", "README.md", "LICENSE", ".pre-commit-hooks.yaml", "urdfkin", "robots",
     "docs/questions.md",
@@ -37,7 +34,7 @@ LONG = """<robot name="r"><link name="a"/><link name="b"/>
 
 
 def with_what_it_needs(name: str, found: set[str]) -> set[str]:
-    """A package, and those that it needs in turn."""
+    """Add a package and all packages that it needs to `found`."""
     if name not in found:
         found.add(name)
         for line in importlib.metadata.requires(name) or ():
@@ -48,7 +45,7 @@ def with_what_it_needs(name: str, found: set[str]) -> set[str]:
 
 
 def wheel(name: str, folder: Path) -> None:
-    """An installed package as the wheel that it came in."""
+    """Write an installed package as a wheel into a folder."""
     found = importlib.metadata.distribution(name)
     tag = next(line[5:] for line in (found.read_text("WHEEL") or "").splitlines() if line.startswith("Tag: "))
     assert tag.endswith("-none-any"), name
@@ -64,7 +61,7 @@ def wheel(name: str, folder: Path) -> None:
 
 
 class Repository:
-    """A git repository, and commands in it that see the wheels and no index."""
+    """A git repository, with commands that install packages only from the wheels."""
 
     def __init__(self, folder: Path, environ: dict[str, str]) -> None:
         self.folder, self.environ = folder, environ
@@ -84,7 +81,7 @@ class Repository:
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Repository:
-    """This very tree as a repository, and all that building and installing it needs."""
+    """Make a repository with urdfkin's files, and the wheels that a build and an installation need."""
     folder = tmp_path_factory.mktemp("hooks")
     wheels = folder / "wheels"
     wheels.mkdir()
@@ -116,7 +113,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Repository:
 
 @pytest.fixture(scope="module")
 def robots(source: Repository) -> Repository:
-    """A repository of robots into which the hooks were installed."""
+    """Make a repository of robots with the hooks installed."""
     pytest.importorskip("pre_commit", reason="pip install pre-commit, which the extra [test] holds")
     made = Repository(source.folder.parent / "robots", source.environ)
     revision = source.run("git", "rev-parse", "HEAD").strip()
@@ -164,26 +161,26 @@ def test_the_hooks_environment_holds_urdfkin_and_click_and_nothing_that_computes
 
 
 def steps() -> list[dict[str, Any]]:
-    """The action's own steps: those that run a script."""
+    """Return the action's steps that run a script."""
     action = yaml.safe_load((ROOT / "action.yml").read_text("utf-8"))
     return [step for step in action["runs"]["steps"] if "run" in step]
 
 
 @pytest.fixture(scope="module")
 def runner(source: Repository) -> Repository:
-    """A repository of robots on a machine where the action's first step has installed urdfkin."""
+    """Make a repository of robots, where the action's first step has installed urdfkin."""
     made, home = Repository(source.folder.parent / "runner", {**source.environ}), str(source.folder.parent)
     made.environ |= {"RUNNER_TEMP": home, "PYTHON": sys.executable, "ACTION": str(source.folder)}
     (made.folder / "arm.urdf").write_text(LONG)
     made.commit()
-    # What a stranger puts there is never run.
+    # A module of the repository must not run.
     (made.folder / "click.py").write_text("raise SystemExit('run')\n")
     made.run("bash", "-eo", "pipefail", "-c", steps()[0]["run"])
     return made
 
 
 def act(runner: Repository, *, fails: bool, **inputs: str) -> tuple[str, str]:
-    """What the second step prints, and the summary that it leaves."""
+    """Run the action's second step; return its output and its summary."""
     summary = runner.folder.parent / "summary.md"
     summary.write_text("")
     given = {"FILES": ".", "SINCE": "", "OPTIONS": "", "SARIF": "", "GITHUB_STEP_SUMMARY": str(summary)}
@@ -232,7 +229,7 @@ def test_the_action_fails_where_two_files_of_a_robot_differ(tmp_path: Path) -> N
     assert compare("a.urdf\nb c.urdf") == 1
     assert "SAME" in summary.read_text()
     assert "DIFFERS" in summary.read_text()
-    assert summary.read_text().count("origin x") == 1  # the list of differences follows the answer
+    assert summary.read_text().count("origin x") == 1  # only the list of differences has this text
     assert compare("a.urdf\nb c.urdf", "0.01") == 0
     assert compare("a.urdf\nb c.urdf", "1; touch RUN") == 2
     assert not (tmp_path / "RUN").exists()

@@ -130,6 +130,11 @@ def test_what_is_argued_can_still_be_made_and_stands_on_the_page_once() -> None:
     assert argued().keys() <= {(mutant.place, mutant.what) for mutant in mutants(sorted(parts))}
 
 
+def test_a_harmless_mutant_is_one_line_of_the_page() -> None:
+    assert not [what for _, what in argued() if "\n" in what]
+    assert all(why[-1] == "." for why in argued().values())
+
+
 @pytest.mark.parametrize(
     "words", [["verification"], ["validation", "judge", "--count"], ["keeping", "--named"]]
 )

@@ -1,4 +1,4 @@
-"""A number that is not finite is found wherever it stands, and its joint named, with a check and without."""
+"""An infinite or NaN number raises an error with the name of the joint, with and without a check."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -17,9 +17,9 @@ from urdfkin.robot.frame_motion import frame_motion
 
 Compute = Callable[..., object]
 
-#: How many of q, v, a a method takes, and the call. The finger, and what lies behind link 3, are not on the
-#: path to this frame.
+#: A frame whose path contains neither the finger nor the joints after link 3.
 FRAME = "panda_link3"
+#: Number of inputs of a method, from q, v and a; and a call of the method.
 METHODS: dict[str, tuple[int, Compute]] = {
     "placement": (1, lambda r, q, **o: r.placement(q, FRAME, **o)),
     "velocity": (2, lambda r, q, v, **o: r.velocity(q, v, FRAME, **o)),
@@ -46,7 +46,7 @@ def panda() -> Robot:
 
 
 def spoiled(inputs: list[FloatArray], samples: tuple[int, ...]) -> Iterator[tuple[int, int, float]]:
-    """Each place of some samples in turn; yields which input, which coordinate, and what stands there."""
+    """Replace each number of some samples in turn; yield the indices of input and number, and the value."""
     places = ((i, sample, k) for i, x in enumerate(inputs) for sample in samples for k in range(x.shape[-1]))
     for (which, sample, coordinate), bad in zip(places, itertools.cycle(BAD), strict=False):
         x = inputs[which]
@@ -98,7 +98,7 @@ def test_among_the_coordinates_of_planar_and_floating_joints(verify: bool) -> No
     inputs = list(state(robot, 2, 4))
     for which, coordinate, _ in spoiled(inputs, (0, 1)):
         name = (robot.rate_names if which else robot.coordinate_names)[coordinate]
-        # A quaternion is looked at before all else, and its joint named.
+        # The error about a quaternion names only the joint.
         joint = name.split(".")[0]
         with pytest.raises(InputError, match=joint):
             robot.acceleration(inputs[0], inputs[1], inputs[2], robot.tip_frame, verify=verify)

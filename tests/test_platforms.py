@@ -40,7 +40,7 @@ def test_no_limit_of_memory_is_derived_where_the_system_states_none(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(memory, "_PROC", tmp_path)
-    assert memory.share(2) is None
+    assert memory.limit(2) is None
 
 
 @pytest.mark.parametrize("system", ["linux", "darwin"])

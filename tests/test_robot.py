@@ -23,9 +23,9 @@ from urdfkin.kinematics import roundings
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
-from urdfkin.robot import _INSIDE, Robot
+from urdfkin.robot import _INTERNAL, Robot
 from urdfkin.verify import verifier
-from urdfkin.verify.certificate import BatchComparison
+from urdfkin.verify.comparison import BatchComparison
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import PinocchioOracle
 from urdfkin.verify.quantities import QUANTITIES, Quantity
@@ -38,7 +38,7 @@ def panda() -> Robot:
 
 @pytest.fixture
 def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bound so tight that rounding breaks it: the way to a VerificationError without a wrong result."""
+    """Make all bounds smaller than rounding errors, so that correct results raise VerificationError."""
     monkeypatch.setattr(roundings, "ROUNDINGS", 1e-9)
 
 
@@ -46,7 +46,7 @@ METHODS = ["placement", "velocity", "jacobian", "jacobian_rate", "hessian", "acc
 
 
 def disagreement(robot: Robot, quantity: str, **base: BaseMotion) -> urdfkin.VerificationError:
-    """The error of one call on a batch (2, 3), in the local reference where there is one."""
+    """Return the error of a call with a batch (2, 3), in LOCAL if the quantity has a reference frame."""
     q = robot.sample(6, 1).reshape(2, 3, robot.nq)
     v, a = np.random.default_rng(2).normal(size=(2, 2, 3, robot.nv))
     inputs = {"velocity": (q, v), "jacobian_rate": (q, v), "acceleration": (q, v, a)}.get(quantity, (q,))
@@ -85,7 +85,7 @@ def test_its_line_repeats_the_case(quantity: str, root_joint: Any, monkeypatch: 
     assert f"the {error.quantity} of panda_hand_tcp" in again.err
     monkeypatch.undo()
     result = good(*words[1:], "--format", "json")
-    # In lanes and alone the last digits may differ; the case is the same one.
+    # A single configuration and a batch may differ in the last digits.
     assert np.abs(np.array(result.data["result"][0]) - error.ours).max() < 1e-12
 
 
@@ -118,37 +118,6 @@ def test_on_a_moving_base_the_line_is_python(panda: Robot, quantity: str, batch:
     assert np.abs(again.value.ours - error.ours).max() < 1e-12
 
 
-def test_the_certificate_counts_what_was_checked_and_says_what_was_not(panda: Robot) -> None:
-    assert not panda.certificate().verified
-    q = panda.sample(5, 1)
-    panda.jacobian(q, "panda_hand")
-    panda.placement(q[:2], ["panda_hand", "panda_link3", "panda_link4"])
-    certificate = panda.certificate()
-    assert certificate.verified
-    assert {line.quantity: line.checked for line in certificate.lines} == {"jacobian": 5, "placement": 6}
-    assert all(0.0 < line.worst < 100.0 and 0.0 < line.share < 1.0 for line in certificate.lines)
-    assert certificate.oracle.startswith("Pinocchio 4.")
-    panda.velocity(q, q, "panda_hand", verify=False)
-    certificate = panda.certificate()
-    assert not certificate.verified
-    assert certificate.not_verified == ("the check was turned off by verify=False",)
-    assert "velocity: 0 checked" in str(certificate)
-    assert "5 not checked" in str(certificate)
-
-
-def test_an_empty_batch_certifies_nothing(panda: Robot) -> None:
-    panda.jacobian(np.zeros((0, 8)), "panda_hand")
-    assert not panda.certificate().verified
-
-
-def test_a_call_may_ask_for_the_check_that_the_robot_leaves_out() -> None:
-    robot = urdfkin.load("ur5", verify=False)
-    robot.jacobian(robot.neutral(), "tool0", verify=True)
-    assert robot.certificate().verified
-    robot.jacobian(robot.neutral(), "tool0")
-    assert not robot.certificate().verified
-
-
 @pytest.mark.parametrize(
     ("name", "velocity", "reason"), [("universe", 1, "reads another robot"), ("j", -1, "refuses the file")]
 )
@@ -159,9 +128,11 @@ def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_v
     text = urdfs.robot(joint(name, "revolute", "a", "b", axis="", more=more))
     with pytest.warns(urdfkin.UrdfWarning):
         robot = urdfkin.load(text)
-    with pytest.warns(urdfkin.NotVerifiedWarning, match=f"not verified: Pinocchio {reason}"):
-        assert robot.jacobian([0.3], "b")[3:, 0].tolist() == [1.0, 0.0, 0.0]
+    for _ in range(2):
+        with pytest.warns(urdfkin.NotVerifiedWarning, match=f"not verified: Pinocchio {reason}"):
+            assert robot.jacobian([0.3], "b")[3:, 0].tolist() == [1.0, 0.0, 0.0]
     certificate = robot.certificate()
+    assert [(line.checked, line.unchecked) for line in certificate.lines] == [(0, 2)]
     assert not certificate.verified
     assert reason in certificate.not_verified[0]
 
@@ -177,7 +148,7 @@ def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.Monkey
 def test_a_disagreement_whose_share_is_no_number_is_raised_too(
     monkeypatch: pytest.MonkeyPatch, panda: Robot
 ) -> None:
-    # An infinite disagreement with an infinite bound: of the two parts of a check, either may be such a one.
+    # An infinite disagreement with an infinite bound has the share NaN, in either part of a check.
     wrong, right = BatchComparison(1, np.inf, np.nan, (0, 0)), BatchComparison(1, 1.0, 0.5, (0, 0))
     for results in ([wrong], [wrong, right], [right, wrong]):
         found = iter(results)
@@ -187,24 +158,22 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
             panda.placement(panda.sample(len(results)), "panda_hand", verify=True)
 
 
-INPUTS: dict[str, Any] = {
-    "text": "abc", "complex numbers": np.ones(8) * 1j, "a ragged list": [[1.0], [1.0, 2.0]], "none": None,
-    "dates": np.zeros(8, dtype="datetime64[s]"), "strings of numbers": ["0"] * 8,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", INPUTS)
-def test_what_is_no_numbers_is_refused(panda: Robot, kind: str) -> None:
-    value = INPUTS[kind]
-    with pytest.raises(UrdfkinError, match=r"q must be real numbers|q needs 8 numbers|unknown pose 'abc'"):
+@pytest.mark.parametrize(
+    "value",
+    ["abc", np.ones(8) * 1j, [[1.0], [1.0, 2.0]], None, np.zeros(8, dtype="M8[s]"), ["0"] * 8],
+    ids=repr,
+)
+def test_what_is_no_numbers_is_refused(panda: Robot, value: Any) -> None:
+    no_numbers = "must be real numbers|needs 8 numbers"
+    with pytest.raises(UrdfkinError, match=f"q ({no_numbers})|unknown pose 'abc'"):
         panda.placement(value, "panda_hand")
-    with pytest.raises(UrdfkinError, match=r"v must be real numbers|v needs 8 numbers|unknown pose 'abc'"):
+    with pytest.raises(UrdfkinError, match=f"v ({no_numbers})|unknown pose 'abc'"):
         panda.velocity(np.zeros(8), value, "panda_hand")
-    with pytest.raises(UrdfkinError, match=r"q must be real numbers|q must be finite|wrong length"):
+    with pytest.raises(UrdfkinError, match=r"q must be (real numbers|finite)|wrong length"):
         panda.from_pinocchio(value)
 
 
-def test_a_wrong_length_names_the_joints(panda: Robot) -> None:
+def test_a_wrong_length_names_the_joints_and_pinocchios_numbers_must_be_finite(panda: Robot) -> None:
     with pytest.raises(InputError, match=r"q needs 8 numbers for panda: panda_joint1, .*found shape \(7,\)"):
         panda.placement(np.zeros(7), "panda_hand")
     with pytest.raises(InputError, match=r"a needs 8 numbers for panda: panda_joint1"):
@@ -213,16 +182,9 @@ def test_a_wrong_length_names_the_joints(panda: Robot) -> None:
         urdfkin.load(urdf_of("single_link")).placement([1.0], "base")
     with pytest.raises(InputError, match="wrong length"):
         panda.from_pinocchio(np.zeros(8))
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_number_that_is_not_finite_is_found_and_its_joint_named(panda: Robot, bad: float) -> None:
-    q = panda.sample(4, 1)
-    q[2, 5] = bad
-    with pytest.raises(InputError, match=f"panda_joint6: q must be finite: found {bad}"):
-        panda.jacobian(q, "panda_hand")
-    with pytest.raises(InputError, match="finite"):
-        panda.from_pinocchio(np.full(9, bad))
+    for bad in (np.nan, np.inf, -np.inf):
+        with pytest.raises(InputError, match="finite"):
+            panda.from_pinocchio(np.full(9, bad))
 
 
 def test_batches_that_do_not_fit_are_refused_with_their_shapes(panda: Robot) -> None:
@@ -274,7 +236,7 @@ def test_a_base_that_is_none_is_refused() -> None:
         ({"velocity": [1.0, 2.0]}, r"\(\.\.\., 6\)"),
         ({"velocity": "fast"}, "real numbers"),
         ({"acceleration": [0, 0, 0, 0, 0, np.nan]}, "finite"),
-        ({"velocity": np.zeros((2, 6)), "acceleration": np.zeros((3, 6))}, "do not fit"),
+        ({"velocity": np.zeros((2, 6)), "acceleration": np.zeros((3, 6))}, "do not broadcast"),
     ):
         with pytest.raises(InputError, match=message):
             BaseMotion(**words)
@@ -343,14 +305,13 @@ def test_the_oracle_keeps_out_of_what_would_end_the_process() -> None:
 
 
 def snake(links: int, *, fixed: bool) -> str:
-    """A chain whose first joint moves, and whose others do unless they are fixed."""
     kinds = ["continuous"] + ["fixed" if fixed else "continuous"] * (links - 1)
     joints = (joint(f"j{i}", k, f"l{i}", f"l{i + 1}", 'xyz="0.01 0 0"') for i, k in enumerate(kinds))
     return urdfs.robot(*joints, name="snake")
 
 
 def test_the_oracle_reads_names_and_layout_from_the_tree_and_nothing_else(panda: Robot) -> None:
-    # Whatever the tree says of places, axes and limits, the answer is the text's.
+    # The oracle's results do not depend on the poses and axes in the tree.
     other = urdfkin.load("panda")
     for each in other.tree.joints:
         object.__setattr__(each, "T_parent_joint", np.eye(4))
@@ -360,7 +321,7 @@ def test_the_oracle_reads_names_and_layout_from_the_tree_and_nothing_else(panda:
     assert (one == two).all()
 
 
-@pytest.mark.parametrize("name", sorted({name for name in vars(Robot) if name[0] != "_"} - _INSIDE))
+@pytest.mark.parametrize("name", sorted({name for name in vars(Robot) if name[0] != "_"} - _INTERNAL))
 def test_the_help_of_a_method_describes_each_argument_in_the_order_of_its_signature(name: str) -> None:
     text, method = inspect.getdoc(vars(Robot)[name]) or "", vars(Robot)[name]
     section = text.partition("Args:\n")[2].partition("\n\n")[0]

@@ -1,4 +1,4 @@
-"""Objects show themselves: by print, in notebooks, Markdown and LaTeX, whatever names a file brings."""
+"""Objects display safely in a terminal, a notebook, Markdown and LaTeX, whatever names a file has."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def objects(robot: Robot) -> dict[str, Any]:
     }  # fmt: skip
 
 
-#: What must stand in each form of each object.
+#: Texts in each display form of each object
 SAYS = {
     "robot": ("panda: nq 8, nv 8", "panda_joint4", "-3.0718", "-0.0698", "2.175"),
     "table": ("standard Denavit-Hartenberg parameters", "panda_joint4", "0.316", "0.0825"),
@@ -111,7 +111,7 @@ def test_a_name_from_a_strangers_file_is_text_in_every_form(name: str) -> None:
     for made in sheets():
         sheet, tame = made(name), made("tame")
         tags = [tag for tag, _ in Page(sheet.html()).skeleton]
-        while tags:  # every element ends inside the one in which it begins
+        while tags:  # elements are nested
             end = next(i for i, tag in enumerate(tags) if tag.startswith("/"))
             assert tags[end] == f"/{tags[end - 1]}"
             assert tags[end - 1] in {"div", "p", "b", "table", "thead", "tbody", "tr", "th", "td"}
@@ -200,12 +200,12 @@ def test_a_table_shows_itself_whatever_was_imported_first() -> None:
     assert "standard Denavit-Hartenberg parameters" in done.stdout
 
 
-#: Names that a URDF can hold; printed as they are, they would act on a terminal or a log.
+#: Names in a URDF that have an effect on a terminal or a log if they are printed without escapes
 ACTING = ("line", "carriage", "workflow", "workflow after a blank", "azure", "colours of one byte", "bidi")
 
 
 def printed(name: str) -> dict[str, str]:
-    """What `print` and `repr` say of the objects of a robot that bears a name."""
+    """Return the texts that `print` and `repr` show of objects of a robot with a given name."""
     text = urdf(name)
     robot = urdfkin.load(text)
     q = [0.1, 0.2]

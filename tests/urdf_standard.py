@@ -1,9 +1,9 @@
-"""Kinematics of URDF, written from the standard (https://wiki.ros.org/urdf/XML) and textbook definitions.
+"""Kinematics of URDF from the URDF standard (https://wiki.ros.org/urdf/XML) and textbook definitions.
 
-It shares no code with urdfkin. The standard library parses the XML. Numbers have 90 digits (mpmath). Poses
-are products of homogeneous matrices, velocities and accelerations are differences of poses along a motion,
-and the Jacobian is z x (p - o) for each axis. Its derivatives are differences of Jacobians. A difference with
-a step of 1e-25 is right to 25 digits or more.
+This module shares no code with urdfkin. The standard library parses the XML. Numbers have 90 digits (mpmath).
+Poses are products of homogeneous matrices. Velocities and accelerations are differences of poses along a
+motion. A column of the Jacobian is z x (p - o), and derivatives of the Jacobian are differences of Jacobians.
+A difference with a step of 1e-25 is correct to at least 25 digits.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 mp = mpmath.mp.clone()
 mp.dps = 90
 _STEP = mp.mpf(10) ** -25
-#: Value of a joint: a number; x, y and an angle; or x, y, z and a quaternion x, y, z, w.
+#: Value of a joint: a number, or a rotation and a position.
 Value = Any
 
 
@@ -55,7 +55,7 @@ def _pose(R: Any, p: Any) -> Any:
 
 
 def _quaternion(x: Any, y: Any, z: Any, w: Any) -> Any:
-    """Return the rotation of a quaternion of any length, from q v q*."""
+    """Return the rotation v -> q v q* of a quaternion q of any length."""
     v, s = _vector((x, y, z)), x * x + y * y + z * z + w * w
     return ((2 * w * w - s) * _UNIT[:3, :3] + 2 * np.outer(v, v) + 2 * w * _skew(v)) / s
 
@@ -72,7 +72,7 @@ _FREE = {
 
 
 class _Joint:
-    """A joint of the file: its kind, its pose in the parent link, its axis and its rule."""
+    """The type, the pose in the parent link, the axis and the mimic rule of a joint."""
 
     def __init__(self, element: ET.Element, version: str) -> None:
         self.kind, origin = element.get("type"), element.find("origin")
@@ -110,18 +110,14 @@ class _Joint:
 
 
 class Robot:
-    """A robot of a URDF file.
-
-    Values are by the name of the joint: a number, or for a planar or floating joint a rotation and a
-    position in the joint's frame (`value`).
-    """
+    """A robot of a URDF file. The value of a planar or floating joint is a rotation and a position."""
 
     def __init__(self, text: str | bytes) -> None:
         root = ET.fromstring(text)
         version = root.get("version", "1.0")
         self.joints = {joint.get("name", ""): _Joint(joint, version) for joint in root.findall("joint")}
         for joint in self.joints.values():
-            if joint.leader not in self.joints:  # such a joint is free
+            if joint.leader not in self.joints:  # the joint moves independently
                 joint.leader = ""
         self.links = [link.get("name", "") for link in root.findall("link")]
         self.above = {joint.child: name for name, joint in self.joints.items()}
@@ -142,7 +138,7 @@ class Robot:
         return names
 
     def rule(self, name: str) -> tuple[str, Any, Any]:
-        """Return the joint that a joint follows in the end, with multiplier and offset."""
+        """Return the independent joint that a joint mimics, with multiplier and offset."""
         joint = self.joints[name]
         if not joint.leader:
             return name, mp.mpf(1), mp.mpf(0)
@@ -150,7 +146,7 @@ class Robot:
         return leader, joint.multiplier * multiplier, joint.multiplier * offset + joint.offset
 
     def own(self, name: str, values: Mapping[str, Value]) -> Value:
-        """Return the value of a joint, also of a mimic joint and of a fixed joint."""
+        """Return the value of a joint, which may be a mimic joint or a fixed joint."""
         leader, multiplier, offset = self.rule(name)
         value = values.get(leader)
         return value if leader == name else multiplier * value + offset
@@ -165,7 +161,7 @@ class Robot:
     def later(self, values: Mapping[str, Value], v: Mapping[str, Any], a: Mapping[str, Any], t: Any) -> Any:
         """Return the values after a time t, to second order in t, from joint velocities and accelerations.
 
-        A planar or floating joint has the linear and the angular velocity of the child link in its axes.
+        The velocity of a planar or floating joint is the velocity of the child link in the link's axes.
         """
         found: dict[str, Value] = {}
         for name, value in values.items():
@@ -191,9 +187,9 @@ class Robot:
     def jacobians(
         self, link: str, values: Mapping[str, Value], columns: Mapping[str, int]
     ) -> dict[tuple[str, int], Any]:
-        """Return the columns of the Jacobians that may differ from 0, by reference frame and index.
+        """Return the columns of the Jacobians that may differ from 0, by reference frame and column index.
 
-        `columns` has the index of each joint's first column.
+        `columns` contains the index of each joint's first column.
         """
         axes: list[tuple[int, Any, Any, bool, Any]] = []  # index, multiplier, axis, whether it turns, point
         T = _UNIT
@@ -223,10 +219,7 @@ class Robot:
     ) -> dict[tuple[str, str | None], list[Any]]:
         """Return all quantities of a link, each as a list whose last index varies fastest.
 
-        Args:
-            link: Name of the link.
-            sample: q, v and a.
-            joints: Name of each joint with coordinates, and its places in q and v.
+        `sample` has q, v and a. `joints` has the name and the slices of q and v of each moving joint.
         """
         values = {one["name"]: self.value(one["name"], sample["q"][slice(*one["q"])]) for one in joints}
         v, a = (
@@ -259,7 +252,8 @@ class Robot:
             back = R.T if reference == "local" else _UNIT[:3, :3]
             velocity = p_1 - _skew(w) @ p if at_origin else p_1
             classical = p_2 - (_skew(alpha) + _skew(w) @ _skew(w)) @ p if at_origin else p_2
-            # the time derivative of the numbers of the velocity in WORLD; in LOCAL, those of R^T p'
+            # The linear part is the time derivative of the linear velocity's components R^T p' or, in WORLD,
+            # of the components in the world's axes.
             spatial = R @ (R_1.T @ p_1 + R.T @ p_2)
             if at_origin:
                 spatial = p_2 - _skew(alpha) @ p - _skew(w) @ p_1

@@ -1,4 +1,4 @@
-"""Small URDF texts, written joint by joint: a test states what its robot is, and not its XML."""
+"""Functions that write the XML of small URDFs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from urdfkin.urdf.writer import to_urdf
 
 
 def limit(lower: object = -1, upper: object = 1) -> str:
-    """Limits, with an effort and a velocity of 1."""
+    """Write a <limit> with an effort and a velocity of 1."""
     return f'<limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>'
 
 
@@ -26,14 +26,14 @@ def mimic(leader: str, multiplier: object = 1, offset: object = 0) -> str:
 def joint(
     name: str, kind: str, parent: str, child: str, origin: str = "", axis: str = "0 0 1", more: str = ""
 ) -> str:
-    """A joint; `origin` has the attributes of its origin, `more` its other elements."""
+    """Write a joint; `origin` are the attributes of <origin>, and `more` are additional elements."""
     inside = f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
     inside += f"<origin {origin}/>" * bool(origin) + f'<axis xyz="{axis}"/>' * bool(axis) + more
     return f'<joint name={quoteattr(name)} type="{kind}">{inside}</joint>'
 
 
 def robot(*joints: str, name: str = "r", attributes: str = "") -> str:
-    """The joints with the links that they name, in the order in which they name them."""
+    """Write a robot with joints, and with the links of these joints."""
     links = dict.fromkeys(re.findall(r"<(?:parent|child) (link=(?:\"[^\"]*\"|'[^']*'))/>", "".join(joints)))
     named = "".join(f"<{link.replace('=', ' name=', 1)}/>" for link in links)
     return f"<robot name={quoteattr(name)} {attributes}>{named}{''.join(joints)}</robot>"
@@ -46,13 +46,13 @@ def chain(
     axis: str = "0 0 1",
     **how: Any,
 ) -> str:
-    """Links l0, l1, ... in a chain, with a joint j0, j1, ... for each text, which stands inside the joint."""
+    """Write a chain of links l0, l1, ... with a joint j0, j1, ... for each text of additional elements."""
     parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", origin, axis, x) for i, x in enumerate(inside)]
     return robot(*parts, **how)
 
 
 def loaded(source: Any, **how: Any) -> Robot:
-    """The robot of a text, or of another source or a tree, whose warnings are no matter."""
+    """Load a robot from any source or from a tree, without warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         return urdfkin.load(to_urdf(source) if isinstance(source, KinematicTree) else source, **how)

@@ -1,8 +1,9 @@
 // Compare answers with test vectors: compare VECTORS.tsv ANSWERS.tsv
 // Standard C++17, no library. Build: g++ -std=c++17 -O2 compare.cpp -o compare
 // A line has six fields between tabs: sample, frame, reference, quantity, values, tolerances.
-// An answer needs the first five; lines without an answer are counted. Exit code 0: all numbers of all answers
-// are within their tolerances; 1: they are not; 2: a file cannot be read, or nothing was compared.
+// A line of answers needs only the first five fields. The program counts the test vectors without an answer.
+// Exit code 0: all numbers of all answers are within their tolerances; 1: a number is not within its tolerance;
+// 2: a file cannot be read, or nothing was compared.
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -23,7 +24,7 @@ std::vector<double> numbers(const std::string &text) {
     return found;
 }
 
-std::map<std::string, Line> read(const char *path) {  // by "sample, frame, reference, quantity"
+std::map<std::string, Line> read(const char *path) {  // keys: "sample, frame, reference, quantity"
     std::ifstream file(path);
     if (!file) { std::cerr << path << ": cannot be read\n"; std::exit(2); }
     std::map<std::string, Line> found;
@@ -43,7 +44,7 @@ int main(int count, char **arguments) {
     auto answers = read(arguments[2]);
     int compared = 0, wrong = 0, missing = 0;
     for (const auto &[name, line] : read(arguments[1])) {
-        if (line.tolerances.size() != line.values.size()) continue;  // q, v and a
+        if (line.tolerances.size() != line.values.size()) continue;  // a line with q, v or a
         if (!answers.count(name)) { ++missing; continue; }
         const auto &found = answers[name].values;
         if (found.size() != line.values.size()) {

@@ -72,7 +72,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the timed tasks for a batch, with different threads and memory; one only writes the output."""
+    """Yield the timed tasks for a batch, which differ in threads and memory; one writes only the output."""
     method, n = getattr(subject.robot, quantity), subject.n
     inputs = subject.inputs(quantity, n)
     out, own, floor = np.empty((3, n, *subject.width(quantity)))
@@ -313,7 +313,7 @@ def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
     order = positions(subject.robot.joint_names, [link._joint_name for link in moving])
     columns = [int(i) for i in path.jindices]
     names = {"path": path, "tensordot": np.tensordot, "columns": np.array(columns)}
-    who, remark = "Robotics Toolbox, loop", "computes the path's columns alone"
+    who, remark = "Robotics Toolbox, loop", "computes only the columns of the path's joints"
     if quantity == "jacobian":
         ours, shape = [order[i] for i in columns], (6, len(columns))
 
@@ -347,7 +347,9 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
     columns = positions(subject.robot.joint_names, chain.get_joint_parameter_names())
     n = min(subject.n, _MOST)
     q = torch.from_numpy(np.ascontiguousarray(subject.q[:n, columns]))
-    remark = "the path's columns alone; its reader keeps seven digits of angles; all processors"
+    remark = (
+        "computes only the columns of the path's joints; reads angles with seven digits; uses all processors"
+    )
 
     def work(who: str, jacobian: Callable[[Any], Any]) -> Work:
         def result() -> FloatArray:
@@ -391,7 +393,7 @@ def jax(subject: Subject, quantity: str) -> Iterator[Work]:
         subject.n,
         lambda: compiled(*inputs).block_until_ready(),
         lambda: np.asarray(compiled(*inputs)),
-        remark="all processors; arrays are JAX's own",
+        remark="uses all processors and JAX's own arrays",
     )
 
 

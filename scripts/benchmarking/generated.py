@@ -1,10 +1,10 @@
 """Generate C code for one robot, frame and quantity; its speed is an upper limit for a general kernel.
 
 CasADi writes the textbook's equations with the robot's constants as straight-line C, without products with 0
-and 1. The numbers are vectors of doubles, with one configuration in each lane (`generated.c`). The time
-includes sine, cosine and the transposition of the arrays. The code does not check its inputs, so a non-finite
-number or an angle of a million turns gives a wrong result. It lacks urdfkin's correction of the last digit of
-sine and cosine.
+and 1. Each number is a SIMD vector of doubles: several configurations are computed together (`generated.c`).
+The time includes sine, cosine and the transposition of the arrays. The code does not check its inputs: a
+non-finite number, or an angle of a million turns, gives a wrong result. Sine and cosine lack urdfkin's
+correction of the last digit.
 """
 
 import ctypes
@@ -27,7 +27,9 @@ from urdfkin.model.tree import FloatArray
 
 GENERATED = "generated for this robot, 1 thread"
 COMPILER = "cc"
-_REMARK = "C written by CasADi for one robot, one frame, one quantity; it does not look at its inputs"
+_REMARK = (
+    "C code that CasADi writes for one robot, one frame and one quantity; the code does not check its inputs"
+)
 _FRAME = Path(__file__).with_suffix(".c")
 _FLAGS = ("-std=gnu11", "-O3", "-march=native", "-shared", "-fPIC")
 
@@ -38,7 +40,7 @@ _Z = (0.0, 0.0, 1.0)
 def results(
     plan: CompiledTree, quantity: str, x: Any, sines: Any, cosines: Any, v: Any, a: Any, eq: Any = equations
 ) -> list[Any]:
-    """Return one frame's Jacobian (7.85) or acceleration (7.127 to 7.130), row by row, in world axes.
+    """Return the rows of a frame's Jacobian (7.85) or acceleration (7.127 to 7.130), in world axes.
 
     The joints have one coordinate each. The numbers and the equations `eq` may be of any kind.
     """
@@ -120,7 +122,7 @@ def _straight_line(plan: CompiledTree, quantity: str) -> str:
     whole = re.search(r"static int casadi_f0\(.*?\n}", generator.dump(), re.DOTALL)
     if whole is None:
         raise ValueError("CasADi wrote no function")
-    # The code gets vectors instead of doubles, and loses its tests for missing arguments.
+    # Replace doubles by SIMD vectors, and remove CasADi's tests for missing arguments.
     text = re.sub(r"(arg\[\d+\])\? (\1\[\d+\]) : 0", r"\2", whole[0])
     text = text.replace("if (res[0]!=0) ", "")
     return re.sub(r"(a\d+)=(-?[\d.][\d.e+-]*);", r"\1=in_all_lanes(\2);", text)

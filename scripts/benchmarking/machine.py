@@ -21,9 +21,9 @@ from urdfkin.compiled.preload import only
 from urdfkin.robot import Robot
 
 ROOT = Path(__file__).parents[2]
-#: Keys of the times of a first use: with an empty kernel cache, and with compiled kernels on disk.
+#: Keys of the times of a first call: with an empty kernel cache, and with all kernels in the cache.
 EMPTY, KEPT = "empty_ms", "kept_ms"
-#: For each quantity whose first use compiles a kernel: how many of the inputs q, v and a it has.
+#: Number of inputs (q, v, a) of each quantity whose first call compiles a kernel.
 USES = {
     "placement": 1,
     "velocity": 2,
@@ -57,7 +57,7 @@ def peak_over_output(robot: str, frame: str, quantity: str, n: int, *, out: bool
 
 
 def first_uses(robot: str, frame: str, uses: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Yield the processor time of each first use and of all together, without and with stored kernels."""
+    """Yield the processor time of each quantity's first call, with an empty and with a full kernel cache."""
     together = " + ".join(uses) if len(uses) > 1 else None
     for what in (*uses, *filter(None, [together])):
         with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Count the additions and multiplications of one configuration, by numbers that count their operations.
+"""Count the additions and multiplications for one configuration, with numbers that record their operations.
 
 A fused multiply-add counts as two operations, as in the stated peak performance of a machine. A change of
 sign and a product with a known 0 or 1 do not count.
@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.compiled import axes, outputs, recursion
-from urdfkin.compiled.plan import KEPT_ROWS, WIDTH, CompiledTree, Head, Op, program_of
+from urdfkin.compiled import outputs, recursion
+from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
-#: Operations of a sine and a cosine (`compiled.python_numbers`): 10 reduce the angle.
-#: z, 1 - z/2 and their rounding errors need 8, the two polynomials 20, and the last steps 13.
+#: Number of operations of a sine and a cosine (`compiled.python_numbers`).
+#: Reduction of the angle: 10. The terms z and 1 - z/2 with their errors: 8. Polynomials: 20. Last steps: 13.
 _SINE_COSINE = 51
 
 
@@ -59,7 +59,7 @@ class Number:
 
 
 def count(results: Any) -> int:
-    """Count the operations that compute these results; shared ones count once."""
+    """Return the number of operations that compute these results; a shared operation counts once."""
     waiting, seen = [results], set[Number]()
     while waiting:
         value = waiting.pop()
@@ -74,7 +74,7 @@ def count(results: Any) -> int:
 
 @dataclass
 class _Walk:
-    """Run the forward recursion and the functions of `outputs` with numbers that count their operations."""
+    """The functions of the forward recursion, bound to numbers that record their operations."""
 
     written: list[Any] = field(default_factory=list)
 
@@ -93,7 +93,7 @@ class _Walk:
             "one": lambda: one,
             "nothing": lambda: nothing,
         }
-        for module in (axes, recursion, outputs):
+        for module in (recursion, outputs):
             for name, value in vars(module).items():
                 if isinstance(value, FunctionType):
                     self.names.setdefault(name, FunctionType(value.__code__, self.names, name))
@@ -109,8 +109,8 @@ def operations(plan: CompiledTree, quantity: str) -> int:
     program, run = program_of(plan, turned=False, columns=columns), _Walk()
     words: list[int] = program.words.tolist()
     angles = (words[Head.ANGLES_END] - words[Head.ANGLES]) // 4
-    follow = {"jacobian": "place"}.get(quantity, quantity)
-    state = getattr(run.call, f"follow_{follow}")(run.state)
+    output = {"jacobian": "place"}.get(quantity, quantity)
+    state = getattr(run.call, f"mask_{output}")(run.state)
     total, at = angles * _SINE_COSINE, int(words[Head.CODE])
     while words[at] != Op.END:
         total += _cost(run, words[at : at + WIDTH], quantity, state)
@@ -127,7 +127,7 @@ def _cost(run: _Walk, instruction: list[int], quantity: str, state: tuple[Any, .
     if op <= Op.FLOATING:
         return count(run.call._over_joint(world, op, state, None, row, 0, 0, how, None, c))
     if op == Op.COLUMN:
-        run.call.column_jacobian(None, row % KEPT_ROWS, 0, how, None, c, 2, state)
+        run.call.column_jacobian(None, row % STORED_ROWS, 0, how, None, c, 2, state)
     elif op == Op.EMIT and quantity != "jacobian":
         emit = run.call.emit_velocity if quantity == "velocity" else run.call.emit_acceleration
         emit(1, None, [1] * len(Head), 0, 0, 0, 2, state, None)

@@ -1,4 +1,4 @@
-"""Measure the sections of the benchmark, each after a comparison of all results."""
+"""Measure the sections of the benchmark; before each measurement, all results are compared."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -39,8 +39,8 @@ ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other
 def contest_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
     """Measure Jacobians and accelerations by all contenders, compared with Pinocchio.
 
-    Sections: a batch; single calls with all overhead; single calls with a check (`checked`); and batches of
-    which all results, a sample or none is checked (`verified`).
+    The sections are `batch`, `single` (calls for one configuration), `checked` (the same calls with a check),
+    and `verified` (batches with a check of all results, of a sample, or of none).
     """
     for subject, quantity, table in _contests(section, n):
         what = f"{subject.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
@@ -48,7 +48,6 @@ def contest_rows(section: str, n: int, contenders: Sequence[Contender], rounds: 
         loop = calls.batch(subject, quantity)
         if section == "batch":
             works = [work for contender in contenders for work in contender.works(subject, quantity)]
-            # The processes compute the whole batch, so that every row of all results is compared.
             loop = next(work for work in works if work.who == PROCESSES)
             baseline = next(work for work in works if work.who == LOOP)
         elif section == "single":
@@ -139,26 +138,25 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure(table, works, rounds, works[1])
 
 
-# A batch runs with and without the instructions of a part; the difference is the time of the part.
-# A single call runs as calls that stop early, such as an empty function and a call with rejected arguments.
+# The time of a step of a batch is the difference between a kernel with and without the step's instructions.
+# The steps of a single call are measured by calls that end early, such as a call with rejected arguments.
 
-#: The instructions of each part of a batch computation, in the order in which the parts are added.
+#: The kernel's instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
     "reading inputs": frozenset(),
     "sines and cosines": frozenset(),
-    "forward recursion": frozenset(Op) - {Op.END, Op.KEEP, Op.COLUMN, Op.EMIT},
-    "columns": frozenset((Op.KEEP, Op.COLUMN)),
+    "forward recursion": frozenset(Op) - {Op.END, Op.STORE, Op.COLUMN, Op.EMIT},
+    "columns": frozenset((Op.STORE, Op.COLUMN)),
     "writing results": frozenset((Op.EMIT,)),
 }
 
 
 def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each part of a batch, in ns for one configuration, with one thread."""
+    """Yield the time of each step of a batch, in ns for one configuration, with one thread."""
     for subject, quantity, _ in _contests("where", n):
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
         works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
         if quantity == "acceleration":
-            # an acceleration has no Jacobian columns to compute
             works = [work for work in works if work.who != "columns"]
         found = times(works, rounds)
         before, parts = np.zeros(rounds), {}
@@ -168,7 +166,7 @@ def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 def cut(program: KernelProgram, parts: int) -> KernelProgram:
-    """Return the first parts of a program."""
+    """Return a program with only the instructions of its first `parts` steps."""
     ops = frozenset[Op]().union(*list(PARTS.values())[:parts])
     words = program.words.copy()
     code = words[words[Head.CODE] :].reshape(-1, WIDTH)
@@ -197,7 +195,7 @@ def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> 
 
 
 def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time (ns) of each part of a single call, for a prepared frame and for the robot's method."""
+    """Yield the time (ns) of each step of a call, by a prepared evaluator and by the robot's method."""
     for subject, quantity, _ in _contests("where", n):
         calls = list(_calls(subject, quantity))
         works = [call.single(subject, quantity) for call in calls]
@@ -206,7 +204,7 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         loop, function, refused, array, computed, prepared, method = times(works, rounds).values()
         parts = {
             "Python's call of a method": function - loop,
-            "its call of the forward recursion": refused - loop,
+            "call of the forward recursion by this method": refused - loop,
             "forward recursion": computed - refused,
             "rest of the prepared evaluator": prepared - computed - (function - loop),
             "NumPy's new array": array - loop,
@@ -216,7 +214,7 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 class _Empty:
-    """Methods without code, with the arguments of the methods of a prepared frame."""
+    """Empty methods with the signatures of a prepared evaluator's methods."""
 
     def jacobian(self, q: object, out: object = None) -> object:
         return out
@@ -253,7 +251,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 def _entry(
     kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Return medians over all rounds; times are subtracted only within a round, with the same other load."""
+    """Return the medians over all rounds. Times of the same round were subtracted, so other load cancels."""
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}

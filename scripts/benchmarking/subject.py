@@ -15,7 +15,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
 QUANTITIES = ("jacobian", "acceleration")
-#: The third robot is a humanoid, and the path to its frame is a small part of its tree.
+#: The third robot is a humanoid: most of its joints do not move the chosen frame.
 SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
 #: Number of configurations in a loop of calls; the time for a single call does not depend on this number.
 LOOP = 2_000

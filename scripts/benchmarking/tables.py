@@ -14,7 +14,7 @@ from scripts.pages import table as markdown
 
 #: The measurements of one contender, as a mapping.
 Entry = Mapping[str, Any]
-_SHARE = "times generated code"
+_SHARE = "speed, generated code = 1"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
 #: For each section about growth: its title, and the cells of a row.
@@ -90,7 +90,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
             yield _contest(section, title, rows)
     if batch := sections.get("batch"):
         yield Words("summary", "urdfkin against the others, medians", [_best(*one) for one in _groups(batch)])
-        title = "lower limits of the time for one configuration, from its bytes and its operations"
+        title = "lower limits of the time for one configuration, by memory and by arithmetic"
         yield Words("floor", title, [_floor(*one, figures["operations"]) for one in _groups(batch)])
     for kind, what in (("batch", "a batch, one thread"), ("single", "a single call")):
         if chosen := [entry for entry in figures.get("where", ()) if entry["kind"] == kind]:
@@ -115,7 +115,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
-    """Return the page with the figures in their places; raise ValueError if a place is missing or double."""
+    """Return the page with the figures inserted; raise ValueError if a place is missing or occurs twice."""
     parts: dict[str, list[str]] = {"machine": [machine_of(figures)]}
     for words in tables(figures):
         parts.setdefault(words.section, []).append(words.text)
@@ -146,7 +146,7 @@ def _groups(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
 def _contest(section: str, title: str, rows: list[Entry]) -> Words:
     cost, single = section in ("checked", "verified"), section in ("single", "checked")
     what = "calls" if single else "results stored" if cost else "loop"
-    ratio = f"cost, Pinocchio's {what} = 1" if cost else f"times Pinocchio's {what}"
+    ratio = f"cost, Pinocchio's {what} = 1" if cost else f"speed, Pinocchio's {what} = 1"
     remarks = list(dict.fromkeys(row["remark"] for row in rows if row["remark"]))
     ceiling = _generated(rows)
     cells = [
@@ -179,12 +179,14 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
     return {
         "": title,
         "1 thread, ns": number(one),
-        "times Pinocchio's loop": number(who[ONE]["ratio"]),
-        "the same, all threads": number(several["ratio"]) if several else "one processor",
-        "the same, compiled for this robot, 1 thread": compiled,
+        "speed, Pinocchio's loop = 1": number(who[ONE]["ratio"]),
+        "speed with all threads, Pinocchio's loop = 1": number(several["ratio"])
+        if several
+        else "one processor",
+        "speed compiled for this robot, 1 thread, Pinocchio's loop = 1": compiled,
         _SHARE: number(ceiling / one) if ceiling else "not measured",
         "fastest other library, ns": f"{best['who']}, {number(best['median_ns'])}",
-        "urdfkin, 1 thread, times faster": number(best["median_ns"] / one),
+        "urdfkin, 1 thread: times faster than this library": number(best["median_ns"] / one),
     }
 
 

@@ -1,8 +1,8 @@
 """Time contenders, and check that all of them compute the same numbers.
 
 Each round times every contender once, in another order. Ratios are therefore reliable on a noisy machine, and
-absolute times are not. Each contender first computes once without timing. Its data are then in the cache, and
-the threads of the previous contender sleep.
+absolute times are not. Before each timed run, the contender computes once without timing. The processor's
+cache then contains the contender's data, and the threads of other contenders are idle.
 """
 
 import gc
@@ -17,7 +17,7 @@ import numpy as np
 from scripts.benchmarking.subject import Subject
 from urdfkin.model.tree import FloatArray
 
-#: Allowed difference (m, rad, m/s^2, rad/s^2), which detects other computations, not inaccuracy.
+#: Allowed difference (m, rad, m/s^2, rad/s^2) between contenders; it is much larger than rounding.
 TOLERANCE = 1e-9
 
 
@@ -101,7 +101,7 @@ def measure(
     baseline: Work | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> list[Row]:
-    """Time works that have run once before, so that no kernel is compiled while the clock runs."""
+    """Measure tasks that have already run once, so that their kernels are compiled."""
     found = times(works, rounds, clock)
     medians = {who: float(np.median(values)) for who, values in found.items()}
     return [

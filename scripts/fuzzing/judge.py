@@ -28,12 +28,12 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 
 #: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
-#: Largest numbers of frames in one pass, and of frames one by one.
+#: Maximum number of frames in one call, and of frames with a call each.
 TOGETHER, ALONE = 12, 2
 NAMES = 6
 #: Distance of the far base from the world's origin, in metres.
 FAR = 1e6
-#: The quantities of several frames, each with its number of inputs.
+#: Quantities that accept several frames, each with its number of inputs.
 QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "acceleration": 3}
 
 
@@ -87,7 +87,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
         for what, result in ask(robot, seed=0):
             if not np.isfinite(result).all():
                 return Outcome(too_large, what)
-        # The certificate does not include tables; for a table that is not verified there is a warning.
+        # The certificate does not cover DH tables. A table that is not verified causes a warning.
         doubted = any(issubclass(w.category, NotVerifiedWarning) for w in warned)
         verified = robot.certificate().verified and not doubted
         ask_prepared(robot, seed=0)
@@ -183,7 +183,7 @@ def _together(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield each quantity for all frames in a batch, compared with one frame and with one configuration."""
+    """Yield each quantity for several frames and configurations, compared with calls for a single one."""
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:
@@ -205,7 +205,7 @@ def _together(
 
 
 def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name; urdfkin and Pinocchio look up each name independently."""
+    """Yield placements of frames by name. urdfkin and Pinocchio each search for the name by themselves."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]

@@ -1,7 +1,7 @@
-"""Make random MJCF files with free bodies that MuJoCo aligns or fuses, chains of equalities, and classes.
+"""Make random MJCF files with free bodies that MuJoCo aligns or fuses, equality constraints, and classes.
 
 A file depends only on the seed, its family and its number. MuJoCo computes the pose of each body and site
-and checks the equalities, independently of urdfkin's MJCF reader.
+and checks the equality constraints, independently of urdfkin's MJCF reader.
 """
 
 import random
@@ -16,7 +16,7 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference from MuJoCo's placements, and of the two sides of an equality.
+#: Allowed relative difference from MuJoCo's placements, and of the two sides of an equality constraint.
 _APART = 1e-12
 
 # Otherwise MuJoCo writes a log of dynamics warnings into the current folder.
@@ -73,7 +73,7 @@ class _File:
             parts = [f'<{kind} name="free{self.bodies}" {align}/>']
         else:
             parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        for _ in range(rng.randint(1, 2)):  # boxes give their body an inertia with oblique axes
+        for _ in range(rng.randint(1, 2)):  # oblique boxes: the axes of the body's inertia are oblique
             sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
             parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
         if rng.random() < 0.2:
@@ -174,7 +174,7 @@ def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
                 T = robot.placement(q, LinkFrame.of(one.name))
                 off = max(np.abs(T[:3, 3] - one.xpos).max(), np.abs(T[:3, :3].ravel() - one.xmat).max())
                 if off > _APART * large:
-                    return f"{one.name} is {off:.3g} elsewhere"
+                    return f"{one.name} is off by {off:.3g}"
         for row in np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)):
             i = int(data.efc_id[row])
             name = model.equality(i).name

@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from scripts.fuzzing import Case
 
-#: Largest size of a file to mutate, in bytes. Larger files take longer and test nothing more.
+#: Maximum size of a file to mutate, in bytes; larger files only take longer.
 LARGEST = 150_000
 
 ODD_NUMBERS = (
@@ -91,7 +91,7 @@ def _of_tokens(rng: random.Random, how: str, data: bytes) -> bytes:
     first, second = (pattern.search(data, at) or pattern.search(data) for at in starts)
     if first is None or second is None:
         return data
-    group = pattern.groups  # the value of an attribute, or the whole match
+    group = pattern.groups  # group 2 is an attribute's value, group 0 the whole match
     if how == "swap_values":
         if first.start() == second.start():
             return data
@@ -113,7 +113,7 @@ def _of_elements(rng: random.Random, how: str, data: bytes) -> bytes:
         return data
     if root.tag != "robot":
         return data
-    # Many files have no element of some kind, which then cannot be changed.
+    # A file without the chosen kind of element stays unchanged.
     with contextlib.suppress(IndexError):
         (_change_structure if how in _STRUCTURE else _change_elements)(rng, how, root)
     changed: bytes = ET.tostring(root, encoding="utf-8")

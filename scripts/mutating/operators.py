@@ -28,7 +28,7 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 class Slip:
     """One mutant: a new value in a list or in a field of a node."""
 
-    shown: ast.AST  # the node that is shown to the user
+    shown: ast.AST  # the node whose text is printed
     home: Any  # the list or the node
     place: int | str  # the index or the field
     value: Any  # the new value
@@ -157,7 +157,7 @@ def _other(value: bool | int | float) -> bool | int | float:
 
 
 def _of_text(node: ast.BinOp | ast.AugAssign) -> bool:
-    """Return whether the operator joins texts or types, as in `"a" + b` or `int | None`."""
+    """Return whether an operand is a string or None, as in `"a" + b` or `int | None`."""
     parts = [node.value] if isinstance(node, ast.AugAssign) else [node.left, node.right]
     return any(
         isinstance(part, ast.JoinedStr)

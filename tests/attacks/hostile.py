@@ -1,12 +1,9 @@
-"""Names that attack whoever shows them, and robots that bear them.
-
-Every name is legal in a URDF: XML lets an attribute hold any of these characters.
-"""
+"""Names that attack programs which display them, and robots with such names."""
 
 from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
-#: Each tries to become something else than text in some form that urdfkin writes.
+#: Names that would be interpreted in an output format if they were not escaped.
 NAMES = {
     "script": "<script>window.hacked=1</script>",
     "event": "<img src=x onerror=window.hacked=1>",
@@ -48,19 +45,19 @@ NAMES = {
     "percent": "%s%n%d{0}{x!r}",
 }  # fmt: skip
 
-#: Those that XML 1.0 can hold.
+#: Names that XML 1.0 allows.
 IN_XML = {
     kind: name for kind, name in NAMES.items() if not any(c in "\x1b\x07\x08\x0b\x0c\x00" for c in name)
 }
 
 
 def attribute(name: str) -> str:
-    """A name as an attribute's value, quotes included; line ends survive."""
+    """Write a name as the value of an attribute, in quotation marks, with escaped line ends."""
     return quoteattr(name, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
 
 
 def chain_of_all(names: Sequence[str] = tuple(IN_XML.values()), robot: str = NAMES["line"]) -> str:
-    """A robot whose links and joints bear every name that a URDF can hold, one below the other."""
+    """Write a chain whose links and joints have these names."""
     links = "".join(f"<link name={attribute(name)}/>" for name in ["base", *names])
     joints = "".join(
         f'<joint name={attribute(f"{child} ")} type="continuous"><parent link={attribute(parent)}/>'
@@ -71,7 +68,7 @@ def chain_of_all(names: Sequence[str] = tuple(IN_XML.values()), robot: str = NAM
 
 
 def urdf(name: str) -> str:
-    """A planar arm whose robot, links and joints all bear a name, numbered where they must differ."""
+    """Write an arm whose robot, links and joints have a name, followed by a number if they must differ."""
     link = [attribute(f"{name}{k}" if k else name) for k in range(3)]
     joint = [attribute(f"{name} {k}") for k in (1, 2)]
     return f"""<?xml version="1.0"?>

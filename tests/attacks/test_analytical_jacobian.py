@@ -20,7 +20,7 @@ from urdfkin.kinematics import rotation
 from urdfkin.kinematics.rotation import SEQUENCES, quaternion_of, rotation_from_euler
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 
@@ -94,9 +94,8 @@ def test_it_is_verified_in_every_representation(representation: str) -> None:
         robot = urdfkin.load(name)
         q = robot.sample(200, 11)
         robot.analytical_jacobian(q, robot.tip_frame, representation)
-        T = np.eye(4)
-        T[:3, :3] = rotation_from_euler("ZYZ", [0.3, 0.7, 1.1])
-        robot.analytical_jacobian(q, robot.tip_frame, representation, base=BaseMotion(T))
+        base = BaseMotion(pose(rotation_from_euler("ZYZ", [0.3, 0.7, 1.1])))
+        robot.analytical_jacobian(q, robot.tip_frame, representation, base=base)
         assert robot.certificate().verified
         assert robot.certificate().lines[0].share < 0.25
 
@@ -207,7 +206,6 @@ def mutants(source: str, called: Collection[str]) -> Iterator[tuple[str, ast.Mod
 
 
 def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | None:
-    """The result, if it comes with a certificate."""
     before = sum(line.unchecked for line in robot.certificate().lines)
     try:
         J = robot.analytical_jacobian(q, "tool0", representation)
@@ -218,7 +216,6 @@ def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | No
 
 @contextmanager
 def names_called() -> Iterator[set[str]]:
-    """The functions in Python that are called meanwhile."""
     names = set[str]()
     sys.setprofile(lambda frame, *_: names.add(frame.f_code.co_qualname.replace(".<locals>", "")))
     try:

@@ -1,4 +1,4 @@
-"""urdfkin is run in a folder of strangers: nothing in it is run, nor taken for settings."""
+"""In an untrusted current folder, urdfkin runs no file and reads no settings."""
 
 import os
 import subprocess
@@ -17,7 +17,7 @@ PLANTED = [
     "ast", "sitecustomize", "usercustomize", "resource", "tempfile", "xacrodoc", "xacro", "yaml",
     "numpy", "numba", "pinocchio", "click", "matplotlib", "platformdirs",
 ]  # fmt: skip
-#: What Python has imported from the folder already, before a line of urdfkin is run.
+#: Modules that Python imports from the folder before urdfkin runs.
 BEFORE_MAIN = {"urdfkin", "threading", "ast"}
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="l${1 + 1}"/></robot>'
 
@@ -26,7 +26,7 @@ Run = Callable[..., str]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a robot, and modules that leave a mark when they are imported."""
+    """Return a folder with a robot, and with modules that write to a file when they are imported."""
     folder = tmp_path / "robot"
     folder.mkdir()
     (folder / "r.xacro").write_text(XACRO)
@@ -53,7 +53,7 @@ def run(folder: Path, start: list[str], *words: str) -> str:
 
 @pytest.fixture
 def command(tmp_path: Path) -> list[str]:
-    """What pip installs: a script in a folder of its own."""
+    """Return a script in another folder, like the script that pip installs."""
     script = tmp_path / "bin" / "urdfkin"
     script.parent.mkdir()
     script.write_text("from urdfkin.cli import main\nif __name__ == '__main__':\n    main()\n")

@@ -1,7 +1,6 @@
-"""What `check` lets pass, Pinocchio reads, and as the same robot; what is said to be refused, it refuses.
+"""Pinocchio reads the same robot from a text that `check` accepts, and refuses a text as a finding states.
 
-Documents are put together from pieces that are odd one by one: each slot is plain mostly, so that many
-documents have no error.
+The texts consist of unusual pieces. Most pieces of a text are usual ones, so that many texts have no error.
 """
 
 import random
@@ -20,7 +19,7 @@ def attributes(element: str, *values: str) -> list[str]:
     return [f"<{element} {value}/>" for value in values]
 
 
-#: Slot -> what may stand there; the first is plain.
+#: Alternatives of each piece, the usual one first.
 SLOTS: dict[str, list[str]] = {
     "head": [
         '<?xml version="1.0"?>\n', "", "\n \n", "\ufeff", '<?xml version="1.1"?>',
@@ -171,7 +170,6 @@ NV = {JointKind.FIXED: 0, JointKind.PLANAR: 3, JointKind.FLOATING: 6}
 
 
 def assert_same(tree: KinematicTree, model: pin.Model, data: bytes) -> None:
-    """Names, kinds, places, axes and limits."""
     (joint,) = tree.joints
     assert model.name == tree.name, data
     assert model.nv == NV.get(joint.kind, 1), data

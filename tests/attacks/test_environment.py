@@ -1,4 +1,4 @@
-"""Whatever a shell, a disc or a terminal does to a command: a result, or a clear line and the right code."""
+"""In any shell, disk or terminal, a command has a result, or one line of error and the right exit code."""
 
 import json
 import os
@@ -37,7 +37,7 @@ def arm(tmp_path: Path) -> Path:
 
 
 def shell(line: str, cwd: Path | None = None, **env: str) -> tuple[int, str, str]:
-    """`$URDFKIN` in a line of bash is the command."""
+    """Run a line of bash, in which `$URDFKIN` is the command."""
     command = ["bash", "-c", line.replace("$URDFKIN", f"{sys.executable} -m urdfkin")]
     how = {"encoding": "utf-8", "errors": "surrogateescape", "cwd": cwd, "timeout": 120}
     done = subprocess.run(command, env=os.environ | env, capture_output=True, check=False, **how)  # type: ignore[call-overload]
@@ -55,7 +55,7 @@ def one_line(text: str) -> str:
 
 FULL = "standard output: cannot be written: found No space left on device"
 CLOSED = "standard output: cannot be written: found Bad file descriptor"
-#: A line of a shell, its exit code, and what is in the only line of standard error.
+#: Exit code, and a text in the only line of standard error, of each shell line.
 STREAMS = {
     **{f"{words} > /dev/full": (2, FULL) for words in ("robots", "--help", "--version", "info ur5")},
     "explain URDF101 > /dev/full": (2, FULL),

@@ -1,4 +1,4 @@
-"""Nothing that a URDF calls a link, a joint or itself becomes code in any language that is exported."""
+"""No name in a URDF becomes code in an exported file of any language."""
 
 import ast
 import re
@@ -15,11 +15,11 @@ from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from tests.export.writing import code, file, need
 from tests.urdfs import loaded
 from urdfkin.export import LANGUAGES, write
-from urdfkin.export.naming import all_safe, safe, shown, title
+from urdfkin.export.naming import all_safe, comment_name, safe, title
 from urdfkin.robot import Robot
 
 pytestmark = pytest.mark.slow
-_PYTHON = [to for to, (_, ending, _) in LANGUAGES.items() if ending.endswith(".py")]
+_PYTHON = [to for to, (_, suffix) in LANGUAGES.items() if suffix.endswith(".py")]
 _WORDS = (
     "int", "double", "for", "end", "function", "template", "class", "lambda", "def", "out", "in", "L",
     "q", "v", "a", "sin", "cos", "sqrt", "R", "T", "real", "np", "main", "eye", "pi", "i", "None", "_",
@@ -43,7 +43,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> None:
     written = code(robot, quantities=("placement",))
-    words = set(re.findall(r"\w+", written.name)) | {x for row in written.words.values() for x in row}
+    words = set(re.findall(r"\w+", written.name)) | {x for row in written.identifiers.values() for x in row}
     assert all(re.fullmatch(r"[A-Za-z0-9_]+", word) for word in words)
     for to in LANGUAGES:
         text = write(written, to)
@@ -53,7 +53,7 @@ def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> Non
 
 
 def code_alone(text: str, to: str) -> str:
-    """Without comments."""
+    """Return code without its comments."""
     if to in ("c", "cpp", "cuda"):
         return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     if to == "matlab":
@@ -135,7 +135,7 @@ def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
 
 @given(st.text(max_size=60) | st.sampled_from([*_WORDS, *NAMES.values()]))
 def test_words_of_a_comment_end_none(name: str) -> None:
-    for text in (shown(name), shown(name * 50)):
+    for text in (comment_name(name), comment_name(name * 50)):
         assert text.isascii()
         assert text == "" or text.isprintable()
         assert not set("*\"'\\%\n") & set(text)

@@ -22,9 +22,9 @@ from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.quantities import VELOCITY
 
@@ -45,7 +45,6 @@ REFERENCES = ("local", "world", "local_world_aligned")
 
 
 def numbers(rng: np.random.Generator, exponent: int, size: int) -> FloatArray:
-    """Numbers about 10 to the exponent, some of them zero."""
     wide: FloatArray = rng.normal(size=size) * np.exp2(math.log2(10.0) * exponent)
     wide[rng.random(size) < 0.2] = 0.0
     return wide
@@ -80,11 +79,8 @@ def test_numbers_of_any_size_are_verified_or_leave_the_range(
     q = robot.sample(1, seed % 1000)[0]
     q[LENGTHS] = numbers(rng, sizes[0], len(LENGTHS))
     v, a = numbers(rng, sizes[1], robot.nv), numbers(rng, sizes[2], robot.nv)
-    base = None
-    if moving:
-        T = np.eye(4)
-        T[:3, 3] = numbers(rng, sizes[3], 3)
-        base = BaseMotion(T, numbers(rng, sizes[4], 6), numbers(rng, sizes[5], 6))
+    fields = pose(p=numbers(rng, sizes[3], 3)), numbers(rng, sizes[4], 6), numbers(rng, sizes[5], 6)
+    base = BaseMotion(*fields) if moving else None
     beyond = everything(robot, q, v, a, base)
     used = sizes if moving else sizes[:3]
     if max(used) < 75:  # no product of three or four of them overflows
@@ -125,7 +121,7 @@ def test_a_place_whose_square_overflows_is_verified(size: float) -> None:
     robot = urdfkin.load(PLANAR)
     assert np.isfinite(robot.placement([size, 0.0, 0.7], "b")).all()
     assert np.isfinite(robot.velocity([size, 0.0, 0.7], [size, 1.0, 0.0], "b")).all()
-    base = BaseMotion(np.block([[np.eye(3), np.full((3, 1), size / 2)], [np.zeros(3), 1.0]]))
+    base = BaseMotion(pose(p=np.full(3, size / 2)))
     assert np.isfinite(robot.placement([0.0, 0.0, 0.7], "b", base=base)).all()
     assert robot.certificate().verified
 
@@ -147,7 +143,6 @@ def test_a_scale_of_zero_means_equal_and_a_product_of_others_is_at_least_the_sma
 
 
 def two_axes(first: float, second: float) -> str:
-    """Two skew axes, at so many metres from the base and from one another."""
     return robot_of(
         joint("x", "continuous", "a", "b", f'xyz="{first!r} 0 0.1" rpy="1 0.2 0.3"'),
         joint("y", "continuous", "b", "c", f'xyz="{second!r} 0.1 0.2" rpy="1 0.2 0.3"', "0 0.6 0.8"),
@@ -187,7 +182,7 @@ def test_lengths_whose_squares_vanish_do_not_lose_to_rounding_and_the_judges_uni
     for convention in ("standard", "modified"):
         robot.dh("b", "a", convention)
     assert urdfkin.validate([TINY.encode()], samples=2).passed
-    for line in judge(urdfkin.load(FAINT), samples=2).lines:
+    for line in accuracy_study(urdfkin.load(FAINT), samples=2).lines:
         assert line.urdfkin.worst < 100.0, line
         assert line.pinocchio.worst < 100.0, line
 
@@ -300,9 +295,7 @@ def test_the_limit_is_where_nothing_can_overflow_below_it() -> None:
 
 
 def base_at(distance: float, rates: FloatArray) -> BaseMotion:
-    T = np.eye(4)
-    T[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
-    T[:3, 3] = distance * np.array([0.5, 4.5, 1e-4])
+    T = pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], distance * np.array([0.5, 4.5, 1e-4]))
     return BaseMotion(T, rates[:6], rates[6:])
 
 

@@ -84,8 +84,8 @@ CASES = {
         fork(lambda: (robot.placement(q[:3], "tool0"), robot.certificate()))
         """,
     "a kernel, while another thread compiles one": """
-        from urdfkin.compiled import kept
-        held(kept.compiling)
+        from urdfkin.compiled import kernel_cache
+        held(kernel_cache.compiling)
         fork(lambda: robot.placement(q[:3], "tool0"))
         """,
     "a deep robot, while another thread builds one": """
@@ -126,7 +126,7 @@ CASES = {
         join()
         """,
     "several threads that fork at the same time": """
-        import urdfkin.compiled.kept
+        import urdfkin.compiled.kernel_cache
         sys.setswitchinterval(1e-6)
         end, codes = time.monotonic() + 3.0, set()
         def many():

@@ -1,4 +1,4 @@
-"""Time and memory of a check grow with the file and no faster, whatever the file is made of."""
+"""Time and memory of a check grow linearly with the size of any file."""
 
 import json
 import re
@@ -21,14 +21,15 @@ from urdfkin.urdf.lint.formats import as_json
 from urdfkin.urdf.parser import read_document
 from urdfkin.verify.oracle import rules_of_text
 
-#: Four times the size takes four times the time; sixteen times would be the square. Between them, and in
-#: seconds, there is room for a busy machine.
+#: For four times the size: largest accepted ratio of times, between 4 (linear) and 16 (quadratic), and
+#: additional
+#: seconds for a busy machine. Then the largest time of a test, s.
 TIMES, MORE, ENOUGH = 10.0, 0.3, 30.0
 
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """End what takes more processor time than that, so that the square of something does not hang the run."""
+    """Raise AssertionError after this processor time, so that a quadratic time does not stop the tests."""
 
     def end(*_: object) -> None:
         raise AssertionError(f"more than {seconds:g} s of processor time")

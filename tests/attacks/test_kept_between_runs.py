@@ -20,11 +20,11 @@ import pytest
 from tests.cli.running import process
 from urdfkin import compiled as recursion
 from urdfkin import kinematics
-from urdfkin.compiled import kept, machine
+from urdfkin.compiled import kernel_cache, machine
 from urdfkin.compiled.machine import compiling
 from urdfkin.compiled.machine.compiling import NUMBERS, Kernel
 from urdfkin.system import cache
-from urdfkin.system.cache import CacheWarning, get, kept_folder, put
+from urdfkin.system.cache import CacheWarning, cache_folder, get, put
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +47,6 @@ def third(x: Any) -> Any:
 
 
 def fresh() -> Kernel:
-    """A small kernel that this process has not compiled yet."""
     return Kernel(third, (NUMBERS,), True)
 
 
@@ -211,11 +210,11 @@ def test_a_command_with_a_damaged_cache_says_so_in_a_line_and_mends_it(tmp_path:
 
 def refused(root: Path, words: str) -> None:
     with pytest.warns(CacheWarning, match=words):
-        assert kept_folder("kernels", [], root=root) is None
+        assert cache_folder("kernels", [], root=root) is None
 
 
 def made(root: Path, *words: str, kind: str = "kernels") -> Path:
-    folder = kept_folder(kind, [], *words, root=root)
+    folder = cache_folder(kind, [], *words, root=root)
     assert folder is not None
     return folder
 
@@ -225,7 +224,7 @@ def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_
 ) -> None:
     before = os.umask(0)
     try:
-        folder = kept_folder("kernels", [], root=tmp_path / "urdfkin")
+        folder = cache_folder("kernels", [], root=tmp_path / "urdfkin")
     finally:
         os.umask(before)
     assert folder is not None
@@ -233,7 +232,7 @@ def test_a_folder_of_ones_own_is_closed_to_others_and_may_be_of_a_group_of_ones_
     folder = made(tmp_path)
     folder.chmod(0o770)
     monkeypatch.setattr(cache, "_is_private", lambda group: True)
-    assert kept_folder("kernels", [], root=tmp_path) == folder
+    assert cache_folder("kernels", [], root=tmp_path) == folder
     monkeypatch.setattr(cache, "_is_private", lambda group: False)
     refused(tmp_path, "a group can write to")
 
@@ -252,10 +251,10 @@ def test_a_folder_in_which_everybody_could_put_another_or_of_a_root_without_writ
     shared.chmod(0o777)
     refused(shared / "urdfkin", "every user can write to")
     shared.chmod(0o1777)  # sticky, as /tmp: nobody can move what another owns
-    assert kept_folder("kernels", [], root=shared / "urdfkin") is not None
+    assert cache_folder("kernels", [], root=shared / "urdfkin") is not None
     (tmp_path / "file").write_text("")
     with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
-        assert kept_folder("kernels", [], root=tmp_path / "file") is None
+        assert cache_folder("kernels", [], root=tmp_path / "file") is None
 
 
 @pytest.mark.parametrize("whose", ["the folder", "the one above", "the file behind a link"])
@@ -287,7 +286,7 @@ def test_a_planted_kernel_of_another_user_is_not_unpickled_and_an_old_folder_lef
 ) -> None:
     if os.geteuid() != 0:
         pytest.skip("only the superuser can give a folder away")
-    monkeypatch.setattr(compiling, "cache_folder", lambda: kept_folder("kernels", [], root=tmp_path))
+    monkeypatch.setattr(compiling, "cache_folder", lambda: cache_folder("kernels", [], root=tmp_path))
     ask(fresh())
     (folder,) = tmp_path.iterdir()
     (file,) = (path for path in folder.iterdir() if path.name != ".used")
@@ -304,8 +303,6 @@ def test_a_planted_kernel_of_another_user_is_not_unpickled_and_an_old_folder_lef
 
 
 class Planted:
-    """A pickle that runs something."""
-
     ran = False
 
     def __reduce__(self) -> tuple[Callable[[], None], tuple[()]]:
@@ -323,7 +320,7 @@ def test_a_folder_that_can_only_be_read_is_still_read(
     monkeypatch.setattr(Path, "touch", failing(errno.EROFS))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert kept_folder("kernels", [], root=tmp_path) == folder
+        assert cache_folder("kernels", [], root=tmp_path) == folder
 
 
 # -- a folder for each state of the sources --------------------------------------------------------
@@ -336,8 +333,8 @@ def test_every_file_of_the_part_is_among_the_sources(tmp_path: Path, monkeypatch
         seen.extend(sources)
         return tmp_path
 
-    monkeypatch.setattr(cache, "kept_folder", noting)
-    uncached: Callable[[], Path | None] = kept.cache_folder.__wrapped__
+    monkeypatch.setattr(cache, "cache_folder", noting)
+    uncached: Callable[[], Path | None] = kernel_cache.cache_folder.__wrapped__
     assert uncached() == tmp_path
     folders = [Path(str(module.__file__)).parent for module in (recursion, machine, kinematics)]
     files = {path for folder in folders for path in folder.glob("*.py")}
@@ -360,14 +357,14 @@ def test_a_change_in_any_source_leads_to_another_folder(changed: int, tmp_path: 
     sources = [tmp_path / f"{name}.py" for name in "abc"]
     for source in sources:
         source.write_text("x = 1")
-    first = kept_folder("things", sources, "1.0", root=tmp_path)
-    assert first == kept_folder("things", sources, "1.0", root=tmp_path)
+    first = cache_folder("things", sources, "1.0", root=tmp_path)
+    assert first == cache_folder("things", sources, "1.0", root=tmp_path)
     others = [
-        kept_folder("things", sources, "1.1", root=tmp_path),
-        kept_folder("trees", sources, "1.0", root=tmp_path),
+        cache_folder("things", sources, "1.1", root=tmp_path),
+        cache_folder("trees", sources, "1.0", root=tmp_path),
     ]
     sources[changed].write_text("x = 2")
-    others.append(kept_folder("things", sources, "1.0", root=tmp_path))
+    others.append(cache_folder("things", sources, "1.0", root=tmp_path))
     assert len({first, *others}) == 4
     assert all(folder is not None and folder.is_dir() for folder in (first, *others))
 

@@ -1,4 +1,4 @@
-"""Robots that are let go leave nothing behind, and a copy of a robot begins with an empty certificate."""
+"""Deleted robots free their memory and files, and a copy of a robot has an empty certificate."""
 
 import copy
 import json
@@ -20,11 +20,11 @@ ROBOTS = 300
 
 @pytest.mark.long
 def test_three_hundred_robots_leave_no_object_no_descriptor_and_no_memory() -> None:
-    """In a process of its own; `python -m scripts.leaks 10000` is the same for longer."""
+    # `python -m scripts.leaks 10000` is a longer run of this test.
     command, root = [sys.executable, "-m", "scripts.leaks", str(ROBOTS)], Path(__file__).parents[2]
     parts = json.loads(subprocess.run(command, capture_output=True, check=True, cwd=root).stdout)
     assert len(parts) == PARTS
-    # The first parts fill caches, which have ends. Then one object a robot would be 180 more.
+    # The first parts fill caches of limited size. One leaked object for each robot would be 180 objects.
     second, last = parts[1], parts[-1]
     assert last["descriptors"] == second["descriptors"]
     assert last["objects"] - second["objects"] < 60

@@ -16,7 +16,7 @@ from urdfkin.kinematics.rotation import exp_rotation, nearest_rotation
 from urdfkin.kinematics.roundings import EPS, ROUNDINGS
 from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.verify.bounds import magnitudes
 from urdfkin.verify.oracle import free_flyer, free_flyer_rates, nearest_quaternion
 
@@ -50,7 +50,6 @@ def test_a_rotation_printed_with_nine_decimals_is_taken_and_one_that_is_exact_st
 
 
 def nearest_at_50_digits(M: FloatArray) -> FloatArray:
-    """The orthogonal factor of the polar decomposition, by Newton's iteration on the inverse."""
     with mp.workdps(50):
         X = mp.matrix(M.tolist())
         for _ in range(8):
@@ -114,12 +113,10 @@ def test_a_turned_base_stays_well_within_the_bound(reference: str) -> None:
 
 def test_only_a_base_that_is_turned_counts_as_a_joint() -> None:
     plan, q = urdfkin.load(ARM).plan([0, 1]), np.zeros((1, 1))
-    moved = np.eye(4)
-    moved[:3, 3] = 1.0, 2.0, 3.0
     turned = BaseMotion(at(exp_rotation([0.0, 0.0, 1.0])))
     counts = [
         (magnitudes(plan, q, None, None, state).roundings / ROUNDINGS).tolist()
-        for state in (STILL_STATE, BaseMotion(moved).state(()), turned.state(()))
+        for state in (STILL_STATE, BaseMotion(pose(p=[1.0, 2.0, 3.0])).state(()), turned.state(()))
     ]
     assert counts == [[[1.0, 2.0]], [[1.0, 2.0]], [[2.0, 3.0]]]
 

@@ -1,4 +1,4 @@
-"""Names that look like ours: each stands for one frame, the same to urdfkin and to Pinocchio, or for none."""
+"""Each name is one frame for urdfkin and Pinocchio or an error, even a name such as `link:foo`."""
 
 import copy
 import pickle
@@ -16,24 +16,24 @@ from tests.urdfs import robot as urdf
 from urdfkin import BaseMotion
 from urdfkin.errors import InputError, OracleError, UnknownNameError
 from urdfkin.model.tree import JointFrame, KinematicTree, LinkFrame
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.oracle import QueryBatch
 
-#: What links and joints are called here.
-ASKED = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in POOL))
+#: Names of frames that the tests search.
+FRAMES = (*POOL, *(f"{prefix}:{name}" for prefix in ("link", "joint") for name in POOL))
 
-#: Where the base of these tests is.
+#: Pose of the base.
 TURNED = np.array([[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 3.0], [0.0, 0.0, 0.0, 1.0]])
 
 
-#: Link `foo` and link `link:foo`, at (1, 0, 0) and at (1, 2, 0).
+#: A robot with a link `foo` at (1, 0, 0) and a link `link:foo` at (1, 2, 0).
 LIKE_OURS = urdf(
     joint("j1", "continuous", "base", "foo", 'xyz="1 0 0"'),
     joint("j2", "continuous", "foo", "link:foo", 'xyz="0 2 0"'),
 )
 
 
-def test_an_exact_name_wins_and_a_link_frame_is_that_link() -> None:
+def test_an_exact_name_has_priority_and_a_link_frame_is_its_link() -> None:
     foo, other, frame = [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], LinkFrame.of("foo")
     robot, q = loaded(LIKE_OURS), [0.0, 0.0]
     for base in (None, BaseMotion()):
@@ -46,8 +46,9 @@ def test_an_exact_name_wins_and_a_link_frame_is_that_link() -> None:
     assert robot.certificate().verified
 
 
-def test_pinocchio_resolves_names_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    # As it was once: a prefix first.
+def test_the_comparison_with_pinocchio_finds_a_frame_of_the_wrong_link(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     right = KinematicTree.frame_link
 
     def prefix_first(tree: KinematicTree, name: str) -> int:
@@ -59,7 +60,7 @@ def test_pinocchio_resolves_names_by_itself(monkeypatch: pytest.MonkeyPatch) -> 
         loaded(LIKE_OURS).placement([0.0, 0.0], "link:foo")
 
 
-def test_a_prepared_frame_is_not_taken_for_another_of_its_text() -> None:
+def test_prepared_frames_with_equal_text_are_different_frames() -> None:
     robot = loaded(LIKE_OURS)
     q = np.zeros(2)
     ways = "link:foo", LinkFrame.of("foo"), "link:foo"
@@ -68,25 +69,23 @@ def test_a_prepared_frame_is_not_taken_for_another_of_its_text() -> None:
     assert pickle.loads(pickle.dumps(robot.prepare(LinkFrame.of("foo")))).placement(q)[1, 3] == 0.0
 
 
-def test_every_frame_of_all_frames_stands_for_itself_also_in_a_validation() -> None:
+def test_every_frame_of_all_frames_is_its_own_frame_even_as_a_copy_and_in_a_validation() -> None:
     robot = loaded(LIKE_OURS)
     assert robot.all_frames == ("link:base", "link:foo", "link:link:foo", "joint:j1", "joint:j2")
     assert [robot.tree.frame_link(frame) for frame in robot.all_frames] == [0, 1, 2, 1, 2]
     for copied in (copy.deepcopy(robot.all_frames), pickle.loads(pickle.dumps(robot.all_frames))):
         assert [robot.tree.frame_link(frame) for frame in copied] == [0, 1, 2, 1, 2]
     assert urdfkin.validate([LIKE_OURS.encode()], samples=2).passed
-    assert max(line.pinocchio.worst for line in judge(loaded(LIKE_OURS), samples=1).lines) < 10.0
+    assert max(line.pinocchio.worst for line in accuracy_study(loaded(LIKE_OURS), samples=1).lines) < 10.0
 
 
 @pytest.mark.parametrize("name", ["anymal_c", "so100", "z1", "b1_z1"])
-def test_a_robot_whose_link_and_joint_share_a_name_moves_on_its_base(name: str) -> None:
+def test_a_robot_whose_link_and_joint_share_a_name_moves_with_its_base(name: str) -> None:
     robot = urdfkin.load(name)
     shared = {joint.name for joint in robot.tree.joints} & set(robot.link_names)
     assert shared
-    assert robot.velocity(robot.neutral(), np.ones(robot.nv), robot.link_frames).shape == (
-        len(robot.link_names),
-        6,
-    )
+    twists = robot.velocity(robot.neutral(), np.ones(robot.nv), robot.link_frames)
+    assert twists.shape == (len(robot.link_names), 6)
     q, base = robot.sample(2, 3), BaseMotion(TURNED, np.arange(6.0), np.arange(6.0) - 2.0)
     everywhere = robot.placement(q, robot.link_frames, base=base)
     np.testing.assert_allclose(everywhere, TURNED @ robot.placement(q, robot.link_frames), atol=1e-14)
@@ -109,7 +108,7 @@ def test_the_world_and_the_root_joint_move_with_the_base(root_joint: str) -> Non
     assert robot.certificate().verified
 
 
-def test_the_remedy_for_an_ambiguous_name_works() -> None:
+def test_the_remedy_for_an_ambiguous_name_is_correct() -> None:
     crossed = (
         joint("b", "fixed", "a", "link:b", 'xyz="1 0 0"'),
         joint("c", "fixed", "link:b", "b", 'xyz="0 1 0"'),
@@ -126,7 +125,7 @@ def test_the_remedy_for_an_ambiguous_name_works() -> None:
 
 
 def meant(name: str, links: list[str], joints: list[str]) -> int | str:
-    """The link that a name stands for (joints lead to `links[1:]`), or the word for why there is none."""
+    """Return the index of the link that a name means, or "ambiguous" or "unknown"."""
     link = links.index(name) if name in links else None
     joint = joints.index(name) + 1 if name in joints else None
     if link is not None and joint is not None and link != joint:
@@ -146,12 +145,12 @@ def meant(name: str, links: list[str], joints: list[str]) -> int | str:
     data=st.data(),
     root_joint=st.sampled_from([None, None, "floating", "planar"]),
 )
-def test_of_hostile_names_every_one_stands_for_the_same_frame_on_both_sides(
+def test_every_hostile_name_is_the_same_frame_in_urdfkin_and_pinocchio(
     links: list[str], data: st.DataObject, root_joint: str | None
 ) -> None:
     n = len(links) - 1
     joints = data.draw(st.lists(st.sampled_from(POOL), min_size=n, max_size=n, unique=True))
-    assume("universe" not in joints)  # Pinocchio does not find such a joint: a finding of its own
+    assume("universe" not in joints)  # Pinocchio does not find a joint with this name (URDF404)
     assume(root_joint is None or ("universe" not in links and "root_joint" not in joints))
     places, rows = [np.zeros(3)], []
     for k in range(n):
@@ -168,7 +167,7 @@ def test_of_hostile_names_every_one_stands_for_the_same_frame_on_both_sides(
         places = [np.zeros(3), *places]
     q = robot.neutral()
     for base, T in ((None, np.eye(4)), (BaseMotion(TURNED), TURNED)):
-        for name in ASKED:
+        for name in FRAMES:
             where = meant(name, links, joints)
             if isinstance(where, str):
                 wanted = InputError if where == "ambiguous" else UnknownNameError

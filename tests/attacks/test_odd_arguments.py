@@ -1,4 +1,4 @@
-"""Whatever is handed to a public argument, the answer is a result or one of urdfkin's own errors."""
+"""For any value of a public argument, urdfkin returns a result or raises an error of its own."""
 
 import inspect
 import math
@@ -36,7 +36,7 @@ ODD: dict[str, Any] = {
 ARM = robot_of(
     joint("j", "revolute", "a", "b", more=limit()), joint("k", "continuous", "b", "c", 'xyz="1 0 0"', "0 1 0")
 )
-#: Good arguments for every parameter without a default.
+#: Valid arguments for every parameter without a default.
 GOOD: dict[str, Any] = {
     "q": [0.1, 0.2], "v": [0.1, 0.2], "a": [0.1, 0.2], "frame": "c", "n": 2,
     "start": [0.1, 0.2], "end": [0.3, 0.2],
@@ -46,7 +46,7 @@ GOOD: dict[str, Any] = {
 
 def methods() -> list[str]:
     names = [name for name in dir(Robot) if not name.startswith("_")]
-    # What is for the package's own parts takes what they made.
+    # These methods take objects of the package.
     inside = {"plan", "select"}
     return [name for name in names if inspect.isfunction(getattr(Robot, name)) and name not in inside]
 
@@ -66,7 +66,7 @@ def robot() -> Robot:
 
 
 def failure(function: Callable[..., Any], arguments: dict[str, Any]) -> str | None:
-    """What is wrong with the answer: nothing, for a result or for an error of urdfkin's own with words."""
+    """Return a description of a wrong exception; None for a result, or for an error of urdfkin."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -117,7 +117,7 @@ def test_a_prepared_frame_takes_what_its_robot_takes(method: str, robot: Robot) 
 FUNCTIONS: dict[str, dict[str, Any]] = {
     "load": {"source": ARM}, "check": {"source": ARM}, "validate": {"robots": ARM, "samples": 1},
 }  # fmt: skip
-#: Arguments that are objects with methods of their own, which are called and answer for themselves.
+#: Arguments whose methods urdfkin calls, and whose exceptions are the caller's.
 OBJECTS = {("validate", "executor"), ("validate", "progress"), ("check", "limits")}
 ARGUMENTS = [(name, x) for name in FUNCTIONS for x in inspect.signature(getattr(urdfkin, name)).parameters]
 
@@ -129,7 +129,7 @@ def test_an_odd_argument_of_a_function_gives_a_result_or_an_error_of_urdfkins_ow
 ) -> None:
     monkeypatch.chdir(tmp_path)  # a word may be a store's
     function, good = getattr(urdfkin, name), FUNCTIONS[name]
-    # So many processes or samples are no mistake, but take a while.
+    # A very large number of processes or samples is valid, but takes too long.
     odd = {key: x for key, x in ODD.items() if key != "too large" or parameter not in ("jobs", "samples")}
     failures = {label: failure(function, good | {parameter: x}) for label, x in odd.items()}
     assert {label: words for label, words in failures.items() if words} == {}
@@ -153,11 +153,11 @@ def test_threads_are_a_whole_number_whatever_the_batch(odd: object, n: int, robo
 def test_many_threads_are_no_more_work_than_the_batch_and_the_processors(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ten million threads made ten million parts, for 3.5 s."""
+    # Ten million threads once caused ten million parts, which took 3.5 s.
     counted = []
     parts = evaluate._parts
 
-    def counting(n: int, threads: int) -> list[tuple[int, int]]:
+    def counting(n: int, threads: int) -> list[slice]:
         counted.append(threads)
         return parts(n, threads)
 

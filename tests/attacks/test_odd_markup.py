@@ -1,4 +1,4 @@
-"""Undeclared prefixes and remains of xacro: the robot is computed if its motion does not depend on them."""
+"""Undeclared prefixes and unexpanded xacro that do not affect the motion of the robot."""
 
 import xml.etree.ElementTree as Xml
 
@@ -10,7 +10,7 @@ import urdfkin
 from tests.urdf.lint.cases.arm import MESH, arm
 from tests.urdfs import loaded
 from urdfkin.urdf.lint import Finding, Severity
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.view.scene import shapes
 
 UNDECLARED = "URDF214"
@@ -18,13 +18,13 @@ FOLLOWS = '<mimic joint="j1" multiplier="-2" offset="0.1"/>'
 SPHERE = '<link name="base"><visual><geometry><sphere radius="1"/></geometry></visual></link>'
 
 
-def told(text: str) -> list[Finding]:
+def undeclared(text: str) -> list[Finding]:
     return [finding for finding in urdfkin.check(text) if finding.code == UNDECLARED]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("more", ["<drake:x/>", '<gazebo drake:a="1"/>'])
-def test_a_follower_beside_an_undeclared_prefix_is_verified(more: str) -> None:
+def test_a_robot_with_a_mimic_joint_and_an_undeclared_prefix_is_verified(more: str) -> None:
     robot = loaded(arm(follow=FOLLOWS, more=more))
     T = robot.placement([0.3], "tool")
     assert robot.certificate().verified
@@ -32,17 +32,17 @@ def test_a_follower_beside_an_undeclared_prefix_is_verified(more: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_judge_and_the_viewer_read_a_file_with_an_undeclared_prefix() -> None:
+def test_the_accuracy_study_and_the_viewer_read_a_file_with_an_undeclared_prefix() -> None:
     robots = (loaded(arm(follow=FOLLOWS, more=more)) for more in ("<d:x/>", ""))
-    with_prefix, without = (judge(robot, samples=2).lines[0] for robot in robots)
+    with_prefix, without = (accuracy_study(robot, samples=2).lines[0] for robot in robots)
     assert with_prefix == without
     (shape,) = shapes(loaded(arm(base=SPHERE, more="<drake:x/>")))
     assert (shape.link, shape.kind) == ("base", "sphere")
 
 
-def test_each_undeclared_prefix_is_told_once_with_its_first_place_and_xacro_as_xacro() -> None:
+def test_each_undeclared_prefix_is_reported_once_and_the_prefix_xacro_as_unexpanded_xacro() -> None:
     more = '<a:x/><b:x/>\n  <a:y/><gazebo c:u="1" xmlns:d="http://d"/><d:z/>'
-    found = told(arm(more=more))
+    found = undeclared(arm(more=more))
     assert [(f.line, f.column) for f in found] == [(8, 3), (8, 9), (9, 17), (9, 45)]
     assert {f.severity for f in found} == {Severity.WARNING}
     assert [f.found for f in found] == ['"<a:x>" and 1 more', '"<b:x>"', '"c:u"', '"<d:z>"']
@@ -57,8 +57,8 @@ DECLARED = [
 
 
 @pytest.mark.parametrize("more", DECLARED)
-def test_a_prefix_that_is_declared_is_not_told(more: str) -> None:
-    assert told(arm(more=more)) == []
+def test_a_declared_prefix_is_not_reported(more: str) -> None:
+    assert undeclared(arm(more=more)) == []
 
 
 PARTS = [
@@ -67,7 +67,7 @@ PARTS = [
 
 
 def _nested(parts: list[str]) -> str:
-    """Some of the parts in one another, the others behind one another."""
+    """Write some of the elements inside each other, and others after each other."""
     if not parts:
         return ""
     tag = parts[0][1:-1].split(" ")[0]
@@ -77,17 +77,19 @@ def _nested(parts: list[str]) -> str:
 
 @pytest.mark.slow
 @given(st.lists(st.sampled_from(PARTS), max_size=7))
-def test_it_is_told_whenever_readers_that_know_namespaces_refuse(parts: list[str]) -> None:
+def test_an_undeclared_prefix_is_reported_exactly_if_a_reader_with_namespaces_refuses_the_file(
+    parts: list[str],
+) -> None:
     text = f'<robot name="r"><link name="base"/>{_nested(parts)}</robot>'
     try:
         Xml.fromstring(text)
         refused = False
     except Xml.ParseError:
         refused = True
-    assert bool(told(text)) == refused
+    assert bool(undeclared(text)) == refused
 
 
-# -- remains of xacro ------------------------------------------------------------------------------
+# -- unexpanded xacro ------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -99,7 +101,7 @@ def test_it_is_told_whenever_readers_that_know_namespaces_refuse(parts: list[str
         arm(more='<gazebo><xacro:plugin/><p name="${x}"/></gazebo>'),
     ],
 )
-def test_a_robot_whose_motion_needs_no_xacro_is_loaded_and_verified(text: str) -> None:
+def test_a_robot_whose_motion_does_not_depend_on_xacro_is_verified(text: str) -> None:
     robot = loaded(text)
     robot.placement([0.1, 0.2], "tool")
     assert robot.certificate().verified
@@ -117,7 +119,6 @@ def test_a_robot_whose_motion_needs_no_xacro_is_loaded_and_verified(text: str) -
         arm(base=MESH.format("$(arg a)"), origin='<origin xyz="0 0 $(arg h)"/>'),
     ],
 )
-def test_where_motion_depends_on_it_the_robot_is_refused(text: str) -> None:
+def test_a_robot_whose_motion_depends_on_xacro_is_refused(text: str) -> None:
     (error,) = [f for f in urdfkin.check(text) if f.code == "URDF202" and f.severity is Severity.ERROR]
-    assert error.remedy is not None
-    assert "expand the file first" in error.remedy
+    assert "expand the file first" in str(error.remedy)

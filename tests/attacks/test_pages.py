@@ -1,7 +1,6 @@
-"""No name becomes an element, an attribute, a script or a line in any form that urdfkin writes.
+"""No name adds an element, an attribute, a script or a line to any form that urdfkin writes.
 
-Where a form can be parsed, its skeleton (what there is besides the words) is compared with that of the same
-thing under tame names: whatever a name adds is found, also what nobody thought of.
+The structure of a parsed text with hostile names is compared with the structure with harmless names.
 """
 
 import ast
@@ -56,7 +55,7 @@ def same(name: str) -> str:
 
 @cache
 def _report(called: Callable[[str], str]) -> str:
-    """A run on a robot with every name, and a robot for each name that no URDF could hold or that failed."""
+    """Return the report of a robot with all names that XML allows, and of a failed robot for each name."""
     names = [called(name) for name in IN_XML.values()]
     document: Any = validate([chain_of_all(names, called(NAMES["line"]))], samples=1).as_dict()
     whole = document["robots"][0]
@@ -68,7 +67,7 @@ def _report(called: Callable[[str], str]) -> str:
     whole["source"] = called(NAMES["colours"])
     failed = whole["checks"][0]
     failed |= {"failed": 1}
-    # As wide as each other: it stands beside a plot, whose ticks are as many as there is room for.
+    # Both names have the same width, because the number of ticks of the plot depends on the width.
     whole["checks"][2] |= {"quantity": "<b>|`\x1b" if called is same else "abcdefghij"}
     failed["worst_case"] |= {"replay": called(NAMES["code"]), "frame": called(NAMES["line"])}
     document |= {"verdict": "disagrees", "command": called(NAMES["code"])}
@@ -106,7 +105,7 @@ def test_a_comment_in_markdown_has_the_same_elements_under_any_names(html: bool)
 
 
 def _compared(document: Document) -> str:
-    """With one that has lost every robot: each is named as gone."""
+    """Return the comparison with a report of only the first robot."""
     empty: Any = {**document, "robots": document["robots"][:1]}
     return markdown_of(document, empty, compare(document, empty))
 
@@ -130,7 +129,7 @@ def table(name: str) -> DHTable:
 
 
 @pytest.mark.parametrize("kind", IN_XML)
-def test_what_was_snapped_is_told_with_names_as_words(kind: str) -> None:
+def test_a_report_of_snapped_values_has_the_same_elements_under_any_name(kind: str) -> None:
     def page(name: str) -> Page:
         text = urdf(name).replace('<origin xyz="0.3 0 0"/>', '<origin xyz="0.3 0 0" rpy="1.5708 0 0"/>')
         snapped = urdfkin.load(text).dh(snap=1e-3)
@@ -150,7 +149,7 @@ def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, htm
 
 
 @pytest.mark.parametrize("kind", NAMES)
-def test_a_name_in_markdown_is_code_and_prose_is_prose(kind: str) -> None:
+def test_a_name_in_markdown_is_one_code_element_or_one_paragraph(kind: str) -> None:
     cell = rendered(f"| a | b |\n| --- | --- |\n| {markdown_code(NAMES[kind])} | x |\n", True)
     tags = [tag for tag, _ in cell.skeleton if tag in ("td", "code", "tr")]
     assert tags == ["tr", "tr", "td", "code", "td"]
@@ -172,7 +171,7 @@ def test_the_whole_tree_has_the_same_lines_under_any_names(form: str) -> None:
 
 
 @pytest.mark.parametrize("kind", NAMES)
-def test_a_name_in_latex_is_words(kind: str) -> None:
+def test_a_name_in_latex_has_no_active_character(kind: str) -> None:
     known = r"\\textbackslash\{\}|\\textasciitilde\{\}|\\textasciicircum\{\}|\\[&%$#_{}]"
     assert not re.search(r"[\\{}$&#^_~%\n\r]", re.sub(known, "", escaped(NAMES[kind])))
     lines = [export(table(name), "latex").count("\n") for name in (NAMES[kind], "tame_name")]
@@ -198,7 +197,7 @@ def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
 def test_code_with_a_proof_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> list[str]:
         written = code_of_chain(table(name), ["placement"], name="chain", verify=False)
-        words = written.words["q"]
+        words = written.identifiers["q"]
         assert all(re.fullmatch(r"\w+", word, re.ASCII) for word in words)
         found = []
         for form in ("numpy", "casadi", "c", "matlab"):
@@ -233,20 +232,20 @@ def test_a_table_that_is_read_back_has_its_names(kind: str, form: str, tmp_path:
     file.write_text(export(table(NAMES[kind]), form), encoding="utf-8")
     found = read_table(file)
     assert (found.robot, found.base_frame, found.tip_frame) == (NAMES[kind],) * 3
-    # In CSV what would act on a log or a terminal stays an escape: urdfkin's JSON and TOML hold every name.
+    # In CSV, characters that act on a log or a terminal stay escaped.
     if form != "csv" or (NAMES[kind].isprintable() and "##" not in NAMES[kind]):
         assert [row.joint for row in found.rows] == [f"{NAMES[kind]} {i}" for i in range(2)]
 
 
 @pytest.mark.parametrize("name", ["=1+1", "+x", "-x", "@x", "'=1", " =1", "\t=1", "'''@x", "'x", "x'", "'"])
-def test_no_spreadsheet_takes_a_name_for_a_formula(name: str) -> None:
+def test_a_name_in_csv_is_no_formula(name: str) -> None:
     cell = csv_cell(name)
     assert not cell.startswith(("=", "+", "-", "@", "\t", "\r"))
     if name.isprintable():
         assert from_csv_cell(cell) == name
 
 
-def test_a_drawing_has_names_as_words_alone() -> None:
+def test_a_drawing_has_the_same_elements_under_any_names() -> None:
     def elements(called: Callable[[str], str]) -> list[Any]:
         names = [called(name) for name in IN_XML.values()]
         robot = urdfkin.load(chain_of_all(names, called(NAMES["math"])))

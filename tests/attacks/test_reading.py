@@ -1,6 +1,6 @@
-"""One reader reads every file, up to a limit; pipes and devices only where the caller named them.
+"""Every file is read by `system.files` up to a limit. Pipes and devices are read only if the user names them.
 
-The device here is /dev/zero: who reads it to its end runs out of memory.
+Reading the device /dev/zero to its end would need infinite memory.
 """
 
 import ast
@@ -35,7 +35,7 @@ from urdfkin.view.scene import shapes
 
 PACKAGE = Path(urdfkin.__file__).parent
 
-#: Who opens files besides the reader, and which: no stranger can put another in their place.
+#: Modules that open files without `system.files`, and the files, which other users cannot replace.
 OTHERS = {
     "cli/streams.py": "/dev/null",
     "model/conventions/convention.py": "urdfkin's own data; a user's file by the reader",
@@ -56,7 +56,7 @@ _OPENING = {"open", "read_bytes", "read_text", "fdopen"}
 
 @pytest.fixture(autouse=True)
 def _bounded() -> Iterator[None]:
-    """Memory has an end before the machine's."""
+    """Limit the memory of the process to 2 GiB more than it uses."""
     before = resource.getrlimit(resource.RLIMIT_AS)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + 2 * 2**30, before[1]))
@@ -65,17 +65,14 @@ def _bounded() -> Iterator[None]:
 
 
 def _opens(source: str) -> bool:
-    """Whether a module opens files by itself: by a method of a path, or by `open`."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Call):
-            function = ast.unparse(node.func)
-            method = "." in function and function.rpartition(".")[2] in _OPENING
-            if function == "open" or (method and not function.startswith("webbrowser.")):
-                return True
-    return False
+    """Return whether a module calls `open` or a method that opens a file."""
+    calls = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
+    names = (ast.unparse(call.func) for call in calls)
+    opening = (name for name in names if name == "open" or ("." in name and name.split(".")[-1] in _OPENING))
+    return any(not name.startswith("webbrowser.") for name in opening)
 
 
-def test_no_module_but_the_reader_opens_files_that_a_stranger_may_have_put_there() -> None:
+def test_no_other_module_opens_files_that_another_user_may_have_created() -> None:
     found = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py")
@@ -85,7 +82,7 @@ def test_no_module_but_the_reader_opens_files_that_a_stranger_may_have_put_there
 
 
 def odd_file(kind: str, path: Path) -> Path:
-    """What is no regular file, or too large, at a path or elsewhere."""
+    """Create a file that is not regular or too large, and return its path."""
     make: dict[str, Callable[[], object]] = {
         "a link to a device": lambda: path.symlink_to("/dev/zero"),
         "a pipe": lambda: os.mkfifo(path),
@@ -97,7 +94,7 @@ def odd_file(kind: str, path: Path) -> Path:
 
 
 @pytest.mark.parametrize("kind", ["a device", "a link to a device", "a pipe", "a folder"])
-def test_what_is_no_regular_file_is_refused_at_once(kind: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_regular_is_refused(kind: str, tmp_path: Path) -> None:
     path = odd_file(kind, tmp_path / "x")
     words = r"not a regular file: found a (character device|pipe)|directory"
     for read in (read_bytes, read_if_there):
@@ -124,7 +121,9 @@ def test_settings_that_are_a_link_to_a_device_are_refused(
     assert "pyproject.toml: not a regular file: found a character device" in refused("check ur5")
 
 
-def test_a_manifest_a_kept_file_or_a_pipe_in_place_of_a_file_is_none(tmp_path: Path) -> None:
+def test_a_manifest_or_a_cached_file_that_is_a_device_and_an_mjcf_file_that_is_a_pipe_are_ignored(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "package.xml").symlink_to("/dev/zero")
     assert find_package("arm", tmp_path / "arm.urdf", {}) is None
     (tmp_path / "kernel").symlink_to("/dev/zero")
@@ -135,35 +134,36 @@ def test_a_manifest_a_kept_file_or_a_pipe_in_place_of_a_file_is_none(tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "judge.json", "chunk"])
-def test_a_stores_file_that_is_a_link_to_a_device_is_not_read(name: str, tmp_path: Path) -> None:
+def test_a_file_of_a_store_that_is_a_link_to_a_device_is_not_read(name: str, tmp_path: Path) -> None:
     validate("planar_two_link", samples=10, store=tmp_path)
     (place,) = tmp_path.glob("chunks/*/*.chunk") if name == "chunk" else (tmp_path / name,)
     place.unlink(missing_ok=True)
     place.symlink_to("/dev/zero")
-    said: list[str] = []
+    messages: list[str] = []
     if name == "manifest.json":
         with pytest.raises(SourceError, match="not a regular file"):
-            Store.reading(tmp_path, said.append)
+            Store.reading(tmp_path, messages.append)
     elif name == "chunk":
-        assert Store.reading(tmp_path, said.append).answer(0, 0) is None
-        assert "computed again" in said[0]
+        assert Store.reading(tmp_path, messages.append).answer(0, 0) is None
+        assert "computed again" in messages[0]
         words = "is damaged and is computed again: not a regular file: a character device"
         with pytest.warns(StoreWarning, match=words):
             assert validate("planar_two_link", samples=10, store=tmp_path).passed
         assert not place.is_symlink()
     else:
-        assert AccuracyResult.of(Store.reading(tmp_path, said.append)) is None
-        assert "no accuracy results" in said[0]
+        assert AccuracyResult.of(Store.reading(tmp_path, messages.append)) is None
+        assert "no accuracy results" in messages[0]
 
 
-def test_a_stores_lock_or_folder_that_is_a_link_leaves_what_it_leads_to_as_it_is(tmp_path: Path) -> None:
+def test_the_target_of_a_link_that_replaces_a_lock_or_folder_of_a_store_is_not_changed(
+    tmp_path: Path,
+) -> None:
     mine, store = tmp_path / "mine", tmp_path / "store"
     mine.write_text("precious")
     store.mkdir()
     (store / "lock").symlink_to(mine)
-    with pytest.raises(
-        SourceError, match="the store's lock is not a regular file: found a link; delete the lock"
-    ):
+    words = "the store's lock is not a regular file: found a link; delete the lock"
+    with pytest.raises(SourceError, match=words):
         validate("planar_two_link", samples=10, store=store)
     assert mine.read_text() == "precious"
     mine, store = tmp_path / "my folder", tmp_path / "other store"
@@ -190,9 +190,8 @@ def test_arrays_that_unpack_to_more_than_the_limit_are_refused(
         for _ in range(21):
             file.write(bytes(10**6))
     assert (tmp_path / "t.npz").stat().st_size < 2e5
-    with pytest.raises(
-        SourceError, match=r"not an \.npz file of numbers: found arrays of 21000\d+ bytes, more than 20000000"
-    ):
+    words = r"not an \.npz file of numbers: found arrays of 21000\d+ bytes, more than 20000000"
+    with pytest.raises(SourceError, match=words):
         read_arrays(tmp_path / "t.npz", {"q": (1,)}, ["q"])
 
 
@@ -206,10 +205,9 @@ XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["a link to a device", "a pipe", "a large file"])
-def test_what_a_xacro_file_includes_is_read_nowhere_but_in_the_confined_process(
+def test_only_the_confined_process_reads_included_files_and_an_unreadable_one_allows_any_argument(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its arguments are not known then, and nothing is refused."""
     arm = tmp_path / "arm.xacro"
     arm.write_text(XACRO)
     odd_file(kind, tmp_path / "part.xacro")
@@ -248,9 +246,7 @@ def test_an_older_version_that_is_too_large_is_refused(
 # -- folders and meshes ---------------------------------------------------------------------------------
 
 
-def test_a_pipe_or_a_device_in_a_folder_that_is_checked_is_refused_and_the_others_are_checked(
-    tmp_path: Path,
-) -> None:
+def test_check_of_a_folder_refuses_pipes_and_devices_and_checks_all_other_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.urdf")
     (tmp_path / "b.urdf").symlink_to("/dev/zero")
     (tmp_path / "c.urdf").write_text('<robot name="r"><link name="a"/></robot>')
@@ -267,7 +263,7 @@ OBJ = "mtllib {}\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
 @pytest.mark.parametrize("name", ["device.mtl", "pipe.mtl", "../outside.mtl", "leading_out.mtl"])
-def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
+def test_files_that_a_mesh_names_are_read_only_if_they_are_regular_files_in_its_folder(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("trimesh")
@@ -282,11 +278,11 @@ def test_what_a_mesh_names_is_read_from_regular_files_of_its_own_folder(
     (folder / "own.obj").write_text(OBJ.format("own.mtl"))
     read: list[str] = []
 
-    def told(path: Path, most: int) -> bytes:
+    def read_and_note(path: Path, most: int) -> bytes:
         read.append(path.name)
         return files.read_bytes(path, most)
 
-    monkeypatch.setattr(scene, "read_bytes", told)
+    monkeypatch.setattr(scene, "read_bytes", read_and_note)
     for mesh in ("a.obj", "own.obj"):
         visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
         (folder / "r.urdf").write_text(f'<robot name="r"><link name="l">{visual}</link></robot>')

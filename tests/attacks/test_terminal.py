@@ -1,4 +1,4 @@
-"""Nothing that a file brings acts on a terminal or a log: every command, on hostile names."""
+"""No name in a file has an effect on a terminal or a log, for any command."""
 
 import json
 import os
@@ -20,10 +20,10 @@ from urdfkin.cli.streams import SafeStream
 from urdfkin.dh.export import FORMATS
 from urdfkin.export import LANGUAGES
 
-#: A file may be called so.
+#: A hostile file name
 FILE = "\x1b[31m\n::error::forged\u202e ##vso[x]"
 
-#: Lines after each command and its robot. Words in capitals are hostile files and names.
+#: Options after each command and its robot; words in capitals are hostile files and names
 ROBOT = {
     "info": ["", "--format json"],
     "order": ["", "--format csv", "--from isaaclab --format json", "--to FILE"],
@@ -90,7 +90,7 @@ LINES += [f"{command} {more}" for command, lines in OTHERS.items() for more in l
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """A robot, a table and a report, in a folder and under names as hostile as what is in them."""
+    """Write a robot and a report with hostile content under hostile names."""
     folder = tmp_path_factory.mktemp("files") / FILE.replace("/", "")
     folder.mkdir()
     made = {name: str(folder / f"{FILE}{ending}") for name, ending in ENDINGS.items()}
@@ -127,7 +127,7 @@ ENDINGS = {"ROBOT": ".urdf", "REPORT": ".json", "PICTURE": ".svg", "FOLDER": ""}
 
 
 def acts(text: str, *, commands: bool = False) -> list[str]:
-    """What in a text would act on a terminal or a log."""
+    """Return the parts of a text that have an effect on a terminal or a log."""
     found = [repr(c) for c in text if c != "\n" and not c.isprintable()]
     found += re.findall(r"##(?:vso|teamcity)?\[", text)
     lines = [line.strip() for line in re.split("[\n\r]", text)]
@@ -161,7 +161,7 @@ def test_no_name_and_no_word_of_the_command_line_acts_on_the_terminal(
 @pytest.mark.parametrize("fit", ["--no-fit", pytest.param("--fit", marks=pytest.mark.long)])
 @pytest.mark.parametrize("part", range(5))
 def test_no_name_of_a_table_or_of_what_it_is_held_against_acts(part: int, fit: str, tmp_path: Path) -> None:
-    """All names, a few at a time: what a comparison tries grows with the cube of a table's length."""
+    # A fifth of the names: the time of a comparison grows with the cube of the table's length.
     names = list(IN_XML.values())[part::5]
     robot, table = tmp_path / f"{FILE}.urdf".replace("/", ""), tmp_path / f"{FILE}.toml".replace("/", "")
     robot.write_text(chain_of_all(names), encoding="utf-8")
@@ -181,7 +181,6 @@ def test_no_name_of_a_file_or_an_option_acts(command: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", IN_XML)
 def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As many lines as for a robot with tame names of that length: a name is one line, or part of one."""
     monkeypatch.setenv("COLUMNS", "10000")
     counts: list[list[int]] = []
     lines = "info", "jacobian", "dh", "dh --format markdown", "dh --tree", "dh --format c", BREAKDOWN
@@ -204,7 +203,7 @@ def test_machine_formats_say_the_names_as_they_are(files: dict[str, str]) -> Non
         assert [row["joint"] for row in table["rows"]] == names
 
 
-def test_a_crash_says_its_last_words_through_the_door() -> None:
+def test_the_message_of_a_crash_is_escaped() -> None:
     code = (
         "import urdfkin.cli as c\nclass Crash:\n  @staticmethod\n"
         f"  def main(**_): raise ValueError({FILE!r})\nc.cli = Crash\nc.main()"
@@ -252,8 +251,8 @@ def test_a_terminal_of_any_encoding_shows_escapes(encoding: str, files: dict[str
     assert b"Traceback" not in done.stderr
 
 
-class Kept:
-    """A stream that keeps what it is given."""
+class Recorder:
+    """A stream that stores the written text."""
 
     encoding = "utf-8"
 
@@ -266,17 +265,17 @@ class Kept:
 
 @pytest.mark.parametrize("step", [1, 2, 3, 7, 1000])
 def test_a_command_in_pieces_is_noticed_too(step: int) -> None:
-    kept: Any = Kept()
-    door = SafeStream(kept)
+    recorder: Any = Recorder()
+    stream = SafeStream(recorder)
     text = " " * 200 + "::error::x\n" + "a ##vso[task]\n  : :x\n:" + ":warning::y\nfine: ::x ## [y]\n"
     for k in range(0, len(text), step):
-        door.write(text[k : k + step])
-    assert acts(kept.text) == []
-    assert kept.text.endswith("fine: ::x ## [y]\n")
+        stream.write(text[k : k + step])
+    assert acts(recorder.text) == []
+    assert recorder.text.endswith("fine: ::x ## [y]\n")
 
 
-def test_what_is_printed_goes_through_the_door() -> None:
-    """No module of the command line has a way round it; whole documents go through `click.echo`."""
+def test_all_output_of_the_command_line_passes_the_safe_stream() -> None:
+    # Only whole documents, which contain escaped names, are printed by `click.echo`.
     allowed = {
         "streams.py": ("click.echo(printable(line)",),
         "explain.py": (

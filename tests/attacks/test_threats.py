@@ -1,4 +1,4 @@
-"""The page on threats names tests that exist, and says nothing that no test shows."""
+"""The page on threats names an existing test for each row."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "threats.md").read_text(encoding="utf-8")
 
 
-def test_every_row_names_a_test_that_exists_and_readers_are_led_there() -> None:
+def test_every_row_of_the_page_names_an_existing_test_and_security_md_links_the_page() -> None:
     named = re.findall(r"`(tests/[^`]+\.py)`", PAGE)
     assert len(named) >= 10
     assert [name for name in named if not (ROOT / name).is_file()] == []

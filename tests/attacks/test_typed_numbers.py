@@ -1,4 +1,4 @@
-"""A number that a user types or writes is decimal digits in ASCII; what looks like one is refused."""
+"""Numbers in arguments and files must be decimal numbers in ASCII."""
 
 from pathlib import Path
 
@@ -10,28 +10,22 @@ from tests.cli.running import refused, urdfkin
 from tests.urdfs import joint, robot
 from urdfkin.robot.trajectory import read_trajectory
 
-#: What Python's float takes, and nobody means.
-NOT_MEANT = [
+#: Words that are no numbers; Python's `float` accepts some of them.
+NO_NUMBERS = [
     "1_0", "\u0661", "\u0967.\u0966", "\uff11", "nan", "inf", "-Infinity", "1e999", "0x10", "1,5", "1\u22122",
     "\u22121", "", "+", ".", "1e", "e5", "1 2", "--1", "1j", "9" * 3000,
 ]  # fmt: skip
-MEANT = {"1": 1.0, "+1.5": 1.5, "-.5": -0.5, "1.": 1.0, "1e-3": 1e-3, " 2E+2 ": 200.0, "007": 7.0}
+NUMBERS = {"1": 1.0, "+1.5": 1.5, "-.5": -0.5, "1.": 1.0, "1e-3": 1e-3, " 2E+2 ": 200.0, "007": 7.0}
 
 
-@pytest.mark.parametrize("text", [text for text in NOT_MEANT if "," not in text])
-def test_it_is_refused_in_a_list_on_the_command_line(text: str) -> None:
-    assert "--q, elbow_joint: not a finite number: found" in refused("placement ur5 --q", f"0,0,{text},0,0,0")
-
-
-@pytest.mark.parametrize("text", NOT_MEANT)
-def test_it_is_refused_in_a_file_with_its_line_and_column(text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("text", NO_NUMBERS)
+def test_a_word_that_is_no_number_is_refused_with_its_joint_and_its_line(text: str, tmp_path: Path) -> None:
+    if "," not in text:
+        words = "--q, elbow_joint: not a finite number: found"
+        assert words in refused("placement ur5 --q", f"0,0,{text},0,0,0")
     path = tmp_path / "q.csv"
     path.write_text(f'0,0,0,0,0,0\n# a remark\n0,0,0,"{text}",0,0\n', encoding="utf-8")
     assert "q.csv:3, wrist_1_joint: not a finite number: found" in refused("placement ur5 --q", f"@{path}")
-
-
-@pytest.mark.parametrize("text", NOT_MEANT)
-def test_it_is_refused_in_a_trajectory_with_its_line_and_column(text: str, tmp_path: Path) -> None:
     robot, path = library.load("ur5"), tmp_path / "t.csv"
     rows = [f"{t},0,0,0,0,0,0" for t in range(5)]
     rows[3] = f'3,0,0,0,0,0,"{text}"'
@@ -52,7 +46,7 @@ OPTIONS = [
 
 @pytest.mark.parametrize("text", ["1_0", "\u0661\u0660", "nan", "\uff14"])
 @pytest.mark.parametrize("words", OPTIONS, ids=lambda words: words[-1])
-def test_it_is_refused_as_an_option(
+def test_a_word_that_is_no_number_is_refused_as_an_option(
     words: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -60,15 +54,15 @@ def test_it_is_refused_as_an_option(
 
 
 @pytest.mark.parametrize("count", ["1_0", "\u0661", "0", "-1", "1.5", ""])
-def test_it_is_refused_as_a_count_of_samples(count: str) -> None:
+def test_a_word_that_is_no_positive_integer_is_refused_as_a_count_of_samples(count: str) -> None:
     done = urdfkin("placement ur5 --q", f"random:{count}")
     assert (done.code == 0) is (count == ""), done.err
 
 
-@pytest.mark.parametrize("text", MEANT)
-def test_what_is_a_number_is_taken(text: str) -> None:
+@pytest.mark.parametrize("text", NUMBERS)
+def test_a_decimal_number_is_accepted(text: str) -> None:
     done = urdfkin("placement ur5 --no-verify --format json --q", f"0,0,{text},0,0,0")
-    assert done.data["q"] == [[0.0, 0.0, MEANT[text], 0.0, 0.0, 0.0]]
+    assert done.data["q"] == [[0.0, 0.0, NUMBERS[text], 0.0, 0.0, 0.0]]
 
 
 # -- columns ---------------------------------------------------------------------------------------------
@@ -76,7 +70,7 @@ def test_what_is_a_number_is_taken(text: str) -> None:
 NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_2_joint,wrist_3_joint"
 
 
-#: What is wrong with a file of --q, and what is said.
+#: Wrong contents of a file for --q, and a part of the message.
 FILES = [
     ("1,2\n", "q.csv:1: 6 numbers are expected"),
     ("a,b,c,d,e,f\n0,0,0,0,0,0\n", "q.csv:1: the first line must name the columns of --q"),
@@ -95,14 +89,14 @@ FILES = [
 
 
 @pytest.mark.parametrize(("content", "message"), FILES)
-def test_a_column_too_many_or_missing_is_told_with_file_line_and_name(
+def test_wrong_columns_are_refused_with_file_line_and_name(
     content: str, message: str, tmp_path: Path
 ) -> None:
     (tmp_path / "q.csv").write_text(content)
     assert message in refused("placement ur5 --q", f"@{tmp_path / 'q.csv'}")
 
 
-def test_columns_in_any_order_are_read_by_name_and_a_mistake_is_told_by_name(tmp_path: Path) -> None:
+def test_columns_in_any_order_are_read_by_name(tmp_path: Path) -> None:
     names = NAMES.split(",")[::-1]
     path = tmp_path / "q.csv"
     path.write_text(",".join(names) + "\n6,5,4,3,2,1\n")
@@ -112,7 +106,7 @@ def test_columns_in_any_order_are_read_by_name_and_a_mistake_is_told_by_name(tmp
     assert "q.csv:2, shoulder_pan_joint: not a finite number" in urdfkin("placement ur5 --q", f"@{path}").err
 
 
-def test_joints_that_are_called_like_numbers_may_head_a_file(tmp_path: Path) -> None:
+def test_the_names_of_columns_may_be_numbers(tmp_path: Path) -> None:
     text = robot(joint("1", "continuous", "a", "b"), joint("2", "continuous", "b", "c"))
     (tmp_path / "q.csv").write_text("2,1\n0.2,0.1\n")
     done = urdfkin("placement - --format json --q", f"@{tmp_path / 'q.csv'}", stdin=text)

@@ -1,4 +1,4 @@
-"""Memory is asked for before it is taken, bounded, and grows with the robot's size, not with its square."""
+"""The memory of a validation is estimated before use, bounded, and linear in the number of links."""
 
 import resource
 import tracemalloc
@@ -26,7 +26,6 @@ GB = 10**9
 
 
 def chain(joints: int, kind: str, leaves: int = 0) -> str:
-    """A chain of joints, and fixed leaves at its end."""
     inside = "" if kind == "fixed" else limit()
     parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", 'xyz="0.1 0 0"', more=inside) for i in range(joints)]
     ends = range(joints, joints + leaves)
@@ -34,7 +33,7 @@ def chain(joints: int, kind: str, leaves: int = 0) -> str:
     return robot(*parts) if parts else '<robot name="r"><link name="l0"/></robot>'
 
 
-def test_blocks_cover_everything_once_and_processes_share_what_is_free(
+def test_blocks_contain_each_item_once_and_processes_share_half_of_the_free_memory(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(comparison, "BLOCK_BYTES", 1000)
@@ -43,10 +42,10 @@ def test_blocks_cover_everything_once_and_processes_share_what_is_free(
         assert [i for block in found for i in range(count)[block]] == list(range(count))
         assert max(block.stop - block.start for block in found) == most
     monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
-    assert memory.share() == 4 * GB
-    assert memory.share(4) == GB
+    assert memory.limit() == 4 * GB
+    assert memory.limit(4) == GB
     monkeypatch.setattr(memory, "_free", lambda: iter([]))
-    assert memory.share() is None
+    assert memory.limit() is None
 
 
 @pytest.mark.long
@@ -67,7 +66,7 @@ def test_comparing_in_blocks_changes_no_number(
 def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPatch) -> None:
     sizes: list[int] = []
 
-    def seen(function: Callable[..., Any]) -> Callable[..., Any]:
+    def recorded(function: Callable[..., Any]) -> Callable[..., Any]:
         def call(*args: Any, **kwargs: Any) -> Any:
             result = function(*args, **kwargs)
             sizes.extend(part.nbytes for part in (result if isinstance(result, tuple) else (result,)))
@@ -77,7 +76,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
 
     for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
         for where in (evaluate, PinocchioOracle):
-            monkeypatch.setattr(where, name, seen(getattr(where, name)))
+            monkeypatch.setattr(where, name, recorded(getattr(where, name)))
     monkeypatch.setattr(comparison, "BLOCK_BYTES", 100_000)
     (chunk,) = chunks(subject("talos"), 5, 3)
     run_chunk(chunk)
@@ -87,7 +86,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_a_plan_of_all_frames_grows_with_the_links_not_with_their_square() -> None:
+def test_the_memory_of_a_compiled_tree_is_linear_in_the_number_of_links() -> None:
     peaks = []
     for links in (500, 2000):
         tree = urdfkin.load(chain(links, "fixed")).tree
@@ -99,7 +98,7 @@ def test_a_plan_of_all_frames_grows_with_the_links_not_with_their_square() -> No
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_a_plan_knows_its_frames_as_their_paths_do() -> None:
+def test_a_compiled_tree_has_the_joints_and_depths_of_the_paths_to_its_frames() -> None:
     robot = urdfkin.load("talos")
     links = [5, 40, 0, 17, 40]
     plan = compile_tree(robot.tree, links)
@@ -112,43 +111,38 @@ def test_a_plan_knows_its_frames_as_their_paths_do() -> None:
         assert {int(plan.columns[c, 0]) for c in range(len(plan.columns)) if leaders[c] >= 0} == own
 
 
-def test_a_robot_that_does_not_fit_is_not_verified_and_pinocchio_is_not_asked(
+def test_a_robot_that_needs_too_much_memory_is_not_verified_and_pinocchio_builds_no_model(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def asked(*_: object, **__: object) -> None:
-        raise AssertionError("Pinocchio was asked")
-
-    monkeypatch.setattr(memory, "share", lambda processes=1: 2_000_000 // processes)
-    monkeypatch.setattr(PinocchioOracle, "__init__", asked)
+    monkeypatch.setattr(memory, "limit", lambda processes=1: 2_000_000 // processes)
+    monkeypatch.setattr(PinocchioOracle, "__init__", pytest.fail)
     monkeypatch.setattr(chunk_module, "_cache", {})
     robot = validate("talos", samples=1).robots[0]
     assert robot.verdict is ValidationVerdict.NOT_VERIFIED
-    words = (
-        "not enough memory to check the robot (all processes of a validation may use 50% of the free memory)"
-    )
-    assert words in str(robot.reason)
+    message = "not enough memory to check the robot (all processes of a validation may use 50% of the free"
+    assert message in str(robot.reason)
     assert "GB needed, 0.002 GB allowed for each process" in str(robot.reason)
-    assert robot.portrait.model is not None
+    assert robot.summary.model is not None
 
 
 @pytest.mark.long
-def test_what_a_robot_needs_grows_with_the_cube_of_its_rates_and_with_its_links() -> None:
+def test_the_needed_memory_grows_with_the_cube_of_nv_and_with_the_links() -> None:
     trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
-    needs = [memory.needed(tree, 28) for tree in trees]
+    needs = [memory.needed_bytes(tree, 28) for tree in trees]
     assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
     assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
-    assert memory.needed(urdfkin.load(chain(0, "fixed")).tree, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    assert memory.needed_bytes(urdfkin.load(chain(0, "fixed")).tree, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
     wide = urdfkin.load(chain(100, "revolute", leaves=1000)).tree
-    assert memory.needed(wide, 28) > needs[0] + 1000 * 16_000
-    memory.demand(trees[0], 28, needs[0])
-    memory.demand(trees[0], 28, None)
+    assert memory.needed_bytes(wide, 28) > needs[0] + 1000 * 16_000
+    memory.check(trees[0], 28, needs[0])
+    memory.check(trees[0], 28, None)
     with pytest.raises(OracleError, match="not enough memory"):
-        memory.demand(trees[0], 28, needs[0] - 1)
+        memory.check(trees[0], 28, needs[0] - 1)
 
 
 @pytest.fixture
 def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], None]:
-    """Files of a system: /proc and /sys/fs/cgroup."""
+    """Return a function that writes files of a simulated system: /proc and /sys/fs/cgroup."""
     monkeypatch.setattr(memory, "_PROC", tmp_path / "proc")
     monkeypatch.setattr(memory, "_GROUPS", tmp_path / "cgroup")
     monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
@@ -162,17 +156,17 @@ def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, st
     return write
 
 
-def test_the_machines_memory_counts_and_a_containers_own_topmost_group(
+def test_the_limit_depends_on_the_free_memory_of_the_machine_and_of_a_container(
     system: Callable[[str, str], None],
 ) -> None:
-    assert memory.share() == 8_000_000 * 1024 // 2
+    assert memory.limit() == 8_000_000 * 1024 // 2
     system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
     system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
     system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
-    assert memory.share() == 1_000_000_000
+    assert memory.limit() == 1_000_000_000
 
 
-def test_the_control_groups_limits_count_less_what_they_would_give_back(
+def test_the_limit_depends_on_control_groups_whose_inactive_cached_files_count_as_free(
     system: Callable[[str, str], None],
 ) -> None:
     system("proc/self/cgroup", "0::/outer/inner\n")
@@ -181,17 +175,16 @@ def test_the_control_groups_limits_count_less_what_they_would_give_back(
     system("cgroup/outer/memory.stat", "anon 1\ninactive_file 2000000000\n")
     system("cgroup/outer/inner/memory.max", "max\n")
     system("cgroup/outer/inner/memory.current", "1000000000\n")
-    assert memory.share() == 1_500_000_000
+    assert memory.limit() == 1_500_000_000
     system("cgroup/outer/inner/memory.max", "1500000000\n")
-    assert memory.share() == 250_000_000
+    assert memory.limit() == 250_000_000
 
 
 @pytest.mark.long
-def test_a_limit_of_the_process_counts() -> None:
-    """`ulimit -v`: what does not fit is told, and not found out by a MemoryError."""
+def test_the_limit_depends_on_the_limit_of_the_process() -> None:
     done = python(
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9,) * 2)\n"
-        "from urdfkin.validation import memory; print(memory.share())"
+        "from urdfkin.validation import memory; print(memory.limit())"
     )
     assert 0 < int(done.stdout) < 1.5 * GB
 
@@ -199,7 +192,6 @@ def test_a_limit_of_the_process_counts() -> None:
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_many_fixed_links_are_checked_in_little_memory() -> None:
-    """In a process of its own, whose peak is its own."""
     done = python(
         "import resource, sys, warnings; warnings.simplefilter('ignore')\n"
         "from tests.attacks.test_validation_memory import chain\n"
@@ -210,4 +202,4 @@ def test_many_fixed_links_are_checked_in_little_memory() -> None:
         "assert validate(chain(5000, 'fixed'), samples=1).passed\n"
         "print(peak() - before)"
     )
-    assert int(done.stdout) < 400  # MB; paths of all frames alone took 1 GB
+    assert int(done.stdout) < 400  # MB; the paths to all frames took 1 GB

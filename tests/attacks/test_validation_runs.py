@@ -1,4 +1,4 @@
-"""No robot takes a validation with it, whatever it raises; none is passed over in silence."""
+"""An error of one robot is the result of this robot only, and every robot has a result."""
 
 import os
 import subprocess
@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.validation import raising_worker
+from tests.validation import faulty_worker
 from urdfkin.errors import UrdfkinError
 from urdfkin.validation import answer, engines, worker_processes
 from urdfkin.validation.campaign import validate
@@ -26,41 +26,40 @@ ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]
 
 
-#: The ways of running; what crosses the border between processes is odd enough.
-WAYS: dict[str, Callable[[], Any]] = {
-    "here": dict,
+ENGINES: dict[str, Callable[[], Any]] = {
+    "serial": dict,
     "executor": lambda: {"executor": ThreadPoolExecutor(2)},
     "jobs": lambda: {"jobs": 2},
     "isolate": lambda: {"jobs": 2, "isolate": True},
 }
-ERRORS = [*(("here", error) for error in raising_worker.ERRORS), ("executor", "memory"),
+ERRORS = [*(("serial", error) for error in faulty_worker.ERRORS), ("executor", "memory"),
           *(("jobs", error) for error in ("unpicklable", "pinocchio")),
           *(("isolate", error) for error in ("unpicklable", "recursion"))]  # fmt: skip
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("way", "error"), ERRORS)
-def test_whatever_a_robot_raises_is_its_result_and_the_others_are_verified(
-    way: str, error: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("engine", "error"), ERRORS)
+def test_an_error_of_a_robot_is_its_result_and_the_other_robots_are_verified(
+    engine: str, error: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("URDFKIN_TEST_ERROR", error)
-    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.raising_worker")
-    monkeypatch.setattr(answer, "run_chunk", raising_worker.raising)
-    report = validate(ROBOTS, samples=60, **WAYS[way]())
+    monkeypatch.setenv(faulty_worker.FAULT, error)
+    monkeypatch.setattr(worker_processes, "WORKER", faulty_worker.MODULE)
+    monkeypatch.setattr(answer, "run_chunk", faulty_worker.run_faulty)
+    report = validate(ROBOTS, samples=60, **ENGINES[engine]())
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
     robot = report.robots[1]
     assert str(robot.reason).startswith("unexpected error in urdfkin, please report it: ")
-    assert raising_worker.WORDS[error] in str(robot.reason)
-    assert "in raising" in str(robot.error)
+    assert faulty_worker.ERRORS[error][1] in str(robot.reason)
+    assert "in run_faulty" in str(robot.error)
     assert report.as_dict()["robots"][1]["error"] == robot.error
     assert (report.passed, report.exit_code) == (False, 3)
 
 
 class Refusing(Executor):
-    """An executor that breaks down after some chunks."""
+    """An executor that breaks after some chunks, when a result is read or when a chunk is submitted."""
 
-    def __init__(self, takes: int, *, when_asked: bool) -> None:
-        self._left, self._when_asked = takes, when_asked
+    def __init__(self, chunks: int, *, when_asked: bool) -> None:
+        self._left, self._when_asked = chunks, when_asked
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         future = Future[Any]()
@@ -75,7 +74,7 @@ class Refusing(Executor):
 
 
 @pytest.mark.parametrize("when_asked", [True, False])
-def test_an_executor_that_breaks_costs_what_it_did_not_do(when_asked: bool) -> None:
+def test_robots_after_the_breakdown_of_an_executor_are_not_verified(when_asked: bool) -> None:
     report = validate(ROBOTS, samples=30, executor=Refusing(2, when_asked=when_asked))
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "not verified"]
     for robot in report.robots[1:]:
@@ -84,44 +83,44 @@ def test_an_executor_that_breaks_costs_what_it_did_not_do(when_asked: bool) -> N
 
 
 @pytest.mark.long
-def test_a_process_pool_of_someone_elses_can_run_the_chunks() -> None:
+def test_a_process_pool_can_run_the_chunks() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         report = validate(["ur5", "no such robot"], samples=30, executor=pool)
     assert [robot.verdict for robot in report.robots] == ["verified", "bad input"]
 
 
 @pytest.mark.long
-def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_all_of_them_in_the_end(
+def test_an_executor_has_a_bounded_number_of_chunks_at_a_time_and_runs_all_chunks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    flying, most = 0, 0
+    submitted, most = 0, 0
+
+    class Counted(Future[Any]):
+        def result(self, timeout: float | None = None) -> Any:
+            nonlocal submitted
+            submitted -= 1
+            return super().result(timeout)
 
     class Counting(Executor):
         def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-            nonlocal flying, most
-            flying += 1
-            most = max(most, flying)
-            future = Future[Any]()
+            nonlocal submitted, most
+            submitted += 1
+            most = max(most, submitted)
+            future = Counted()
             future.set_result(fn(*args, **kwargs))
-            wait = future.result
-
-            def result(timeout: float | None = None) -> Any:
-                nonlocal flying
-                flying -= 1
-                return wait(timeout)
-
-            setattr(future, "result", result)  # noqa: B010
             return future
 
     monkeypatch.setattr(engines, "IN_FLIGHT", 3)
     report = validate(["planar_two_link", "double_pendulum"], samples=200, executor=Counting())
     assert report.passed
-    assert (most, flying) == (3, 0)
+    assert (most, submitted) == (3, 0)
     assert {robot.samples for robot in report.robots} == {203}
 
 
-@pytest.mark.parametrize("how", [{}, {"executor": ThreadPoolExecutor(1)}], ids=["here", "executor"])
-def test_the_chunks_of_a_robot_that_failed_are_not_run(how: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("how", [{}, {"executor": ThreadPoolExecutor(1)}], ids=["serial", "executor"])
+def test_the_remaining_chunks_of_a_failed_robot_are_not_run(
+    how: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(engines, "IN_FLIGHT", 1)
     ran: list[int] = []
 
@@ -137,7 +136,7 @@ def test_the_chunks_of_a_robot_that_failed_are_not_run(how: Any, monkeypatch: py
     assert (robot.verdict, robot.reason, robot.samples) == (ValidationVerdict.BAD_INPUT, "no", 28)
 
 
-def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disagreement_takes_precedence_over_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(chunk: Chunk) -> ChunkResult:
         if chunk.index == 1:
             raise MemoryError
@@ -154,7 +153,7 @@ def test_a_disagreement_stays_one_whatever_else_goes_wrong(monkeypatch: pytest.M
     assert report.exit_code == 1
 
 
-def test_what_the_machinery_itself_raises_is_every_unfinished_robots_result(
+def test_an_error_of_the_engine_is_the_result_of_each_unfinished_robot(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     right = SerialEngine.run
@@ -170,7 +169,7 @@ def test_what_the_machinery_itself_raises_is_every_unfinished_robots_result(
     assert "Traceback" in str(report.robots[2].error)
 
 
-def test_a_run_over_fewer_robots_than_asked_for_or_over_none_has_not_passed() -> None:
+def test_a_run_with_missing_robots_or_without_robots_has_not_passed() -> None:
     whole = validate(["planar_two_link", "double_pendulum"], samples=0)
     part = ValidationReport(whole.robots[:1], 2, 0, 0, whole.started, 1.0)
     assert whole.passed
@@ -204,9 +203,9 @@ def test_exit_1_is_a_disagreement_and_nothing_else(verdicts: list[str], interrup
     assert not found.passed
 
 
-@pytest.mark.parametrize("way", ["here", "executor"])
-def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
-    way: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("engine", ["serial", "executor"])
+def test_an_interrupt_keeps_finished_chunks_and_drops_waiting_chunks(
+    engine: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ran: list[tuple[str, int]] = []
 
@@ -218,7 +217,7 @@ def test_an_interrupt_keeps_what_had_finished_and_drops_what_waits(
 
     monkeypatch.setattr(engines, "IN_FLIGHT", 1)
     monkeypatch.setattr(answer, "run_chunk", interrupted)
-    executor = None if way == "here" else Refusing(10**6, when_asked=True)
+    executor = None if engine == "serial" else Refusing(10**6, when_asked=True)
     report = validate(ROBOTS, samples=60, executor=executor)
     assert ran[-1] == ("ur5", 1)
     assert (report.interrupted, report.exit_code) == (True, 130)
@@ -248,9 +247,9 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("descriptors", [6, 7, 8, 9, 12])
-def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: int) -> None:
-    words = "validate double_pendulum ur5 --isolate --jobs 2 --samples 2"
-    line = f"ulimit -n {descriptors}; exec {sys.executable} -m urdfkin {words}"
+def test_with_too_few_file_descriptors_each_robot_is_reported(descriptors: int) -> None:
+    arguments = "validate double_pendulum ur5 --isolate --jobs 2 --samples 2"
+    line = f"ulimit -n {descriptors}; exec {sys.executable} -m urdfkin {arguments}"
     done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
     verified = sum(line.endswith("verified") and "not" not in line for line in done.stdout.splitlines())
     assert (done.returncode == 0) == (verified == 2), done.stdout + done.stderr
@@ -258,7 +257,7 @@ def test_without_descriptors_a_robot_is_verified_or_said_not_to_be(descriptors: 
 
 
 @pytest.mark.long
-def test_robots_are_checked_from_a_folder_that_is_gone(tmp_path: Path) -> None:
+def test_robots_are_checked_from_a_deleted_folder(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     gone.mkdir()
     command = f"exec {sys.executable} -m urdfkin validate ur5 --isolate --samples 2"
@@ -270,7 +269,9 @@ def test_robots_are_checked_from_a_folder_that_is_gone(tmp_path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("how", ["jobs=2", "isolate=True"])
-def test_a_script_needs_no_guard_and_nothing_of_the_current_folder_is_run(how: str, tmp_path: Path) -> None:
+def test_a_script_needs_no_main_guard_and_modules_of_the_current_folder_are_not_run(
+    how: str, tmp_path: Path
+) -> None:
     for planted in ("urdfkin", "multiprocessing", "json", "pickle", "queue"):
         (tmp_path / f"{planted}.py").write_text("print('planted')\nraise SystemExit(9)\n")
     scripts = tmp_path / "scripts"

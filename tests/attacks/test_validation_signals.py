@@ -1,4 +1,4 @@
-"""SIGTERM and SIGHUP end a validation as Ctrl-C does, and workers end with their parent, however it dies."""
+"""SIGTERM and SIGHUP end a validation as Ctrl-C does, and workers end with their parent process."""
 
 import json
 import os
@@ -17,19 +17,19 @@ from urdfkin.cli.exit import Stop, stoppable
 
 pytestmark = pytest.mark.long
 
-#: The command, which says when a chunk of the second robot is done.
+#: The command `urdfkin`, which also prints a line when a chunk of the second robot is done.
 _SCRIPT = """
 import sys
 from urdfkin.validation import campaign
 right = campaign.validate
 
-def told(*args, **how):
-    def tell(standing):
-        if standing.label == "talos" and standing.robots_done == 1:
+def validate(*args, **how):
+    def progress(state):
+        if state.label == "talos" and state.robots_done == 1:
             print("talos", flush=True)
-    return right(*args, **how | {"progress": tell})
+    return right(*args, **how | {"progress": progress})
 
-campaign.validate = told
+campaign.validate = validate
 from urdfkin.cli import main
 main()
 """
@@ -37,7 +37,7 @@ main()
 
 @contextmanager
 def running(*words: str, cwd: Path) -> Iterator[subprocess.Popen[str]]:
-    """A validation that has finished one robot and will not finish the next for a long time."""
+    """Yield a validation that has finished the first robot and is far from finishing the second."""
     command = [sys.executable, "-c", _SCRIPT, "validate", "planar_two_link", "talos", *words]
     with subprocess.Popen(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0
@@ -55,16 +55,15 @@ def children(of: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{of}/task/{of}/children").read_text().split()]
 
 
-def gone(processes: list[int]) -> bool:
-    """Whether all of them end within a time that is long for this."""
-    for _ in range(300):
-        if not any(_alive(process) for process in processes):
-            return True
+def end_soon(processes: list[int]) -> bool:
+    """Return whether all processes end within 30 s."""
+    deadline = time.monotonic() + 30
+    while any(map(_is_alive, processes)) and time.monotonic() < deadline:
         time.sleep(0.1)
-    return False
+    return not any(map(_is_alive, processes))
 
 
-def _alive(process: int) -> bool:
+def _is_alive(process: int) -> bool:
     try:
         state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
     except (OSError, IndexError):
@@ -81,18 +80,17 @@ ENDED = [
 
 
 @pytest.mark.parametrize(("number", "how"), ENDED)
-def test_a_signal_keeps_what_had_finished_and_says_so(
+def test_a_signal_keeps_finished_results_in_every_report(
     number: signal.Signals, how: str, tmp_path: Path
 ) -> None:
-    with running(
-        "--samples", "1000", "--json", "r.json", "--junit", "r.xml", *how.split(), cwd=tmp_path
-    ) as process:
+    options = ("--samples", "1000", "--json", "r.json", "--junit", "r.xml", *how.split())
+    with running(*options, cwd=tmp_path) as process:
         workers = children(process.pid)
         assert len(workers) == {"--jobs 2": 2, "--isolate": 1}.get(how, 0)
         process.send_signal(number)
         out, err = process.communicate(timeout=120)
     assert process.returncode == 128 + number, err
-    assert gone(workers)
+    assert end_soon(workers)
     document = json.loads((tmp_path / "r.json").read_text())
     assert (document["interrupted"], document["verdict"], document["asked"]) == (True, "interrupted", 2)
     first, second = document["robots"]
@@ -111,11 +109,10 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
         assert len(workers) == 2
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
-        assert gone(workers)
+        assert end_soon(workers)
 
 
-def test_a_worker_ends_at_the_end_of_its_pipe_alone(tmp_path: Path) -> None:
-    """Where the kernel does not do it: the parent lives, the pipe has ended."""
+def test_a_worker_ends_when_its_pipe_closes() -> None:
     code = (
         "import os, sys, time; from multiprocessing import Pipe\n"
         "from urdfkin.validation import worker_processes as worker\n"
@@ -132,7 +129,7 @@ def test_a_worker_ends_at_the_end_of_its_pipe_alone(tmp_path: Path) -> None:
     python(code)
 
 
-def test_a_worker_whose_parent_is_gone_does_not_begin_and_a_disagreement_stays_one() -> None:
+def test_a_worker_without_a_parent_does_not_start_and_a_disagreement_keeps_its_exit_code() -> None:
     code = "from urdfkin.validation.worker_processes import _end_with; _end_with(1 << 22); print('began')"
     done = python(code, check=False)
     assert (done.returncode, done.stdout) == (0, "")
@@ -141,7 +138,7 @@ def test_a_worker_whose_parent_is_gone_does_not_begin_and_a_disagreement_stays_o
     assert Stop().exit_code(3) == 3
 
 
-def test_only_the_first_signal_interrupts_and_the_handlers_are_put_back() -> None:
+def test_only_the_first_signal_interrupts_and_the_handlers_are_restored() -> None:
     before = [signal.getsignal(each) for each in (signal.SIGTERM, signal.SIGHUP)]
     try:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)  # nohup
@@ -158,7 +155,7 @@ def test_only_the_first_signal_interrupts_and_the_handlers_are_put_back() -> Non
                 interrupts += 1
             os.kill(os.getpid(), signal.SIGTERM)
         assert (interrupts, stop.signal) == (1, signal.SIGTERM)
-        os.kill(os.getpid(), signal.SIGTERM)  # what had finished is being written
+        os.kill(os.getpid(), signal.SIGTERM)  # while finished results are written
     finally:
         for each, handler in zip((signal.SIGTERM, signal.SIGHUP), before, strict=True):
             signal.signal(each, handler)

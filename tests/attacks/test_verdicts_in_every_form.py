@@ -1,4 +1,4 @@
-"""Every form of a report tells every verdict with its reason, and how the whole run ended."""
+"""Every form of a report has each verdict with the reason, and the outcome of the run."""
 
 import io
 import json
@@ -9,6 +9,7 @@ import pytest
 from lxml import etree
 from rich.console import Console
 
+from tests.reading import present
 from tests.report.documents import arms, failing
 from tests.report.test_junit import read
 from tests.urdfs import chain
@@ -16,7 +17,7 @@ from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown
 from urdfkin.report.reading import contradictions
 from urdfkin.report.terminal import print_report
-from urdfkin.validation import robot_summary as chains_module
+from urdfkin.validation import robot_summary
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.collector import CampaignProgress
 from urdfkin.validation.document import Document, outcome_of
@@ -26,24 +27,23 @@ from urdfkin.verify.tables import TableCheck
 def _outside(_: pytest.MonkeyPatch) -> Document:
     document = failing()
     del document["robots"][1:], document["sha256"][1:]
-    document |= {"asked": 1, "reason": "1 of 1 robot disagrees"}
-    return document
+    return document | {"asked": 1, "reason": "1 of 1 robot disagrees"}
 
 
 def _tables(monkeypatch: pytest.MonkeyPatch) -> Document:
     found = TableCheck(13, 0.0021, 0.0, {"placement": 5e9}, {"placement": 2.5e7}, False)
-    monkeypatch.setattr(chains_module, "check_table", lambda *_: found)
-    return _made("ur5")
+    monkeypatch.setattr(robot_summary, "check_table", lambda *_: found)
+    return _document("ur5")
 
 
 def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
-    right = chains_module.chains_of
+    right = robot_summary.chains_of
 
     def without(*args: Any) -> tuple[Any, ...]:
         return tuple(chain | {"share_of_bound": None, "worst": None} for chain in right(*args))
 
-    monkeypatch.setattr(chains_module, "chains_of", without)
-    return _made("ur5")
+    monkeypatch.setattr(robot_summary, "chains_of", without)
+    return _document("ur5")
 
 
 def _crashed(monkeypatch: pytest.MonkeyPatch) -> Document:
@@ -51,34 +51,31 @@ def _crashed(monkeypatch: pytest.MonkeyPatch) -> Document:
         raise MemoryError
 
     monkeypatch.setattr("urdfkin.validation.answer.run_chunk", crash)
-    return _made("ur5")
+    return _document("ur5")
 
 
 def _interrupted(_: pytest.MonkeyPatch) -> Document:
-    def stop(standing: CampaignProgress) -> None:
-        if standing.chunks_done == 3:
+    def stop(state: CampaignProgress) -> None:
+        if state.chunks_done == 3:
             raise KeyboardInterrupt
 
-    return _made(["planar_two_link", "double_pendulum", "ur5"], samples=50, progress=stop)
+    return _document(["planar_two_link", "double_pendulum", "ur5"], samples=50, progress=stop)
 
 
 def _missing(_: pytest.MonkeyPatch) -> Document:
-    document = arms()
-    document |= {"asked": 3, "verdict": "not verified", "reason": "1 of 3 robots without a report"}
-    return document
+    return arms() | {"asked": 3, "verdict": "not verified", "reason": "1 of 3 robots without a report"}
 
 
 HUGE = chain([""] * 320, origin="", name="huge")
-IN_TWO = '<robot name="r"><link name="a"/><link name="b"/></robot>'
+TWO_TREES = '<robot name="r"><link name="a"/><link name="b"/></robot>'
 
 
-def _made(robots: Any, **how: Any) -> Document:
+def _document(robots: Any, **how: Any) -> Document:
     document: Document = json.loads(json.dumps(validate(robots, **{"samples": 2} | how).as_dict()))
     return document
 
 
-#: What went wrong, the verdicts, what is said of the last robot that is not verified, the exit code, and what
-#: JUnit counts: (failures, errors).
+#: Document, verdicts, part of a robot's reason, exit code, and JUnit's (failures, errors).
 CASES: dict[str, tuple[Callable[[pytest.MonkeyPatch], Document], list[str], str, int, tuple[int, int]]] = {
     "results outside": (_outside, ["disagrees"], "3 of 8,000 results lie outside their bound", 1, (2, 0)),
     "tables": (
@@ -88,14 +85,14 @@ CASES: dict[str, tuple[Callable[[pytest.MonkeyPatch], Document], list[str], str,
     "tables, no number": (
         _tables_without_numbers, ["disagrees"], "disagree with Pinocchio: by an infinite amount", 1, (1, 0),
     ),
-    "refused": (lambda _: _made(HUGE), ["not verified"], "memory grows with nv^3", 3, (1, 0)),
-    "bad input": (lambda _: _made(IN_TWO), ["bad input"], "URDF", 2, (0, 1)),
+    "refused": (lambda _: _document(HUGE), ["not verified"], "memory grows with nv^3", 3, (1, 0)),
+    "bad input": (lambda _: _document(TWO_TREES), ["bad input"], "URDF", 2, (0, 1)),
     "crash": (_crashed, ["not verified"], "please report it: MemoryError: no message", 3, (1, 0)),
     "interrupt": (
         _interrupted, ["verified", "not verified", "not verified"],
         "interrupted: 0 of 53 samples were compared", 130, (2, 1),
     ),
-    "nothing": (lambda _: _made([]), [], "", 3, (0, 1)),
+    "nothing": (lambda _: _document([]), [], "", 3, (0, 1)),
     "missing": (_missing, ["verified", "verified"], "", 3, (0, 1)),
 }  # fmt: skip
 
@@ -107,7 +104,6 @@ def terminal(document: Document) -> str:
 
 
 def unescaped(text: str) -> str:
-    """HTML's and Markdown's escapes undone."""
     for escaped, plain in (("&#39;", "'"), ("&lt;", "<"), ("&gt;", ">"), ("&amp;", "&"), ("\\", "")):
         text = text.replace(escaped, plain)
     return text
@@ -116,7 +112,7 @@ def unescaped(text: str) -> str:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("name", CASES)
-def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_form_has_the_verdicts_and_the_reason(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     make, verdicts, reason, code, junit = CASES[name]
     document = make(monkeypatch)
     found = outcome_of(document)
@@ -132,8 +128,8 @@ def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pyt
         "html": unescaped(as_html(document)),
         "junit": " ".join(text for case in root.iter() for text in (*case.attrib.values(), case.text or "")),
     }
-    told = {robot["reason"] for robot in document["robots"] if robot["verdict"] != "verified"}
-    assert reason == "" or any(reason in (each or "") for each in told)
+    reasons = {robot["reason"] for robot in document["robots"] if robot["verdict"] != "verified"}
+    assert reason == "" or any(reason in (each or "") for each in reasons)
     for form, text in forms.items():
         if form != "junit" or name in ("interrupt", "nothing", "missing"):
             assert found.reason in text, form
@@ -147,7 +143,7 @@ def test_every_form_tells_the_verdict_and_its_reason(name: str, monkeypatch: pyt
 
 
 @pytest.mark.slow
-def test_a_run_that_passed_says_nothing_else_in_any_form() -> None:
+def test_no_form_of_a_passed_run_has_a_failure() -> None:
     document = arms()
     assert (document["verdict"], document["reason"], outcome_of(document).exit_code) == ("verified", None, 0)
     assert [robot["reason"] for robot in document["robots"]] == [None, None]
@@ -159,8 +155,9 @@ def test_a_run_that_passed_says_nothing_else_in_any_form() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A failure: it was compared, or could not be. An error: there was nothing to compare with."""
+def test_in_junit_only_bad_input_is_an_error_and_other_verdicts_are_failures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for name, kind, type_ in (
         ("results outside", "failure", "disagrees"),
         ("refused", "failure", "not verified"),
@@ -176,12 +173,11 @@ def test_junit_tells_a_failure_from_an_error(monkeypatch: pytest.MonkeyPatch) ->
     assert len(checks) == 1
 
 
-def test_a_crash_has_its_traceback_and_a_partly_compared_robot_its_samples_in_the_data(
+def test_a_crash_has_a_traceback_and_an_interrupted_robot_has_its_number_of_samples(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     document = _crashed(monkeypatch)
-    error = document["robots"][0].get("error")
-    assert error is not None
+    error = present(document["robots"][0].get("error"))
     assert error.startswith("Traceback (most recent call last)")
     assert "in crash" in (read(document).findtext(".//failure") or "")
     monkeypatch.undo()

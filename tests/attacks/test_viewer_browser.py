@@ -1,4 +1,4 @@
-"""The viewer in a real browser: other pages try to read, drive, frame and redirect it, names to script it."""
+"""In a real browser, other pages and names in a URDF cannot read, control, embed or redirect the viewer."""
 
 import socket
 import threading
@@ -22,7 +22,7 @@ from urdfkin.view.viewer import Viewer
 viser = pytest.importorskip("viser")
 pytestmark = [pytest.mark.long, pytest.mark.browser]
 
-#: What a page somewhere else can try; it is told the whole address, key and all.
+#: Attacks of another page, which knows the viewer's address and key
 ATTACK = """
 const [address, protocol, done] = arguments, found = {};
 const socket = new WebSocket(address.replace("http", "ws").replace(/\\/$/, ""), [protocol]);
@@ -41,7 +41,7 @@ Promise.all([connected, read, shown]).then(([a, b]) => done([a, b]));
 
 @contextmanager
 def other_site() -> Iterator[str]:
-    """Another origin: any page of the web, or of another server on this machine."""
+    """Serve a page of another origin."""
 
     class Page(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -77,7 +77,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 def attack(browser: Browser, address: str) -> tuple[list[str], list[str]]:
-    """What the page could do, and what the browser says of it."""
+    """Attack an address from the shown page; return the results and the browser's errors."""
     browser.errors()
     found = browser.chrome.execute_async_script(ATTACK, address, f"viser-v{viser.__version__}")
     return found, browser.errors()
@@ -92,7 +92,7 @@ def test_another_page_can_neither_connect_nor_read_nor_frame_the_viewer(
             found, errors = attack(browser, viewer.server.address)
             assert found == ["refused", "refused"]
             assert any("frame" in error.lower() for error in errors), errors
-        # The same page can do all of it to a server without the gate: the test can fail.
+        # The same attacks succeed on a server without the filter, so this test can fail.
         plain = viser.ViserServer(host="127.0.0.1", port=free_port(), verbose=False)
         try:
             found, errors = attack(browser, f"http://127.0.0.1:{plain.get_port()}/")
@@ -111,7 +111,7 @@ def test_a_name_that_is_pointed_at_this_machine_shows_a_refusal(viewer: Viewer, 
 
 
 def test_the_page_follows_no_address_to_another_server(viewer: Viewer, browser: Browser) -> None:
-    """Viser's client connects to whatever `?websocket=` says; what it is told there runs in its page."""
+    # Viser's client connects to the server in `?websocket=`, whose messages could run code in the page.
     with socket.create_server(("127.0.0.1", 0)) as elsewhere:
         elsewhere.settimeout(0.2)
         port = elsewhere.getsockname()[1]
@@ -136,10 +136,10 @@ def test_no_name_becomes_an_element_or_a_script_in_any_panel_and_it_is_shown_as_
     browser.settle()
     assert browser.js("return window.hacked === undefined")
     images = browser.js("return [...document.querySelectorAll('img')].map((i) => i.src)")
-    assert [image for image in images if not image.startswith("data:image/svg+xml,")] == []  # viser's mark
+    assert [image for image in images if not image.startswith("data:image/svg+xml,")] == []  # viser's logo
     links = browser.js("return [...document.querySelectorAll('a')].map((a) => a.href)")
     assert [link for link in links if "evil" in link or "javascript" in link] == []
-    # An error in words that a name has a part in.
+    # An error message with a name
     viewer.frame.value = "base"
     viewer.dh.value = "standard"
     viewer._choose()

@@ -1,4 +1,4 @@
-"""The viewer answers its own page with its key, and nobody else: asked over a socket, as a stranger would."""
+"""The viewer's server accepts only requests with its key from its own page."""
 
 import http.client
 import inspect
@@ -49,7 +49,7 @@ def key_of(server: Any) -> str:
 
 
 def ask(server: Any, path: str, **headers: str | None) -> http.client.HTTPResponse:
-    """A request with headers of one's own; KEY in the path stands for the key."""
+    """Send a request with own headers; KEY in the path and OWN in a header are replaced."""
     connection = http.client.HTTPConnection(LOOPBACK, server.get_port(), timeout=20)
     connection.putrequest("GET", path.replace("KEY", key_of(server)), skip_host=True)
     own = f"{LOOPBACK}:{server.get_port()}"
@@ -129,7 +129,7 @@ def test_no_client_can_have_the_viewer_published(server: Any, monkeypatch: pytes
 
 @pytest.mark.slow
 def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As if its next version called something else: the server runs, but not through the gate."""
+    # A future version of viser could call another function than the one that urdfkin replaces.
     plain = SimpleNamespace(serve=websockets.asyncio.server.serve)
     monkeypatch.setattr(
         "viser.infra._infra.websockets",
@@ -159,11 +159,11 @@ def test_a_server_without_the_gate_or_with_other_scripts_is_not_used(monkeypatch
 def test_on_the_whole_network_names_of_others_are_refused_and_an_address_elsewhere_is_an_error() -> None:
     with pytest.raises(InputError, match=r"--host 192\.0\.2\.1: cannot listen on this address"):
         new_server("192.0.2.1")
-    gate = RequestFilter("0.0.0.0", "key")
+    requests = RequestFilter("0.0.0.0", "key")
     own = socket.gethostname()
     for host in ("192.168.1.7:8080", f"{own}:8080", "localhost:8080"):
-        assert gate.refusal("/key/", [host], [], connects=False) is None, host
-    assert gate.refusal("/key/", ["evil.example:8080"], [], connects=False) is not None
-    assert gate.refusal("/", ["192.168.1.7:8080"], [], connects=False) is not None
-    assert gate.address(8080) == "http://127.0.0.1:8080/key/"
+        assert requests.refusal("/key/", [host], [], connects=False) is None, host
+    assert requests.refusal("/key/", ["evil.example:8080"], [], connects=False) is not None
+    assert requests.refusal("/", ["192.168.1.7:8080"], [], connects=False) is not None
+    assert requests.address(8080) == "http://127.0.0.1:8080/key/"
     assert RequestFilter("::1", "key").address(80) == "http://[::1]:80/key/"

@@ -1,4 +1,4 @@
-"""The example workflow does in CI what its page says, and what it names exists."""
+"""The example workflow for CI runs the steps that its page states, and names existing files."""
 
 import os
 import re
@@ -55,7 +55,7 @@ def test_no_page_names_a_tag_and_every_workflow_is_held_against_the_schema() -> 
     assert files <= WRITTEN.keys()
 
 
-#: GitHub's schema, and what is written for it.
+#: GitHub's schema of each file.
 WRITTEN = {
     "action.yml": "github-actions",
     ".github/workflows/ci.yml": "github-workflows",

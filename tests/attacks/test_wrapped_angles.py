@@ -100,7 +100,6 @@ def test_a_follower_goes_on_with_its_leader_and_is_told_where_that_changes_it(
 
 
 def test_a_planar_joint_on_a_circle_drives_straight_ahead_in_its_own_frame(tmp_path: Path) -> None:
-    """At 2 rad/s on a radius of 3 m: 6 m/s along its own x, and nothing sideways, through every wrap."""
     t = np.linspace(0.0, 4.0, 4001)
     angle = 2.0 * t
     q = np.column_stack([3.0 * np.sin(angle), -3.0 * np.cos(angle), wrapped(angle)])

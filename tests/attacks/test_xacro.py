@@ -1,4 +1,4 @@
-"""A xacro file from a stranger: it computes names and numbers, and gets at nothing."""
+"""A hostile xacro file can compute names and numbers, but cannot read other files or run programs."""
 
 import os
 import socket
@@ -22,7 +22,7 @@ Expand = Callable[..., str]
 
 @pytest.fixture
 def expanded(tmp_path: Path) -> Expand:
-    """Expands a robot with this inside."""
+    """Expand a robot with some content."""
 
     def expanded(inside: str, patience: float = 60.0, **arguments: str) -> str:
         path = tmp_path / "robot" / "urdf" / "r.xacro"
@@ -38,11 +38,11 @@ def link(expression: str) -> str:
 
 
 def as_eval(program: str) -> str:
-    """An argument of $(eval ...), which ends at the first closing bracket: by way of a property."""
+    """Write $(eval ...) with a property, because the argument of $(eval) cannot contain a bracket."""
     return f'<xacro:property name="p" value="{program}"/><link name="$(eval ${{p}})"/>'
 
 
-# Each got at os.system, in one way or another, when xacro evaluated it.
+#: Expressions that give access to `os.system` if xacro itself evaluates them.
 PROGRAMS = [
     "(lambda: ().__class__)()", "[c for c in ''.__class__.__mro__]", "(x for x in [1]).gi_frame.f_back",
     "(lambda: [c for c in ().__class__.__base__.__subclasses__() if c.__name__ == 'Popen'])()", "[(yield)]",
@@ -61,14 +61,13 @@ REFUSALS = (
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_an_expression_that_is_a_program_is_refused_by_name(expanded: Expand, program: str) -> None:
+def test_an_expression_that_is_a_program_is_refused_with_the_reason(expanded: Expand, program: str) -> None:
     ways = [as_eval(program)]
-    if "}" not in program:  # which ends an expression
+    if "}" not in program:  # the character ends an expression
         ways.append(link(f"${{{program}}}"))
+    words = rf"r\.xacro: xacro cannot expand the file: found .*({REFUSALS})"
     for inside in ways:
-        with pytest.raises(
-            XacroError, match=rf"r\.xacro: xacro cannot expand the file: found .*({REFUSALS})"
-        ):
+        with pytest.raises(XacroError, match=words):
             expanded(inside)
 
 
@@ -94,7 +93,7 @@ COMPUTED = {
 
 
 @pytest.mark.parametrize("expression", COMPUTED)
-def test_what_robots_compute_is_computed(expanded: Expand, expression: str, tmp_path: Path) -> None:
+def test_the_usual_expressions_are_evaluated(expanded: Expand, expression: str, tmp_path: Path) -> None:
     folder = tmp_path / "robot" / "config"
     folder.mkdir(parents=True)
     (folder / "y.yaml").write_text("limits: {upper: 1.5}\ntilt: !degrees 180\n")
@@ -117,7 +116,7 @@ def test_what_robots_compute_is_computed(expanded: Expand, expression: str, tmp_
 
 @pytest.fixture
 def secret(tmp_path: Path) -> Path:
-    """A file beside the robot's folder, as a neighbour's in a home folder is."""
+    """Create a file beside the robot's folder."""
     path = tmp_path / "neighbour" / "secret.yaml"
     path.parent.mkdir()
     path.write_text(f"{{password: {SECRET}}}")
@@ -126,6 +125,7 @@ def secret(tmp_path: Path) -> Path:
 
 
 def refused(expanded: Expand, inside: str) -> str:
+    """Return the message of the error, which must not contain the secret."""
     with pytest.raises(XacroError) as caught:
         expanded(inside)
     assert SECRET not in str(caught.value)
@@ -136,17 +136,19 @@ def refused(expanded: Expand, inside: str) -> str:
     "name",
     ["../../neighbour/secret", "{tmp}/neighbour/secret", "../urdf/../../neighbour/secret", "link/secret"],
 )
-def test_files_of_others_are_not_read(expanded: Expand, secret: Path, tmp_path: Path, name: str) -> None:
+def test_files_outside_the_robots_folder_are_not_read(
+    expanded: Expand, secret: Path, tmp_path: Path, name: str
+) -> None:
     (tmp_path / "robot" / "urdf").mkdir(parents=True)
     (tmp_path / "robot" / "urdf" / "link").symlink_to(secret.parent)
     name = name.format(tmp=tmp_path)
-    said = refused(expanded, link(f"${{xacro.load_yaml('{name}.yaml')['password']}}"))
-    assert "it is neither in the file's folder, package or repository nor" in said
+    message = refused(expanded, link(f"${{xacro.load_yaml('{name}.yaml')['password']}}"))
+    assert "it is neither in the file's folder, package or repository nor" in message
     for how in ('filename="{}.xacro"', 'filename="{}.x*"', 'filename="{}.xacro" optional="true"'):
         refused(expanded, f"<xacro:include {how.format(name)}/>")
 
 
-def test_a_file_is_read_that_the_user_names_or_a_package_or_search_path_holds(
+def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_read(
     expanded: Expand, secret: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
@@ -174,7 +176,7 @@ def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path
     assert SECRET not in expand(path, {}).decode()
 
 
-def test_a_repository_is_the_files_own_but_a_home_folder_is_not(
+def test_files_in_the_repository_may_be_read_unless_the_repository_is_the_home_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "home" / "robots" / "urdf" / "r.xacro"
@@ -194,7 +196,7 @@ def test_a_repository_is_the_files_own_but_a_home_folder_is_not(
     assert not Ground.around(file, [], ["/", str(tmp_path / "home")]).holds(other)
 
 
-def test_links_in_an_installed_package_lead_to_its_sources_and_to_nothing_else(tmp_path: Path) -> None:
+def test_links_in_an_installed_package_may_only_lead_to_its_sources(tmp_path: Path) -> None:
     installed, source, secret = tmp_path / "install/share/arm", tmp_path / "src/arm", tmp_path / "secret.yaml"
     installed.mkdir(parents=True)
     source.mkdir(parents=True)
@@ -212,7 +214,7 @@ def test_links_in_an_installed_package_lead_to_its_sources_and_to_nothing_else(t
         assert not ground.holds(str(installed / other)), other
 
 
-def test_a_repository_on_a_search_path_is_trusted_with_no_links(
+def test_links_in_a_repository_on_a_search_path_are_not_followed(
     expanded: Expand, secret: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "robot").mkdir()
@@ -253,8 +255,7 @@ DEEDS = [
 
 
 @pytest.mark.parametrize("deed", DEEDS)
-def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
-
+def test_a_program_in_the_confined_process_is_refused(deed: str) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         connected: list[object] = []
         threading.Thread(target=lambda: connected.append(server.accept()), daemon=True).start()
@@ -263,7 +264,7 @@ def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
     assert not connected
 
 
-# -- what it takes ------------------------------------------------------------------------------------
+# -- limits of memory, time and output ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -275,12 +276,14 @@ def test_even_a_program_in_the_expanding_process_is_refused(deed: str) -> None:
         link("${len('x' * 1100000000 + 'y' * 1100000000)}"),
     ],
 )
-def test_memory_has_an_end(expanded: Expand, inside: str) -> None:
+def test_the_memory_of_an_expansion_is_limited(expanded: Expand, inside: str) -> None:
     with pytest.raises(XacroError, match="it takes more than 2 GiB of memory"):
         expanded(inside)
 
 
-def test_time_and_what_it_writes_have_an_end(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_and_the_output_of_an_expansion_are_limited(
+    expanded: Expand, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(XacroError, match="did not finish: found 2 s"):
         expanded(link("${max(python.range(10**12))}"), patience=2.0)
     with pytest.raises(XacroError, match="recursion"):
@@ -290,10 +293,10 @@ def test_time_and_what_it_writes_have_an_end(expanded: Expand, monkeypatch: pyte
         expanded(link("${'x' * 20000}"))
 
 
-# -- the walk itself ----------------------------------------------------------------------------------
+# -- evaluation ---------------------------------------------------------------------------------------
 
 
-def test_a_function_is_called_only_if_it_was_offered_and_and_stops_where_python_stops() -> None:
+def test_only_allowed_functions_are_called_and_and_and_or_evaluate_like_python() -> None:
     names = {"f": len, "g": max, "d": {"h": print}, "x": [1, 2]}
     assert evaluate("g(x)", names, [max]) == 2
     others = "f(x)", "d.h(x)", "d['h'](x)", "(lambda: 1)()", "g(x)(x)", "x.__len__()", "f.__self__"

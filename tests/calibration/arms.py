@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from urdfkin.calibration.calibrate import Calibration, calibrate
 from urdfkin.calibration.parameters import CalibrationModel, urdf_model
 from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.tree import FloatArray
@@ -43,7 +45,7 @@ BRANCHED = """<?xml version="1.0"?>
 
 @dataclass(frozen=True)
 class Bench:
-    """A robot, the truth about its parameters, and poses of the true one."""
+    """A robot, the true errors of its parameters, configurations, and the true poses of the tip."""
 
     robot: Robot
     model: CalibrationModel
@@ -51,13 +53,28 @@ class Bench:
     q: FloatArray
     T: FloatArray
 
+    def values(self, q: FloatArray) -> FloatArray:
+        return self.model.coupling.values(self.model.coupling.select(self.robot.tree, q))
+
+    def poses(self, q: FloatArray) -> FloatArray:
+        """Return the true poses (s, 4, 4) at configurations."""
+        return self.model.way.poses(self.values(q), self.truth)
+
     def noisy(self, metres: float, radians: float, seed: int) -> FloatArray:
-        """(s, 4, 4) the poses as an instrument with this noise shows them."""
+        """Return the poses (s, 4, 4) that an instrument with this noise measures."""
         rng = np.random.default_rng(seed)
         T, s = self.T.copy(), len(self.T)
         T[:, :3, 3] += metres * rng.standard_normal((s, 3))
         T[:, :3, :3] = exp_rotation(radians * rng.standard_normal((s, 3))) @ T[:, :3, :3]
         return T
+
+    def calibrate(
+        self, poses: FloatArray | None = None, q: FloatArray | None = None, **how: Any
+    ) -> Calibration:
+        """Calibrate the robot, by default with the true poses."""
+        poses = self.T if poses is None else poses
+        q = self.q if q is None else q
+        return calibrate(self.robot, q, poses, tip=self.model.tip, base=self.model.base, **how)
 
 
 def bench(
@@ -70,7 +87,7 @@ def bench(
     error: float = 2e-3,
     seed: int = 0,
 ) -> Bench:
-    """A robot whose every parameter is off by some `error` (m, rad), ends not."""
+    """Return a robot whose parameters have errors of about `error` (m, rad), except base and tool."""
     robot = load(name, verify=False)
     model = urdf_model(robot.tree, tip, base, fit)
     rng = np.random.default_rng(seed)
@@ -81,11 +98,11 @@ def bench(
     return Bench(robot, model, truth, q, model.way.poses(values, truth))
 
 
-def pose(seed: int, away: float) -> FloatArray:
-    """(4, 4) any orientation, and a place at a distance."""
+def pose(seed: int, distance: float) -> FloatArray:
+    """Return a pose (4, 4) with a random orientation, and a random position at a distance."""
     rng = np.random.default_rng(seed)
     T = np.eye(4)
     T[:3, :3] = exp_rotation(rng.uniform(-2.0, 2.0, 3))
     direction = rng.standard_normal(3)
-    T[:3, 3] = away * direction / np.linalg.norm(direction)
+    T[:3, 3] = distance * direction / np.linalg.norm(direction)
     return T

@@ -27,9 +27,8 @@ ENDS = ("base", "tool")
 
 
 def elsewhere(arm: Bench, at: FloatArray, n: int = 20) -> FloatArray:
-    """(n, 4, 4) poses at configurations that were not measured."""
-    values = arm.model.coupling.values(arm.model.coupling.select(arm.robot.tree, arm.robot.sample(n, 99)))
-    return arm.model.way.poses(values, at)
+    """Return poses (n, 4, 4) at configurations that were not measured."""
+    return arm.model.way.poses(arm.values(arm.robot.sample(n, 99)), at)
 
 
 @pytest.mark.slow
@@ -39,15 +38,15 @@ def test_without_noise_the_true_arm_is_found_to_rounding(
     arm: str, tip: str, base: str, complete: bool
 ) -> None:
     true = bench(arm, ("origins",), tip, base)
-    found = calibrate(true.robot, true.q, true.T if complete else true.T[:, :3, 3], tip=tip, base=base)
-    assert found.fitted is not None
-    away = elsewhere(true, found.fitted.at) - elsewhere(true, true.truth)
-    assert np.abs(away[:, :3, 3] if not complete else away).max() < 1e-13
+    found = true.calibrate(true.T if complete else true.T[:, :3, 3])
+    fitted = present(found.fitted).at
+    error = elsewhere(true, fitted) - elsewhere(true, true.truth)
+    assert np.abs(error if complete else error[:, :3, 3]).max() < 1e-13
     assert present(found.certificate).verified
     written = load(found.written.text, verify=False)
     q = true.robot.sample(20, 99)
     T = np.linalg.solve(written.placement(q, base), written.placement(q, tip))
-    assert np.abs(T - elsewhere(true, found.fitted.at)).max() < 1e-13
+    assert np.abs(T - elsewhere(true, fitted)).max() < 1e-13
 
 
 @pytest.mark.slow
@@ -57,38 +56,34 @@ def test_the_instrument_and_its_target_may_be_anywhere(complete: bool) -> None:
     B, X = pose(1, 4.0), pose(2, 0.3)
     T = B @ true.T @ X
     poses = T if complete else T[:, :3, 3]
-    tip, base = "panda_hand", "panda_link0"
-    found = calibrate(true.robot, true.q, poses, tip=tip, base=base, fit=[*ENDS, "origins"])
+    found = true.calibrate(poses, fit=[*ENDS, "origins"])
     assert present(found.fitted).rms()[0] < 1e-13
-    rough = calibrate(true.robot, true.q, poses, tip=tip, base=base, fit=ENDS)
-    assert rough.base is not None
-    assert rough.tool is not None
-    # The arm's errors of 2 mm and 2 mrad a joint are what these are off by.
-    assert np.linalg.norm(rough.base[:3, 3] - B[:3, 3]) < 0.02
-    assert np.linalg.norm(rough.tool[:3, 3] - X[:3, 3]) < 0.02
+    rough = true.calibrate(poses, fit=ENDS)
+    # The arm's errors of 2 mm and 2 mrad at each joint cause these errors.
+    assert np.linalg.norm(present(rough.base)[:3, 3] - B[:3, 3]) < 0.02
+    assert np.linalg.norm(present(rough.tool)[:3, 3] - X[:3, 3]) < 0.02
 
 
 def test_joints_that_are_called_as_the_ends_are_no_ends() -> None:
     text = BRANCHED.replace('"three"', '"base"').replace('"four"', '"tool"')
     true = bench(text, ("origins",), "hand", "trunk")
     B, X = pose(1, 4.0), pose(2, 0.3)
-    found = calibrate(true.robot, true.q, B @ true.T @ X, tip="hand", base="trunk", fit=[*ENDS, "origins"])
+    found = true.calibrate(B @ true.T @ X, fit=[*ENDS, "origins"])
     assert present(found.fitted).rms()[0] < 1e-13
     assert set(found.origins) <= {"base", "tool", "fix"}
-    assert found.base is not None
-    assert np.abs(found.base - B).max() < 0.05
+    assert np.abs(present(found.base) - B).max() < 0.05
 
 
 def test_joints_zeros_alone_are_found() -> None:
     true = bench(BRANCHED, ("offsets",), "hand", "trunk", error=0.05)
-    found = calibrate(true.robot, true.q, true.T, tip="hand", base="trunk", fit=["offsets"])
+    found = true.calibrate(fit=["offsets"])
     assert [str(parameter) for parameter in found.parameters] == ["three rz", "four rz"]
     np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
 
 
 def test_gains_are_found_and_not_written() -> None:
     true = bench("ur5", ("gains",), "tool0", "base", error=1e-3)
-    found = calibrate(true.robot, true.q, true.T, tip="tool0", base="base", fit=["gains"])
+    found = true.calibrate(fit=["gains"])
     np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
     assert found.written.text == true.robot.urdf.encode()
     assert any(
@@ -112,38 +107,32 @@ def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(conventio
 
 
 def whitened(true: Bench, found: Calibration) -> float:
-    """chi^2, of 6 numbers, of where the tip is found to be at a configuration that was not measured."""
-    assert found.fitted is not None
-    values = true.model.coupling.values(true.model.coupling.select(true.robot.tree, true.robot.sample(1, 99)))
-    T, columns = found.model.way.columns(values, found.fitted.at)
+    """Return chi^2, of 6 numbers, of the tip's pose error at a configuration that was not measured."""
+    fitted, q = present(found.fitted), true.robot.sample(1, 99)
+    T, columns = found.model.way.columns(true.values(q), fitted.at)
     J = columns[0][:, list(found.identification.kept)]
-    S = true.model.way.poses(values, true.truth)
-    turn = log_rotation(S[0, :3, :3] @ T[0, :3, :3].T)
-    away = np.hstack([S[0, :3, 3] - T[0, :3, 3], turn])
-    return float(away @ np.linalg.solve(J @ found.fitted.covariance @ J.T, away))
+    S = true.poses(q)
+    error = np.hstack([S[0, :3, 3] - T[0, :3, 3], log_rotation(S[0, :3, :3] @ T[0, :3, :3].T)])
+    return float(error @ np.linalg.solve(J @ fitted.covariance @ J.T, error))
 
 
 @pytest.mark.slow
 def test_the_covariance_and_the_noise_are_what_they_are_said_to_be() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=40)
     metres, radians = 2e-4, 5e-4
-    seeds = range(20)
-    every = [
-        calibrate(true.robot, true.q, true.noisy(metres, radians, seed), tip="tool0", base="base")
-        for seed in seeds
-    ]
+    every = [true.calibrate(true.noisy(metres, radians, seed)) for seed in range(20)]
     # chi^2 of 120 has the standard deviation 15.5; that of estimated noise is a little wider.
     assert 75.0 < sum(whitened(true, found) for found in every) < 180.0
     noise = np.array([(f.fitted.noise.metres, f.fitted.noise.radians) for f in every if f.fitted])
     np.testing.assert_allclose(np.sqrt((noise**2).mean(axis=0)), [metres, radians], rtol=0.05)
-    # One campaign in a hundred has a pose that is called odd wrongly.
+    # An outlier is reported wrongly in one of a hundred data sets.
     assert sum(bool(found.odd) for found in every) <= 2
     T = true.noisy(1e-4, 1e-4, 0)
-    stated = calibrate(true.robot, true.q, T, tip="tool0", base="base", noise=(1e-4, 1e-4))
-    assert stated.fitted is not None
-    assert abs(stated.fitted.ratio - 1.0) < 4.0 * stated.fitted.spread
+    stated = true.calibrate(T, noise=(1e-4, 1e-4))
+    fitted = present(stated.fitted)
+    assert abs(fitted.ratio - 1.0) < 4.0 * fitted.spread
     assert not doubts(stated)
-    wrong = calibrate(true.robot, true.q, T, tip="tool0", base="base", noise=(4e-5, 4e-5))
+    wrong = true.calibrate(T, noise=(4e-5, 4e-5))
     assert re.match(r"the residuals are 2\.[3-7]\d* times the stated noise", doubts(wrong)[0])
 
 
@@ -153,15 +142,13 @@ def test_odd_poses_are_told_and_left_out_only_if_that_is_wanted() -> None:
     T = true.noisy(1e-4, 2e-4, 7)
     T[17, :3, 3] += [5e-3, 0.0, 0.0]
     T[40, 0, 3] -= 4e-3
-    found = calibrate(true.robot, true.q, T, tip="tool0", base="base")
+    found = true.calibrate(T)
     assert found.odd == (17, 40)
     assert "poses 17, 40 are outliers: the rms error is " in doubts(found)[0]
-    assert found.fitted is not None
-    assert len(found.fitted.errors) == 60
-    clean = calibrate(true.robot, true.q, T, tip="tool0", base="base", drop_odd=True)
-    assert clean.fitted is not None
-    assert len(clean.fitted.errors) == 58
-    assert clean.fitted.noise.metres < 1.2e-4 < found.fitted.noise.metres
+    clean = true.calibrate(T, drop_odd=True)
+    fits = present(found.fitted), present(clean.fitted)
+    assert [len(fit.errors) for fit in fits] == [60, 58]
+    assert fits[1].noise.metres < 1.2e-4 < fits[0].noise.metres
     assert doubts(clean) == ["poses 17, 40 are excluded as outliers"]
 
 
@@ -169,8 +156,8 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=5)
     T = true.noisy(1e-4, 1e-4, 0)
     with pytest.raises(InputError, match="the fit cannot be checked"):
-        calibrate(true.robot, true.q, T, tip="tool0", base="base")
-    found = calibrate(true.robot, true.q, T, tip="tool0", base="base", force=True)
+        true.calibrate(T)
+    found = true.calibrate(T, force=True)
     assert found.identification.rank == 30
     assert found.written_parameters == ()
     out = io.StringIO()
@@ -230,12 +217,11 @@ def test_turning_joints_have_four_numbers_sliding_ones_two_and_the_tip_six(arm: 
 
 
 def test_no_kept_parameter_has_to_be_large_for_one_that_stands_still() -> None:
-    # Axes that are nearly parallel, and nearly square: where four parameters need hundreds of metres.
+    # With nearly parallel axes, four parameters could become hundreds of metres long.
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40, error=1e-3)
-    true = calibrate(arm.robot, arm.q, arm.T, tip="tool0", base="base")
+    true = arm.calibrate()
     told = calibrate(true.written.text, tip="tool0", base="base")
-    values = told.model.coupling.values(told.model.coupling.select(arm.robot.tree, arm.q))
-    J = stacked(told.model, values, complete=True)
+    J = stacked(told.model, arm.values(arm.q), complete=True)
     kept, still = list(told.identification.kept), list(told.identification.still)
     shares = np.linalg.lstsq(J[:, kept], J[:, still], rcond=None)
     assert np.abs(J[:, kept] @ shares[0] - J[:, still]).max() < 1e-11
@@ -254,8 +240,7 @@ def test_a_joint_that_never_moved_is_told_of() -> None:
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40)
     q = arm.q.copy()
     q[:, 2] = 0.4
-    values = arm.model.coupling.values(arm.model.coupling.select(arm.robot.tree, q))
-    found = calibrate(arm.robot, q, arm.model.way.poses(values, arm.truth), tip="tool0", base="base")
+    found = arm.calibrate(arm.poses(q), q)
     assert found.identification.rank == 26
     assert any(
         "26 parameters are identifiable from these poses; more varied poses would identify 4 more: " in line
@@ -268,10 +253,8 @@ def test_poses_that_hardly_excite_a_parameter_are_told_of() -> None:
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40)
     q = arm.q.copy()
     q[:, 2] = 0.4 + 1e-3 * q[:, 2]
-    values = arm.model.coupling.values(arm.model.coupling.select(arm.robot.tree, q))
-    T = arm.model.way.poses(values, arm.truth)
-    found = calibrate(arm.robot, q, T, tip="tool0", base="base")
+    found = arm.calibrate(arm.poses(q), q)
     assert found.identification.rank == 30
     (line,) = doubts(found)
     assert line.startswith("poorly observable: elbow_joint")
-    assert not doubts(calibrate(arm.robot, arm.q, arm.T, tip="tool0", base="base"))
+    assert not doubts(arm.calibrate())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,38 +36,28 @@ NAMES = [pytest.param(name, marks=pytest.mark.long if name in ("panda", "z1") el
 
 @cache
 def arm(name: str) -> Bench:
-    """An arm whose every parameter is off by 2 mm or 2 mrad."""
     text, tip, base = ARMS[name]
     return bench(text, ("origins",), tip, base, poses=30)
 
 
 def fitted(
-    name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None, **how: object
+    name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None, **how: Any
 ) -> Calibration:
     true = arm(name)
     T = pose(1, 2.0) @ true.noisy(1e-4, 2e-4, 3) @ pose(2, 0.2)
     wanted = ALL if fit is None else fit
     poses = T if "base" in wanted else true.noisy(1e-4, 2e-4, 3)
-    _, tip, base = ARMS[name]
-    return calibrate(
-        true.robot,
-        q,
-        poses if complete else poses[:, :3, 3],
-        tip=tip,
-        base=base,
-        fit=wanted,
-        **how,  # type: ignore[arg-type]
-    )
+    return true.calibrate(poses if complete else poses[:, :3, 3], q, fit=wanted, **how)
 
 
-def refused(name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None) -> str:
+def refused(name: str, q: FloatArray, **how: Any) -> str:
     with pytest.raises(ImplausibleError) as error:
-        fitted(name, q, complete=complete, fit=fit)
+        fitted(name, q, **how)
     return str(error.value)
 
 
-def reason(name: str, q: FloatArray, *, complete: bool = True, fit: list[str] | None = None) -> str:
-    return refused(name, q, complete=complete, fit=fit).split("likeliest reason: ")[1]
+def reason(name: str, q: FloatArray, **how: Any) -> str:
+    return refused(name, q, **how).split("likeliest reason: ")[1]
 
 
 @pytest.mark.parametrize("complete", [True, False])
@@ -167,7 +159,7 @@ def test_good_data_are_never_refused(name: str, complete: bool) -> None:
         true = bench(text, ("origins",), tip, base, poses=poses, error=error, seed=seed)
         T = true.noisy(noise, noise, seed)
         for fit in (["origins"], ALL):
-            found = calibrate(true.robot, true.q, T if complete else T[:, :3, 3], tip=tip, base=base, fit=fit)
+            found = true.calibrate(T if complete else T[:, :3, 3], fit=fit)
             assert not found.plausibility.objections
 
 
@@ -185,10 +177,10 @@ def test_few_distinct_configurations_are_refused() -> None:
     with pytest.raises(
         ImplausibleError, match="4 distinct configurations among 30 poses give 24 numbers for 24"
     ):
-        calibrate(arm("ur5").robot, q[true], T, tip="tool0", base="base")
+        arm("ur5").calibrate(T, q[true])
     jittered = q[true] + 1e-8 * np.random.default_rng(0).standard_normal((30, 6))
     with pytest.raises(ImplausibleError, match="distinct configurations among 30 poses"):
-        calibrate(arm("ur5").robot, jittered, T, tip="tool0", base="base")
+        arm("ur5").calibrate(T, jittered)
 
 
 def test_values_beyond_a_turn_are_taken_for_degrees_unless_they_are_said_to_be_radians() -> None:
@@ -208,28 +200,20 @@ def test_a_refused_fit_is_had_by_force() -> None:
 
 
 def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
-    drawn = arm("ur5").robot
-    model = arm("ur5").model
-    names = [str(parameter) for parameter in model.way.parameters]
+    names = [str(parameter) for parameter in arm("ur5").model.way.parameters]
     truth = np.zeros(len(names))
     truth[names.index("elbow_joint y")] = 1e-3
-    values = model.coupling.values(model.coupling.select(drawn.tree, drawn.sample(60, 5)))
-    q, T = drawn.sample(60, 5), model.way.poses(values, truth)
+    true, q = replace(arm("ur5"), truth=truth), arm("ur5").robot.sample(60, 5)
+    T = true.poses(q)
     T[:, :3, 3] += 5e-5 * np.random.default_rng(1).standard_normal((60, 3))
-    few = calibrate(drawn, q, T, tip="tool0", base="base")
-    every = calibrate(drawn, q, T, tip="tool0", base="base", every=True)
+    few, every = true.calibrate(T, q), true.calibrate(T, q, every=True)
     assert len(every.written_parameters) == every.identification.rank
     assert len(few.written_parameters) <= 4
     assert (present(every.fitted).at == present(few.fitted).at).all()
-    # What is written moves the tip as the truth does, within the noise.
-    assert (
-        np.abs(
-            few.model.way.poses(values, present(few.written_fit).at) - model.way.poses(values, truth)
-        ).max()
-        < 1e-4
-    )
-    moved = set(few.origins)
-    assert moved == {few.parameters[k].where for k in few.written_parameters}
+    # The written parameters move the tip as the true ones do, within the noise.
+    found = few.model.way.poses(true.values(q), present(few.written_fit).at)
+    assert np.abs(found - true.poses(q)).max() < 1e-4
+    assert set(few.origins) == {few.parameters[k].where for k in few.written_parameters}
 
 
 CATALOGUE_ARMS = (
@@ -259,11 +243,10 @@ def test_random_good_data_are_verified_and_random_wrong_data_refused(
     T = true.noisy(10.0**noise, 10.0**noise, seed)
     q = np.degrees(true.q) if mistake == "degrees" else true.q
     q = np.roll(q, {"rows one later": 1, "rows one earlier": -1}.get(mistake, 0), axis=0)
-    measured = (robot, q, T if complete else T[:, :3, 3])
+    measured = T if complete else T[:, :3, 3], q
     if mistake == "none":
-        found = calibrate(*measured, tip=tip, base=base, fit=fit)
-        assert found.certificate is not None
-        assert found.certificate.verified
+        found = calibrate(robot, *measured[::-1], tip=tip, base=base, fit=fit)
+        assert present(found.certificate).verified
     else:
         with pytest.raises(ImplausibleError):
-            calibrate(*measured, tip=tip, base=base, fit=fit)
+            true.calibrate(*measured, fit=fit)

@@ -1,4 +1,4 @@
-"""Run the `urdfkin` command: in this process where its entry point will do, in one of its own where not."""
+"""Run the command `urdfkin` in this process, or in a new process."""
 
 import io
 import json
@@ -6,8 +6,7 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from urdfkin.system.processes import own_python
 
 @dataclass(frozen=True)
 class Done:
-    """What a command left behind."""
+    """The exit code and the output of a command."""
 
     code: int
     out: bytes
@@ -26,45 +25,47 @@ class Done:
 
     @property
     def text(self) -> str:
-        """Standard output as text."""
         return self.out.decode()
 
     @property
     def data(self) -> Any:
-        """Standard output as JSON; NaN and Infinity are none."""
-        return json.loads(self.text, parse_constant=_refused)
+        """Standard output as JSON, without NaN and Infinity."""
+        return json.loads(self.text, parse_constant=_reject)
 
 
-def _refused(word: str) -> None:
-    raise ValueError(f"{word} is no JSON")
+def _reject(word: str) -> None:
+    raise ValueError(f"{word} is not JSON")
 
 
 def urdfkin(*words: str, stdin: str | bytes = b"") -> Done:
-    """The entry point of the installed command, called here: no new process, the same code.
-
-    The first of the words may be a line as one types it: `urdfkin("info ur5 --format", form)`.
-    """
+    """Run the command in this process. The first word may be a line: `urdfkin("info ur5 --format", form)`."""
     words = (*shlex.split(words[0]), *words[1:]) if words and " " in words[0] else words
     data = stdin.encode() if isinstance(stdin, str) else stdin
-    out, err = io.BytesIO(), io.StringIO()
-    code = 0
-    with _streams(words, io.TextIOWrapper(io.BytesIO(data)), io.TextIOWrapper(out, write_through=True), err):
-        try:
-            main()
-        except SystemExit as leave:
-            code = leave.code if isinstance(leave.code, int) else int(leave.code is not None)
+    out, err, code = io.BytesIO(), io.StringIO(), 0
+    stdout = io.TextIOWrapper(out, write_through=True)
+    before = sys.argv, sys.stdin, sys.stdout, sys.stderr
+    sys.argv, sys.stdin = ["urdfkin", *words], io.TextIOWrapper(io.BytesIO(data))
+    sys.stdout, sys.stderr = stdout, err
+    try:
+        main()
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    finally:
+        stdout.flush()
+        stdout.detach()
+        sys.argv, sys.stdin, sys.stdout, sys.stderr = before
     return Done(code, out.getvalue(), err.getvalue())
 
 
 def good(*words: str, stdin: str | bytes = b"") -> Done:
-    """The same, of a command that ends with exit code 0."""
+    """Run the command in this process; it must end with exit code 0."""
     done = urdfkin(*words, stdin=stdin)
     assert done.code == 0, done.err or done.text
     return done
 
 
 def refused(*words: str, stdin: str | bytes = b"") -> str:
-    """The message of a command that is a mistake: exit code 2, nothing on standard output, no traceback."""
+    """Return the message of a wrong command: exit code 2, no standard output, no traceback."""
     done = urdfkin(*words, stdin=stdin)
     assert (done.code, done.out) == (2, b""), done.err or done.text
     assert "Traceback" not in done.err
@@ -72,25 +73,11 @@ def refused(*words: str, stdin: str | bytes = b"") -> str:
 
 
 def python(code: str, *words: str, check: bool = True, **how: Any) -> subprocess.CompletedProcess[str]:
-    """A program in a process of its own, which succeeds unless `check` is false."""
+    """Run Python code in a new process, which must succeed if `check` is true."""
     command = [sys.executable, "-c", code, *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False, **how)
     assert done.returncode == 0 or not check, done.stderr
     return done
-
-
-@contextmanager
-def _streams(
-    words: tuple[str, ...], stdin: io.TextIOWrapper, stdout: io.TextIOWrapper, stderr: io.StringIO
-) -> Iterator[None]:
-    before = sys.argv, sys.stdin, sys.stdout, sys.stderr
-    sys.argv, sys.stdin, sys.stdout, sys.stderr = ["urdfkin", *words], stdin, stdout, stderr
-    try:
-        yield
-    finally:
-        stdout.flush()
-        stdout.detach()
-        sys.argv, sys.stdin, sys.stdout, sys.stderr = before
 
 
 def imported(lines: Sequence[str], modules: Collection[str]) -> dict[str, list[str]]:
@@ -111,7 +98,7 @@ def imported(lines: Sequence[str], modules: Collection[str]) -> dict[str, list[s
 
 
 def process(*words: str, stdin: bytes = b"", cwd: Path | None = None, **env: str) -> Done:
-    """`python -m urdfkin` in a process of its own."""
+    """Run `python -m urdfkin` in a new process."""
     command, env = [sys.executable, "-m", "urdfkin", *words], os.environ | env
     done = subprocess.run(command, input=stdin, cwd=cwd, env=env, capture_output=True, check=False)
     return Done(done.returncode, done.stdout, done.stderr.decode())

@@ -1,4 +1,4 @@
-"""`urdfkin calibrate` writes what it says, and refuses what has no effect."""
+"""`urdfkin calibrate` writes the calibrated robot, and refuses an implausible calibration."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from urdfkin.robot.loading import load
 
 
 def words_of(folder: Path, shift: int = 0) -> tuple[list[str], Any]:
-    """The words of a calibration, whose q are shifted by some rows, and the bench that was measured."""
+    """Return a command line for measured poses, whose q are shifted by some rows, and the measurement."""
     true = bench(BRANCHED, ("origins",), "hand", "trunk")
     (folder / "arm.urdf").write_text(BRANCHED)
     np.savez(folder / "poses.npz", q=np.roll(true.q, shift, axis=0), T=true.T)

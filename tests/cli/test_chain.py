@@ -1,4 +1,4 @@
-"""`urdfkin chain`: axes and origins as Pinocchio's frames have them, up the tree and down."""
+"""`urdfkin chain` prints the axes and origins of the robot's frames, up and down the tree."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""`urdfkin check` through its real entry point: exit codes, formats, options."""
+"""`urdfkin check`: exit codes, formats, options."""
 
 import os
 import re
@@ -7,7 +7,7 @@ from urllib.parse import unquote_to_bytes, urlsplit
 
 import pytest
 
-from tests.cli.running import good, python, refused, urdfkin
+from tests.cli.running import good, refused, urdfkin
 
 GOOD = '<robot name="r">\n  <link name="a"/>\n</robot>\n'
 WARNED = '<robot name="">\n  <link name="a"/>\n</robot>\n'
@@ -21,7 +21,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (tmp_path / f"{name}.urdf").write_text(text)
 
 
-#: A line, its exit code, and how its output begins or, after a star, what is in it.
+#: For each line: the exit code, and the start of the output or, after a star, a text in the output
 LINES = {
     "good.urdf": (0, "no findings in 1 file\n"), "warned.urdf": (0, "*URDF405"),
     "--strict warned.urdf": (1, "*URDF405 error"),
@@ -64,17 +64,9 @@ def test_explain_prints_a_page_and_lists_all_codes() -> None:
     assert urdfkin("explain URDF999").code == 2
 
 
-def test_checking_imports_neither_yourdfpy_nor_pinocchio_nor_a_compiler() -> None:
-    program = (
-        "import sys; from urdfkin.urdf.lint import check; check('<robot/>');"
-        "print({'numba', 'yourdfpy', 'pinocchio', 'lxml', 'trimesh'} & set(sys.modules))"
-    )
-    assert python(program).stdout == "set()\n"
-
-
 NAMES = [b"r\xff\xe9.urdf", b"a b:c%41?#\\[].urdf", "ä\u202e.urdf".encode(), b"a\nb.urdf"]
 
-#: What RFC 3986 lets a path hold.
+#: A path according to RFC 3986
 PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-F]{2})+")
 
 

@@ -1,4 +1,4 @@
-"""`urdfkin check` where maintainers live: folders, settings, what is known, what changed, what is mended."""
+"""`urdfkin check` in a repository: folders, settings, baselines, changes since a version, fixes."""
 
 import json
 import os
@@ -27,7 +27,7 @@ BAD = '<robot name="r"><link name="a"/><link name="b"/></robot>\n'
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty repository, and the current folder."""
+    """Make an empty repository the current folder."""
     (tmp_path / ".git").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -45,7 +45,7 @@ def check(*words: str) -> Done:
 
 
 def found(*words: str) -> list[tuple[str, str]]:
-    """(file, code) of each finding."""
+    """Return (file, code) of each finding."""
     return [(f["file"], f["code"]) for f in check("--format", "json", *words).data["findings"]]
 
 
@@ -87,7 +87,7 @@ def test_a_folder_or_pattern_without_a_urdf_is_an_error_not_a_success(here: Path
     assert (done.code, done.err.startswith(f"urdfkin: error: {word}: no URDF found")) == (2, True)
 
 
-# -- what is told --------------------------------------------------------------------------------------
+# -- output --------------------------------------------------------------------------------------------
 
 
 def test_carets_stand_below_what_is_meant_and_of_a_long_line_the_part_around_is_shown(here: Path) -> None:
@@ -168,7 +168,7 @@ def test_codes_are_ignored_in_some_files_and_by_no_settings_of_others(
     settings('per-file-ignores = { "legacy/*" = ["URDF5"] }')
     assert found() == [("arm.urdf", "URDF503"), ("inner/arm.urdf", "URDF503")]
     settings('ignore = ["URDF503"]')
-    monkeypatch.chdir("inner")  # beyond another repository's top
+    monkeypatch.chdir("inner")  # inside another repository
     assert found() == [("arm.urdf", "URDF503")]
     Path("pyproject.toml").write_text("[tool.other]\nignor = 1\n")
     assert found() == [("arm.urdf", "URDF503")]
@@ -187,26 +187,26 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_a_wrong_setting_is_told_with_its_place(here: Path, text: str) -> None:
+def test_a_wrong_setting_is_reported_with_its_place(here: Path, text: str) -> None:
     put("arm.urdf", GOOD)
     settings(text)
     assert WRONG[text] in refused("check")
     assert check("--isolated").code == 0
 
 
-# -- what is known -------------------------------------------------------------------------------------
+# -- baselines -----------------------------------------------------------------------------------------
 
 
-def test_what_a_baseline_knows_blocks_nobody_and_what_is_new_does(here: Path) -> None:
+def test_findings_in_a_baseline_do_not_fail_the_check_and_new_findings_do(here: Path) -> None:
     arm = put("robots/arm.urdf")
     put("robots/two.urdf", BAD)
     done = check("--strict", "--write-baseline", "known.json")
     assert (done.code, done.text, done.err) == (0, "", "wrote known.json: 2 findings in the baseline\n")
     done = check("--strict", "--baseline", "known.json")
     assert (done.code, done.text) == (0, "no findings in 2 files (already known: 2)\n")
-    arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # known again on another line
+    arm.write_text("\n\n" + LONG.replace("<axis", '<axis  shade="3"'))  # still known on another line
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF208")]
-    arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # what is touched is new
+    arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # a finding of a changed element is new
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
     arm.write_text(GOOD)
     assert (
@@ -254,7 +254,7 @@ def test_what_is_no_baseline_is_refused(here: Path, text: str) -> None:
     assert Path("known.json").read_text() == text
 
 
-# -- what changed --------------------------------------------------------------------------------------
+# -- changes since a version ---------------------------------------------------------------------------
 
 
 def git(*words: str) -> None:
@@ -270,7 +270,7 @@ def commit() -> None:
 
 @pytest.fixture
 def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A branch `main` with two robots, and a branch `work` that has parted from it."""
+    """Make a repository with two robots on the branch `main`, and a new branch `work`."""
     monkeypatch.chdir(tmp_path)
     git("init", "-q", "-b", "main")
     put("arm.urdf")
@@ -290,7 +290,7 @@ def test_only_what_is_new_since_a_branch_is_told(repository: Path) -> None:
     assert found("--changed-since", "main") == new
     commit()
     assert found("--changed-since", "main") == new
-    # What main does meanwhile is not ours.
+    # A later commit on main changes nothing.
     git("checkout", "-q", "main")
     put("arm.urdf", GOOD)
     git("commit", "-qam", "mended on main")
@@ -298,7 +298,7 @@ def test_only_what_is_new_since_a_branch_is_told(repository: Path) -> None:
     assert found("--changed-since", "main") == new
 
 
-def test_from_a_folder_below_and_for_a_file_beyond(
+def test_changes_are_found_from_a_folder_below_and_for_a_file_outside_the_repository(
     repository: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     (repository / "below").mkdir()
@@ -338,7 +338,7 @@ MJCF = """<mujoco><worldbody><body name="a"><joint name="j"/><geom size="1"/><in
 SITE = '<mujocoinclude><site name="tip"/></mujocoinclude>'
 
 
-#: A file, its text, its part, the part's text before and after, and the findings.
+#: File, text, included file, text of the included file before and after the change, and findings
 IN_PARTS = {
     "usd": ("arm.usda", STAGE, "parts.usda", PARTS, PARTS + "\n", ["USD301", "USD302"]),
     "mjcf": ("arm.xml", MJCF, "part.xml", SITE, SITE + "\n", ["MJCF101", "MJCF102"]),
@@ -396,7 +396,7 @@ def test_a_version_that_is_none_is_told_with_what_to_do(repository: Path, versio
     assert "fetch-depth: 0" in err
 
 
-def test_where_there_is_no_repository_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_repository_the_error_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     put("arm.urdf")
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
@@ -415,7 +415,7 @@ def test_git_runs_nothing_that_a_strangers_repository_names(repository: Path) ->
     assert not mark.exists()
 
 
-# -- what is mended ------------------------------------------------------------------------------------
+# -- fixes ---------------------------------------------------------------------------------------------
 
 
 def test_fix_mends_files_and_what_is_left_is_told(here: Path) -> None:
@@ -454,7 +454,7 @@ def test_diff_shows_a_patch_that_does_what_fix_does(here: Path) -> None:
     done = check("--diff")
     assert (done.code, done.err) == (1, "1 finding to fix in 1 file\n")
     assert arm.read_text() == LONG.replace("    <axis", "\t<axis")
-    subprocess.run(["git", "apply"], input=done.out, check=True, capture_output=True)
+    apply(done.out)
     assert arm.read_text() == GOOD.replace("    <axis", "\t<axis")
     done = check("--diff")
     assert (done.code, done.out) == (0, b"")
@@ -477,6 +477,11 @@ ODD_LINES = {
 }
 
 
+def apply(patch: bytes) -> None:
+    command = ["git", "apply", "--whitespace=nowarn"]
+    subprocess.run(command, input=patch, check=True, capture_output=True)
+
+
 @pytest.mark.parametrize("name", ["arm.urdf", "an arm.urdf", "\xe4rm.urdf", 'ar"m.urdf', "below/arm.urdf"])
 @pytest.mark.parametrize("lines", ODD_LINES)
 def test_git_applies_what_diff_prints_and_it_does_what_fix_does(here: Path, lines: str, name: str) -> None:
@@ -486,42 +491,39 @@ def test_git_applies_what_diff_prints_and_it_does_what_fix_does(here: Path, line
     assert done.code == 1, done.text
     assert "\u202e" not in done.text
     assert not re.search(r"^\s*::|##\[", done.text, re.MULTILINE)
-    subprocess.run(["git", "init", "-q"], check=True)
-    subprocess.run(["git", "apply", "--whitespace=nowarn"], input=done.out, check=True, capture_output=True)
+    git("init", "-q")
+    apply(done.out)
     patched = arm.read_bytes()
     arm.write_bytes(odd)
     check("--fix", str(arm))
     assert patched == arm.read_bytes() != odd
 
 
+@pytest.mark.parametrize("lines", ["line feeds", "a bidi mark nearby"])
 def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
-    here: Path, monkeypatch: pytest.MonkeyPatch
+    here: Path, monkeypatch: pytest.MonkeyPatch, lines: str
 ) -> None:
-    subprocess.run(["git", "init", "-q"], check=True)
-    for k, lines in enumerate(("line feeds", "a bidi mark nearby")):
-        arm = put(f"robots/arm{k}.urdf")
-        arm.write_bytes(ODD_LINES[lines].encode())
-        monkeypatch.chdir("robots")
-        done = check("--diff", arm.name)
-        subprocess.run(["git", "apply"], input=done.out, check=True, capture_output=True)
-        assert b"0 0 1" in Path(arm.name).read_bytes()
-        monkeypatch.chdir("..")
+    git("init", "-q")
+    arm = put("robots/arm.urdf")
+    arm.write_bytes(ODD_LINES[lines].encode())
+    monkeypatch.chdir("robots")
+    apply(check("--diff", arm.name).out)
+    assert b"0 0 1" in Path(arm.name).read_bytes()
 
 
-def test_fixes_that_turn_a_joint_wait_for_unsafe_fixes(here: Path) -> None:
+def test_fixes_that_rotate_a_joint_need_unsafe_fixes(here: Path) -> None:
     text = LONG.replace("<axis", '<origin rpy="1.5708 0 0"/><axis')
     arm = put("arm.urdf", text)
-    assert (
-        "--unsafe-fixes also fixes 1 finding, but rotates joints by more than a rounding error"
-        in check().text
-    )
+    hint = "--unsafe-fixes also fixes 1 finding, but rotates joints by more than a rounding error"
+    assert hint in check().text
     assert check("--diff").err == "1 finding to fix in 1 file (1 more with --unsafe-fixes)\n"
     check("--fix")
     assert arm.read_text() == text.replace("0 0 2", "0 0 1")
     assert "--unsafe-fixes does nothing without --fix and --diff" in check("--unsafe-fixes").err
     assert "1.5707963267948966" in check("--diff", "--unsafe-fixes").text
-    check("--fix", "--unsafe-fixes")
-    assert "1.5707963267948966" in arm.read_text()
+    line = "line 5; each joint rotated by at most 3.7e-06 rad"
+    assert f"arm.urdf: fixed URDF601 rounded-pi, {line}\n" in check("--fix", "--unsafe-fixes").err
+    assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
 
 
 def test_github_gets_errors_first_and_one_line_for_many_of_a_kind(here: Path) -> None:
@@ -531,11 +533,11 @@ def test_github_gets_errors_first_and_one_line_for_many_of_a_kind(here: Path) ->
         for k in range(30)
     )
     put("arm.urdf", f'<robot name="r"><link name="a"/>\n{joints}<link name="stray"/></robot>')
-    lines = check("--format", "github").text.splitlines()
-    words = [line.split(" ")[0] for line in lines]
+    text = check("--format", "github").text
+    words = [line.split(" ")[0] for line in text.splitlines()]
     assert words == sorted(words, key=["::error", "::warning", "::notice"].index)
-    assert sum("URDF503" in line for line in lines) == 1
-    assert sum("URDF503" in line for line in check("--format", "github", "--each").text.splitlines()) == 30
+    assert text.count("=URDF503::") == 1
+    assert check("--format", "github", "--each").text.count("=URDF503::") == 30
 
 
 @pytest.mark.parametrize("style", ["terminal", "concise", "json", "sarif", "github"])
@@ -550,16 +552,10 @@ def test_findings_go_to_a_file(here: Path, style: str) -> None:
     assert Path("fix.patch").read_bytes() == patch.out
 
 
-def test_a_rounded_pi_says_how_far_it_turns_and_a_strangers_file_is_not_mended(here: Path) -> None:
+def test_standard_input_and_a_robot_of_the_catalogue_are_not_fixed(here: Path) -> None:
     done = urdfkin("check --fix -", stdin=LONG)
     assert (done.code, "URDF503" in done.text) == (0, True)
     assert check("--fix", "ur5", "--select", "URDF601").code == 0
-    arm = put("arm.urdf", GOOD.replace("<axis", '<origin rpy="1.5708 0 0"/><axis'))
-    assert (
-        check("--fix", "--unsafe-fixes").err
-        == "arm.urdf: fixed URDF601 rounded-pi, line 5; each joint rotated by at most 3.7e-06 rad\n"
-    )
-    assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
 
 
 def test_sarif_fixes_are_the_edits(here: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a shell offers as one types, asked as its script asks, and in the shells themselves."""
+"""Shell completion, called as the completion script calls it, and in real shells."""
 
 import json
 import os
@@ -27,7 +27,7 @@ Offered = Callable[[str], list[str]]
 
 @pytest.fixture
 def offered(monkeypatch: pytest.MonkeyPatch) -> Offered:
-    """What is offered for a line that ends where the key is pressed, as bash asks; `file` means files."""
+    """Return a function that completes the end of a line as bash does; `file` means files."""
 
     def ask(line: str) -> list[str]:
         words = f"urdfkin {line}"
@@ -84,7 +84,6 @@ def test_frames_of_an_mjcf_file_are_its_bodies_sites_and_joints(offered: Offered
 
 
 def test_no_name_is_offered_that_a_shell_would_carry_out(offered: Offered, tmp_path: Path) -> None:
-    """What is completed stands on the command line, and the next key may be the return."""
     path = tmp_path / "hostile.urdf"
     harmful = [
         *IN_XML.values(), "$(reboot)", "`reboot`", "a;reboot", "a b", "-o", "a'b", "*", "~x", "a\\b", "!x",
@@ -109,7 +108,7 @@ def test_what_cannot_be_read_offers_nothing_and_says_nothing(
     made["FOLDER"].mkdir()
     begin = time.monotonic()
     assert offered(f"jacobian {made.get(robot, robot)} --frame ") in ([], ["file", *catalogue()])
-    assert time.monotonic() - begin < 5.0  # a pipe is not waited for
+    assert time.monotonic() - begin < 5.0  # the command does not wait for a pipe
 
 
 def test_completing_imports_nothing_heavy() -> None:
@@ -127,7 +126,7 @@ def test_completing_imports_nothing_heavy() -> None:
 # -- in the shells -------------------------------------------------------------------------------------
 
 _PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-#: How each is started without a person's own settings, and told to complete.
+#: Command that starts a shell without the user's settings, and line that activates completion
 SHELLS = {
     "bash": (["bash", "--norc", "--noprofile", "-i"], 'eval "$(urdfkin completion bash)"'),
     "zsh": (["zsh", "-f", "-i"], 'autoload -Uz compinit; compinit -u -D; eval "$(urdfkin completion zsh)"'),
@@ -138,7 +137,6 @@ SHELLS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("shell", SHELLS)
 def test_a_real_shell_completes_a_frame_and_runs_the_line(shell: str, tmp_path: Path) -> None:
-    """Typed into the shell itself: the last word is completed, and the command is carried out."""
     if shutil.which(shell) is None:
         pytest.skip(f"{shell} is not installed")
     words, setup = SHELLS[shell]
@@ -158,7 +156,7 @@ def test_a_real_shell_completes_a_frame_and_runs_the_line(shell: str, tmp_path: 
 
 
 def type_in(screen: int, keys: str, wanted: str) -> None:
-    """Type, and wait until the screen has what is wanted."""
+    """Type keys, and wait until the pattern `wanted` is on the screen."""
     os.write(screen, keys.encode())
     shown, end = "", time.monotonic() + 60.0
     while time.monotonic() < end:

@@ -1,4 +1,4 @@
-"""`urdfkin dh` prints tables with their check, converts them, and exits with what it found."""
+"""`urdfkin dh` prints and converts tables with their check, and compares tables."""
 
 from pathlib import Path
 

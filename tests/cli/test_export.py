@@ -1,4 +1,4 @@
-"""`urdfkin export`: a file with its proof, and its check."""
+"""`urdfkin export` writes files with a proof, and checks them."""
 
 import os
 import re
@@ -43,7 +43,6 @@ def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def exported() -> str:
-    """A small file of NumPy."""
     return urdfkin("export planar_two_link --to numpy --quantity placement").text
 
 
@@ -107,7 +106,7 @@ def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: s
 def test_octave_is_told_the_functions_name_and_never_the_files(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A program stands in for Octave, and writes down how it was called."""
+    # This program replaces Octave, and writes its arguments to a file.
     octave, path = tmp_path / "bin" / "octave-cli", tmp_path / name
     octave.parent.mkdir()
     octave.write_text(

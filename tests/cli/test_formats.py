@@ -1,4 +1,4 @@
-"""Every table has every format, a file's suffix selects it, and a file is written whole or not at all."""
+"""Every table has every format, the suffix selects the format, and files are written completely or not."""
 
 import csv
 import errno
@@ -10,16 +10,16 @@ import tomllib
 from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
 import pytest
 
 from tests.cli.running import good, refused, urdfkin
-from urdfkin.cli.output import Answer, check_writable, write_file
+from urdfkin.cli.output import Answer, check_writable
 from urdfkin.dh import read_table
 from urdfkin.errors import SourceError
 from urdfkin.errors.display import CodeLine, Matrix, Strong, Table, TextDocument
+from urdfkin.system.files import write_file
 
-#: A command line -> a word of its table, as text and in LaTeX.
+#: For each command line, a word of its table in text and in LaTeX
 TABLES = {
     "robots --family arm": "panda", "info elbow": "wrist", "jacobian elbow": "vx",
     "placement elbow": "x of frame", "hessian elbow": "changed by",
@@ -83,8 +83,8 @@ def test_the_check_is_part_of_json_or_is_printed_beside_the_data() -> None:
 
 def test_an_entry_for_a_printed_format_replaces_the_document() -> None:
     answer = Answer(lambda: TextDocument("title"), {"html": lambda: "page"}, "checked")
-    assert answer.write("html") == ("page", False)
-    assert answer.write("table") == ("title\nchecked\n", True)
+    assert answer.convert("html") == ("page", False)
+    assert answer.convert("table") == ("title\nchecked\n", True)
 
 
 def test_a_document_has_matrices_code_and_emphasis_in_every_format() -> None:
@@ -105,15 +105,10 @@ ELBOW = str(Path(__file__).parents[2] / "robots" / "elbow.urdf")
 WORDS = ("jacobian", "elbow", "--q", "random:2")
 
 
-def test_each_ending_gets_its_form_and_the_same_numbers(tmp_path: Path) -> None:
-    for ending in ("npy", "json", "csv", "CSV"):
-        assert urdfkin(*WORDS, "-o", str(tmp_path / f"J.{ending}")).code == 0
-    J = np.load(tmp_path / "J.npy")
-    assert J.shape == (2, 6, 6)
-    assert (np.array(json.loads((tmp_path / "J.json").read_text())["result"]) == J).all()
-    lines = [line.split(",") for line in (tmp_path / "J.csv").read_text().splitlines()]
-    assert (np.array([line[2:] for line in lines[1:]], dtype=float).reshape(2, 6, 6) == J).all()
-    assert (tmp_path / "J.CSV").read_bytes() == (tmp_path / "J.csv").read_bytes()
+@pytest.mark.parametrize("suffix", ["npy", "json", "csv", "CSV"])
+def test_a_suffix_writes_the_bytes_of_its_format(suffix: str, tmp_path: Path) -> None:
+    good(*WORDS, "-o", str(tmp_path / f"J.{suffix}"))
+    assert (tmp_path / f"J.{suffix}").read_bytes() == good(*WORDS, "--format", suffix.lower()).out
 
 
 def test_the_form_stands_where_the_ending_says_nothing_and_a_breakdown_goes_by_it_too(tmp_path: Path) -> None:
@@ -160,7 +155,7 @@ def test_a_file_that_could_not_be_read_was_not_checked(style: str, tmp_path: Pat
         assert done.text == "no findings in 1 file\n"
 
 
-# -- written whole ---------------------------------------------------------------------------------
+# -- files are written completely or not at all ------------------------------------------------------
 
 
 def test_a_file_that_is_written_is_alone_in_its_folder_with_the_rights_it_had(tmp_path: Path) -> None:
@@ -177,17 +172,27 @@ def full(*_: Any) -> NoReturn:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("where", ["chmod", "replace"])
+@pytest.mark.parametrize("where", ["chmod", "replace", "write"])
 def test_what_cannot_be_finished_leaves_the_file_as_it_was_and_nothing_beside_it(
     where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    place = tmp_path / "out.json"
-    place.write_bytes(b"before")
-    monkeypatch.setattr(Path, where, full)
+    original = tempfile.NamedTemporaryFile
+
+    def full_disk(*words: Any, **how: Any) -> Any:
+        stream = original(*words, **how)
+        stream.write = full  # type: ignore[method-assign]
+        return stream
+
+    path = tmp_path / "out.json"
+    path.write_text("before")
+    if where == "write":
+        monkeypatch.setattr(tempfile, "NamedTemporaryFile", full_disk)
+    else:
+        monkeypatch.setattr(Path, where, full)
     with pytest.raises(SourceError, match="No space left"):
-        write_file(place, b"after")
-    assert [path.name for path in tmp_path.iterdir()] == ["out.json"]
-    assert place.read_bytes() == b"before"
+        write_file(path, b"after")
+    assert [file.name for file in tmp_path.iterdir()] == ["out.json"]
+    assert path.read_bytes() == b"before"
 
 
 def test_a_file_is_written_through_a_link_and_asking_for_it_leaves_nothing(tmp_path: Path) -> None:
@@ -207,19 +212,3 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
-
-
-def test_a_disc_that_is_full_while_writing_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    right = tempfile.NamedTemporaryFile
-
-    def made(*words: Any, **how: Any) -> Any:
-        stream = right(*words, **how)
-        stream.write = full  # type: ignore[method-assign]
-        return stream
-
-    monkeypatch.setattr(tempfile, "NamedTemporaryFile", made)
-    with pytest.raises(SourceError, match="No space left"):
-        write_file(tmp_path / "out.json", b"data")
-    assert list(tmp_path.iterdir()) == []

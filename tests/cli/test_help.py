@@ -1,4 +1,4 @@
-"""Help is quick, complete and true: its examples are run."""
+"""Help is quick and complete, and its examples run."""
 
 import glob
 import os
@@ -19,19 +19,17 @@ from urdfkin.robot.loading import load
 from urdfkin.system.resources import robots_dir
 from urdfkin.urdf.catalogue import catalogue
 
-#: Heavy, or needless where nothing is computed.
+#: Packages that --help must not import
 HEAVY = {"numpy", "numba", "llvmlite", "pinocchio", "yourdfpy", "trimesh", "lxml", "scipy", "rich"}
 
 
 def examples(command: str) -> list[str]:
-    """The examples of the command in its help."""
     text = urdfkin(*command.split(), "--help").text.partition("Example:")[2].partition("Options:")[0]
     lines = " ".join(text.split()).split("urdfkin ")[1:]
     return [line.strip() for line in lines if f"{line} ".startswith(f"{command} ")]
 
 
 def run_examples(command: str) -> None:
-    """Run them here, as a shell would."""
     assert examples(command)
     for example in examples(command):
         words = [sorted(glob.glob(word)) or [word] for word in shlex.split(example)]  # noqa: PTH207  relative
@@ -53,11 +51,6 @@ def test_the_help_page_has_every_command_the_version_pinocchios_and_the_families
     assert named == sorted({entry.family for entry in catalogue().values()})
 
 
-def elbow() -> str:
-    """A robot with nothing to find fault with."""
-    return (robots_dir() / "elbow.urdf").read_text()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("command", commands())
 def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
@@ -68,7 +61,7 @@ def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
 
 
 AFTER_WORK = ("validate", "report", "report compare", "report status")
-#: Serves until it is stopped; tests/view looks at what it serves.
+#: Commands that run until they are stopped
 ENDLESS = ("view",)
 
 
@@ -78,7 +71,7 @@ def test_the_examples_of_the_help_run(command: str, tmp_path: Path, monkeypatch:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robots").mkdir()
     for name in ("my", "robot", "arm", "robots/one"):
-        (tmp_path / f"{name}.urdf").write_text(elbow())
+        (tmp_path / f"{name}.urdf").write_text((robots_dir() / "elbow.urdf").read_text())
     panda = load("panda", verify=False)
     (tmp_path / "my_robot.py").write_text(
         "import urdfkin\nrobot = urdfkin.load('panda', verify=False)\n"
@@ -111,16 +104,13 @@ def test_help_imports_nothing_heavy_of_any_command() -> None:
 
 @pytest.mark.slow
 def test_help_is_there_at_once() -> None:
-    # 0.06 s was measured; a processor that others use too is slower, but counts no more than its own time.
-    assert min(_seconds() for _ in range(3)) < 0.6
+    def processor_seconds() -> float:
+        begin = os.times()
+        assert process("--help").code == 0
+        end = os.times()
+        return end.children_user + end.children_system - begin.children_user - begin.children_system
 
-
-def _seconds() -> float:
-    """What the process took of the processor."""
-    begin = os.times()
-    assert process("--help").code == 0
-    end = os.times()
-    return end.children_user + end.children_system - begin.children_user - begin.children_system
+    assert min(processor_seconds() for _ in range(3)) < 0.6  # measured: 0.06 s
 
 
 def test_words_for_commands_lead_to_commands_and_these_have_the_librarys_names() -> None:

@@ -1,4 +1,4 @@
-"""`urdfkin imu` and `urdfkin singular-values`: the library's numbers in every form."""
+"""`urdfkin imu` and `urdfkin singular-values` print the library's numbers in every format."""
 
 import csv
 import io
@@ -57,7 +57,7 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
 
 
 @pytest.mark.parametrize(
-    ("arrays", "words"),
+    ("content", "words"),
     [
         ({"q": np.zeros((4, 5))}, "q must have the shape (n, 6)"),
         ({"q": np.zeros((4, 6)), "a": np.zeros((4, 6))}, "joint accelerations need joint velocities"),
@@ -70,32 +70,26 @@ def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_ar
         ({"Q": np.zeros((4, 6))}, "unknown: Q; missing: q"),
         ({"q": np.zeros((4, 6)), "base_velocity": np.zeros((4, 6))}, "must be given together"),
         ({"q": np.array([print], dtype=object)}, "not an .npz file of numbers"),
+        (b"", "not an .npz file of numbers"),
+        (b"PK\x03\x04 broken", "not an .npz file of numbers"),
+        (b"t,q\n1,2\n", "not an .npz file of numbers"),
     ],
 )
-def test_an_archive_of_anything_else_is_refused_in_one_line(
-    arrays: dict[str, FloatArray], words: str, tmp_path: Path
+def test_a_wrong_archive_is_refused_in_one_line(
+    content: dict[str, FloatArray] | bytes, words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.npz"
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        np.savez(path, **content)  # type: ignore[arg-type]
     err = refused("imu ur5 --trajectory", str(path))
     assert words in err
     assert str(path) in err
-    assert len(err.strip().splitlines()) == 1
+    assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("data", [b"", b"PK\x03\x04 broken", b"t,q\n1,2\n"])
-def test_what_is_no_archive_is_refused_too(data: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "log.npz"
-    path.write_bytes(data)
-    assert "not an .npz file of numbers" in refused("imu ur5 --trajectory", str(path))
-
-
-def test_options_without_effect_and_half_a_vector_are_refused(
-    motion: dict[str, FloatArray], tmp_path: Path
-) -> None:
-    np.savez(tmp_path / "log.npz", **motion)  # type: ignore[arg-type]
-    err = refused("imu ur5 --v random --trajectory", str(tmp_path / "log.npz"))
-    assert "--v does nothing along a --trajectory" in err
+def test_half_a_vector_is_refused_and_an_unverified_imu_exits_with_3() -> None:
     assert "none for z" in urdfkin("imu ur5 --gravity 0,9.81").err
     assert urdfkin("imu ur5 --no-verify").code == 3
 

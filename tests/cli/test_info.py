@@ -1,4 +1,4 @@
-"""`urdfkin info`: the tree as it hangs, and all that a joint needs in one line."""
+"""`urdfkin info` draws the tree of links, with one line for each joint."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def forked() -> KinematicTree:
 
 
 def parents_of_the_drawing(lines: list[str]) -> list[int]:
-    """Whom each line hangs from, read back from the guides alone."""
+    """Return the parent of each line, from the lines of the drawn tree alone."""
     stack: list[tuple[int, int]] = []
     found = []
     for k, line in enumerate(lines):
@@ -52,9 +52,9 @@ def test_another_order_is_told_with_the_first_joint_and_guides_of_only_children_
     assert set(guides(build_tree("long", "l0", rows))) == {""}
     urdf = to_urdf(forked())
     assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same order")
-    swapped = urdf.replace('joint name="a"', 'joint name="z"')  # its place in the file stays, ours moves
+    swapped = urdf.replace('joint name="a"', 'joint name="z"')  # changes only our order
     assert "differs: z is number 1 in the file and b here; " in urdfkin("info", swapped).text.splitlines()[-1]
-    # A root joint stands in no file.
+    # The file does not contain the root joint.
     assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("the same order")
 
 

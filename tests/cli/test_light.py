@@ -1,4 +1,4 @@
-"""`check` works where nothing but click is installed, and a command is one thread."""
+"""`urdfkin check` needs no package but click, and a command starts no threads."""
 
 import os
 import re
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 ROBOT = str(ROOT / "robots" / "elbow.urdf")
 
-#: Refuses every import but those of Python, of urdfkin and of what the hook installs.
+#: Program that can import only Python's library, urdfkin and the packages that the hook installs
 BARE = """
 import sys
 from importlib.abc import MetaPathFinder
@@ -35,7 +35,7 @@ def hook() -> str:
 
 
 def installed() -> list[str]:
-    """What the hook has pip install beside urdfkin itself."""
+    """Return the packages that the hook installs with urdfkin."""
     found = re.search(r"additional_dependencies: \[(.*)\]", hook())
     assert found is not None
     option, *packages = re.findall(r'"([^"]*)"', found[1])
@@ -55,7 +55,7 @@ def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_so_does_the_command_that_explains_and_one_that_needs_more_says_so(tmp_path: Path) -> None:
+def test_explain_needs_no_more_and_another_command_names_the_missing_package(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
     done = bare("check", str(bad))
@@ -73,7 +73,7 @@ def test_so_does_the_command_that_explains_and_one_that_needs_more_says_so(tmp_p
     assert found[1] not in installed()
 
 
-#: The command, then how many threads there are.
+#: Program that runs a command and prints the number of threads
 COUNTED = """
 import os, sys
 from urdfkin.cli import main

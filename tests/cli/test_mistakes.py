@@ -1,4 +1,4 @@
-"""What a user gets wrong: exit 2, one clear message on stderr, nothing on stdout, never a traceback."""
+"""A mistake of the user gives exit code 2, one message on stderr, nothing on stdout and no traceback."""
 
 import errno
 import os
@@ -110,7 +110,7 @@ MISTAKES = {
         f"velocity panda --q {NAMED}", "--q: no value for panda_joint2, panda_joint3, panda_joint5, panda",
     ),
     "a pose that lacks": (
-        f"velocity panda --q {NAMED}", "or begin with a pose that they keep: 'neutral, panda_joint1=...'",
+        f"velocity panda --q {NAMED}", "or begin with a pose: 'neutral, panda_joint1=...'",
     ),
     "no such pose": ("velocity panda --q raedy", "--q: unknown pose 'raedy'; did you mean ready?"),
     "Pinocchio's numbers": (
@@ -169,7 +169,7 @@ def test_a_mistake_gives_one_clear_message_and_exit_2(
 def test_a_report_that_must_not_be_written_is_refused_before_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Permissions do not bind the superuser, whom tests may run as: the system's answer is stood in for.
+    # Tests may run as the superuser, who may write every file, so the system's error is simulated.
     def refuse(*args: object, **kwargs: object) -> None:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 

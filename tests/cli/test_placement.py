@@ -1,4 +1,4 @@
-"""`urdfkin placement` in other forms, `analytical-jacobian`, a base that moves, an acceleration's parts."""
+"""`urdfkin placement --as`, `analytical-jacobian`, `acceleration --breakdown`, and a moving base."""
 
 import csv
 import io
@@ -19,7 +19,7 @@ from urdfkin.kinematics.rotation import SEQUENCES
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.tree import FloatArray
 
-#: 30 degrees about the world's z, 1 m up.
+#: A pose 1 m above the origin, rotated by 30 degrees about z
 MOVED = "0,0,1,0,0,0.5235987755982988"
 
 
@@ -64,7 +64,6 @@ def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.Monk
 
 
 def test_where_roll_and_yaw_turn_about_one_axis_the_numbers_are_right_all_the_same() -> None:
-    """A vertical pitch is where many arms rest: the two angles are not determined, the rotation is."""
     angles = [0.3, 1.5707963267948966, 0.2]
     pose = ",".join(map(repr, [0, 0, 0, *angles]))
     done = good(f"placement ur5 --base-placement {pose} --frame base_link --as rpy --format json")

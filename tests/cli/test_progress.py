@@ -1,8 +1,9 @@
-"""Progress says what is done, how fast, how long still and what failed; in lines where nobody watches."""
+"""Progress shows finished work, speed, remaining time and failures; without a terminal, as lines."""
 
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,14 +33,15 @@ def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow(compiling: f
 
 
 def test_programs_are_told_in_json_from_before_any_work_to_the_last_chunk() -> None:
-    done = urdfkin("validate planar_two_link nosuch --samples 50 --json-progress")
-    lines = [json.loads(text) for text in done.err.splitlines() if text.startswith("{")]
-    assert lines[-1]["chunks_done"] == lines[-1]["chunks"] == 4
-    assert (lines[-1]["robots_done"], lines[-1]["failures"]) == (2, 1)
-    assert lines[-1]["seconds_left"] == 0.0
-    assert set(lines[0]) == {*STANDING.__slots__, "chunks_per_second", "seconds_left"}
-    done = urdfkin("validate planar_two_link --samples 50 --json-progress")
-    first = next(json.loads(text) for text in done.err.splitlines() if text.startswith("{"))
+    def states(robots: str) -> list[dict[str, Any]]:
+        err = urdfkin(f"validate {robots} --samples 50 --json-progress").err
+        return [json.loads(text) for text in err.splitlines() if text.startswith("{")]
+
+    first, *_, last = states("planar_two_link nosuch")
+    assert last["chunks_done"] == last["chunks"] == 4
+    assert (last["robots_done"], last["failures"], last["seconds_left"]) == (2, 1, 0.0)
+    assert set(first) == {*STANDING.__slots__, "chunks_per_second", "seconds_left"}
+    first, *_ = states("planar_two_link")
     assert (first["chunks_done"], first["chunks"], first["label"]) == (0, 2, "planar_two_link")
     assert first["chunks_per_second"] is None
 

@@ -1,7 +1,4 @@
-"""`validate`, `report` and `compare` through the command, with every form they write.
-
-One run of `validate` is a process of its own; the others call the entry point here.
-"""
+"""`urdfkin validate` and `urdfkin report` write reports in every format."""
 
 import json
 from pathlib import Path
@@ -23,23 +20,16 @@ def urdfkin(*words: str | Path) -> Done:
     return running.urdfkin(*map(str, words))
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two reports, one of them of a run that failed."""
-    path = tmp_path_factory.mktemp("data")
-    for name, document in (("good", arms()), ("bad", failing())):
-        (path / f"{name}.json").write_text(json.dumps(document))
+@pytest.fixture
+def good(tmp_path: Path) -> Path:
+    (path := tmp_path / "good.json").write_text(json.dumps(arms()))
     return path
 
 
 @pytest.fixture
-def good(folder: Path) -> Path:
-    return folder / "good.json"
-
-
-@pytest.fixture
-def bad(folder: Path) -> Path:
-    return folder / "bad.json"
+def bad(tmp_path: Path) -> Path:
+    (path := tmp_path / "bad.json").write_text(json.dumps(failing()))
+    return path
 
 
 @pytest.mark.slow
@@ -102,7 +92,7 @@ def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Pa
     assert done.code == 1
     assert "REGRESSION panda: verdict: verified -> disagrees" in done.text
     assert (tmp_path / "c.md").read_text().startswith("## ❌")
-    assert urdfkin("report", "compare", bad, good).code == 1  # a robot is gone
+    assert urdfkin("report", "compare", bad, good).code == 1  # the second report lacks a robot
     assert urdfkin("report", "compare", good, good).code == 0
     found = json.loads(urdfkin("report", "compare", good, bad, "--format", "json").text)
     assert found["schema"] == "urdfkin-comparison/1"

@@ -1,4 +1,4 @@
-"""What is compiled is said, once and by its name, and nothing is compiled for input that cannot be used."""
+"""Compilation is reported once for each kernel, and wrong input starts no compilation."""
 
 import time
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 
 import urdfkin as library
 from tests.cli.running import process, urdfkin
-from urdfkin.compiled import kept, preload
+from urdfkin.compiled import kernel_cache, preload
 from urdfkin.compiled.machine import kernels as every_kernel
 from urdfkin.compiled.machine.compiling import Kernel
 from urdfkin.validation import campaign
@@ -76,12 +76,12 @@ def test_warm_compiles_every_kernel_of_the_package(tmp_path: Path) -> None:
 def test_programs_are_told_by_one_warning_of_a_logger(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(kept, "_logged", [])
+    monkeypatch.setattr(kernel_cache, "_logged", [])
     for name in ("placements", "jacobians"):
-        with kept.compile_event(name) as missed:
+        with kernel_cache.compile_event(name) as missed:
             missed()
-    with kept.compile_event("velocities"):
-        pass  # read from disk
+    with kernel_cache.compile_event("velocities"):
+        pass  # the kernel is in the cache
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("urdfkin", "WARNING")
     assert "compiling placements" in record.getMessage()

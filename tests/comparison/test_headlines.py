@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from importlib.metadata import version
@@ -13,10 +12,10 @@ import pytest
 import urdfkin
 from tests import urdfs
 from tests.cli.running import urdfkin as run
+from tests.comparison.pairs import certified
 from tests.comparison.test_pairs import FOLLOWING
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic
-from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import SameQuestion, Verdict
 from urdfkin.robot import Robot
 
@@ -106,8 +105,7 @@ def test_a_joint_of_another_kind_is_searched() -> None:
     assert math.isinf(worst.upper)
     assert headline(a, b).startswith("DIFFERS by 1.005 m or more and 1 rad or more (no bound is proven)")
     assert not found.within(10.0)
-    robots = urdfkin.load(a), urdfkin.load(b)
-    assert recheck(json.loads(json.dumps(certificate(found))), *robots) == []
+    assert certified(found, urdfkin.load(a), urdfkin.load(b))
 
 
 @pytest.mark.parametrize("below", ["", '<link name="table"/>'])
@@ -123,8 +121,7 @@ def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: s
     assert "without changes of B, base is 1.118 m off" in headline(a, b)
     assert found.exit_code() == 0
     assert found.exit_code(within=1.0) == 1
-    robots = urdfkin.load(a), urdfkin.load(b)
-    assert recheck(json.loads(json.dumps(certificate(found))), *robots) == []
+    assert certified(found, urdfkin.load(a), urdfkin.load(b))
 
 
 def test_a_frame_between_two_joints_of_the_base_is_no_mount() -> None:
@@ -146,9 +143,9 @@ def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> N
     assert [found.exit_code(within=most) for most in (1e-4, 5.49e-4, 5.6e-4)] == [1, 1, 0]
     said = "NOT WITHIN 0.0001 m and rad without changes of B: b is 0.55 mm"
     assert headline(a, b, within=1e-4).startswith(said)
-    own = "joint ja ranges over -0.005 to 0.055 m; its mimic joints keep their limits from"
+    own = "joint ja ranges over -0.005 to 0.055 m; its mimic joints are within their limits only for values"
     ends = ("A", "0.005"), ("B", "0.0049505")
-    assert found.narrowed == tuple(f"{model}: {own} -0.005 to {end} only (jb)" for model, end in ends)
+    assert found.narrowed == tuple(f"{model}: {own} from -0.005 to {end} (jb)" for model, end in ends)
 
 
 def test_nothing_is_within_anything_where_no_bound_was_asked_for() -> None:
@@ -168,7 +165,7 @@ def test_the_command_answers_what_was_asked(tmp_path: Path) -> None:
     done = run("same", f, g, "--within", "1e-3")
     assert done.code == 0
     assert "WITHIN 0.001 m and rad" in done.text
-    assert "keep their limits from -0.005 to 0.005 only" in done.text
+    assert "within their limits only for values from -0.005 to 0.005" in done.text
 
 
 def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Path) -> None:

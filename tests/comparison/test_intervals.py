@@ -18,13 +18,13 @@ from tests.comparison.searching import far, searched
 from tests.reading import present
 from tests.urdfs import joint, limit, loaded, mimic
 from tests.urdfs import robot as urdf
-from urdfkin.comparison.bounds import Boxes, DistanceSearch, curvature, moved_together, tightened
+from urdfkin.comparison.bounds import Boxes, DistanceSearch, tighten
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
 from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, FramePair, Gauge, Screw, along, variables_of
-from urdfkin.model.mechanisms.upper_bound import FINE, Grid, point, upper_bounds
+from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, FramePair, Gauge, Screw, screw_motion, variables_of
+from urdfkin.model.mechanisms.upper_bound import FINE, Grid, curvature, point, relevant_joints, upper_bounds
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.same import where
 from urdfkin.robot import Robot
@@ -68,8 +68,8 @@ def test_a_support_function_is_a_bound_and_a_close_one(seed: int) -> None:
         axis = rng.standard_normal(3)
         screw = Screw(axis / np.linalg.norm(axis), rng.standard_normal(3))
         low, high = sorted(rng.uniform(-4.0, 4.0, 2))
-        reach = reach.turned(screw, low, high)
-        turns = [along(screw, t, turns=True) for t in np.linspace(low, high, 60)]
+        reach = reach.rotate(screw, low, high)
+        turns = [screw_motion(screw, t, turns=True) for t in np.linspace(low, high, 60)]
         points = np.concatenate([points @ T[:3, :3].T + T[:3, 3] for T in turns])
         points = points[rng.permutation(len(points))[:4000]]
     u = rng.standard_normal((200, 3))
@@ -118,7 +118,7 @@ def laid(a: Robot, b: Robot, link: str, gauge: Gauge | None = None) -> tuple[Dis
 
 def bounds_of(search: DistanceSearch, frame: FramePair) -> tuple[Sequence[str], FloatArray]:
     """Variables, and bounds on second derivatives by them."""
-    steps, some = moved_together(search.found, search.variables, frame)
+    steps, some = relevant_joints(search.found, search.variables, frame)
     return curvature(steps, [one for one in some if one is not None], search.variables, frame)
 
 
@@ -127,7 +127,7 @@ def hold_against_differences(
 ) -> None:
     """Bounds M on second derivatives against difference quotients of the first ones."""
     boxes = Boxes(search, frame, names)
-    c, step = search.random(200)[:, boxes.at], 1e-3
+    c, step = search.random_values(200)[:, boxes.at], 1e-3
     largest = np.zeros_like(M)
     for i in range(len(names)):
         h = step * np.eye(len(names))[i]
@@ -178,9 +178,9 @@ def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() 
     search, frame = laid(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
     upper = upper_bounds(search.found, search.variables, frame, FINE)[0]
     attained = s * np.sqrt(2.0)
-    assert search.worst([frame])[0][0] == pytest.approx(attained, rel=0.01)
+    assert search.largest_distances([frame])[0][0] == pytest.approx(attained, rel=0.01)
     # What boxes prove is no less than what is attained, also where less would be enough.
-    assert tightened(search, frame, 1.01 * s, upper) >= 0.99 * attained
+    assert tighten(search, frame, 1.01 * s, upper) >= 0.99 * attained
 
 
 def test_joints_that_follow_by_other_multipliers_have_no_bound_on_second_derivatives() -> None:
@@ -233,12 +233,12 @@ def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, lin
 @pytest.mark.slow
 def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> None:
     search, frame = searched_boxes("panda", "rounded", "panda_hand_tcp")
-    lower, _ = search.worst([frame])[0]
+    lower, _ = search.largest_distances([frame])[0]
     upper, _ = upper_bounds(search.found, search.variables, frame, FINE)
     assert upper > 1.6 * lower
-    assert tightened(search, frame, 1.05 * lower, upper) == 1.05 * lower
-    assert tightened(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
-    assert tightened(search, frame, 1.05 * lower, upper, most=0) == upper
+    assert tighten(search, frame, 1.05 * lower, upper) == 1.05 * lower
+    assert tighten(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
+    assert tighten(search, frame, 1.05 * lower, upper, most=0) == upper
 
 
 def two_turns(place: str, inside: str) -> Robot:
@@ -255,7 +255,7 @@ def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable
     apart = b.placement(np.hstack([q, np.ones_like(q)]), "tool") - a.placement(q, "tool")
     attained = float(np.linalg.norm(apart[:, :3, 3], axis=1).max())
     assert attained > 5.5
-    assert tightened(search, frame, 5.3, 7.0) >= attained
+    assert tighten(search, frame, 5.3, 7.0) >= attained
 
 
 def test_the_worst_configuration_names_a_joint_that_moves_on_its_own_in_b_only() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,9 +12,10 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.comparison.pairs import written
 from tests.urdfs import joint, limit, loaded, mimic
 from tests.urdfs import robot as urdf
-from urdfkin.comparison.bounds import tightened
+from urdfkin.comparison.bounds import tighten
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Sameness, Verdict
 from urdfkin.comparison.verdict import Comparator
@@ -164,7 +164,7 @@ def test_the_slopes_of_two_slides_count_in_the_bound_of_a_box() -> None:
     q = a.sample(1000, seed=0)
     off = np.linalg.norm((b.placement(q, "tool") - a.placement(q, "tool"))[:, :3, 3], axis=1).max()
     assert off > 5.7
-    assert tightened(search, frame, 5.2, 7.0) >= off
+    assert tighten(search, frame, 5.2, 7.0) >= off
 
 
 def test_the_limits_of_a_mimic_joint_do_not_restrict_the_joint_that_it_mimics() -> None:
@@ -287,7 +287,7 @@ FORGED: dict[str, tuple[str, Callable[[Any], None], str]] = {
 def test_a_recheck_rejects_a_certificate_with(forged: str, request: pytest.FixtureRequest) -> None:
     pair, forge, words = FORGED[forged]
     a, b, found = request.getfixturevalue(pair)
-    document = json.loads(json.dumps(certificate(found)))
+    document = written(found)
     assert recheck(document, a, b) == []
     forge(document)
     assert any(words in line for line in recheck(document, a, b))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,7 +14,7 @@ import pytest
 
 import urdfkin
 from scripts.check_bits import WAYS, Subject, differing_interpreted, same
-from tests.cli.running import imported, process
+from tests.cli.running import imported, process, python
 from urdfkin.compiled import preload
 from urdfkin.compiled.preload import only
 from urdfkin.compiled.python_numbers import Number, fma, sine_cosine
@@ -123,7 +121,6 @@ def test_one_result_needs_no_cache(tmp_path: Path) -> None:
 
 @pytest.fixture
 def unspent(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """A process in which nothing is loaded; the names of the kernels that it loads."""
     loaded: list[str] = []
     for name in ("_spent", "_loaded", "_beside"):
         monkeypatch.setattr(preload, name, {})
@@ -173,6 +170,10 @@ def test_without_a_folder_for_kernels_no_process_starts(
     assert preload._beside == {}
 
 
+def without_cache(folder: Path) -> dict[str, str]:
+    return os.environ | {"XDG_CACHE_HOME": str(folder), "NUMBA_CACHE_DIR": ""}
+
+
 _LONG = """
 import time, urdfkin
 from urdfkin.compiled import preload
@@ -187,10 +188,7 @@ print(process.pid, process.poll(), flush=True)
 @pytest.mark.slow
 @pytest.mark.parametrize("end", ["", "import os; os._exit(0)", "import os, signal; os.kill(os.getpid(), 9)"])
 def test_the_process_that_compiles_ends_with_this_one(end: str, tmp_path: Path) -> None:
-    environ = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""}
-    done = subprocess.run(
-        [sys.executable, "-c", _LONG + end], env=environ, capture_output=True, text=True, check=False
-    )
+    done = python(_LONG + end, check=False, env=without_cache(tmp_path))
     pid, state = done.stdout.split()
     assert (state, done.stderr) == ("None", "")
     assert _ends(int(pid))
@@ -220,10 +218,7 @@ while "placements" not in preload._loaded and time.perf_counter() < begin + 120.
     assert (robot.placement([0.5]) == before).all()
 print("placements" in preload._loaded)
 """
-    environ = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "NUMBA_CACHE_DIR": ""}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environ, capture_output=True, text=True, check=True
-    )
+    done = python(code, env=without_cache(tmp_path))
     assert (done.stdout, done.stderr) == ("True\n", "")
 
 

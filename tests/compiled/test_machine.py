@@ -62,12 +62,10 @@ def guarded(shape: tuple[int, ...], filled: float | FloatArray = GUARD) -> tuple
 
 
 def kept(memory: FloatArray) -> bool:
-    """Whether the guards stand as they stood."""
     return bool((memory[: ZONE + 1] == GUARD).all() and (memory[-ZONE:] == GUARD).all())
 
 
 def outputs(robot: Robot) -> Iterator[tuple[str, tuple[int, ...], tuple[str, ...]]]:
-    """A method, the shape of its result, and its reference."""
     yield "placement", (4, 4), ()
     for reference in ("local", "world", "local_world_aligned"):
         yield "velocity", (6,), (reference,)
@@ -182,25 +180,16 @@ ONE_JOINT = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" t
 
 
 def sine_and_cosine(angles: FloatArray) -> FloatArray:
-    """(n, 2), as the walk puts them into a rotation."""
     places = urdfkin.load(ONE_JOINT).placement(angles[:, None], "b", verify=False)
     return np.stack([places[:, 1, 0], places[:, 0, 0]], axis=1)
 
 
 def units_off(angles: FloatArray) -> FloatArray:
-    """By how many units in the last place."""
+    number = np.vectorize(lambda x: mpmath.mpf(float(x)), otypes=[object])
     with mpmath.workdps(60):
-        true = [[f(mpmath.mpf(float(x))) for f in (mpmath.sin, mpmath.cos)] for x in angles]
-        ours = sine_and_cosine(angles)
-        return np.array(
-            [
-                [
-                    float((mpmath.mpf(float(x)) - y) / np.spacing(abs(float(y))))
-                    for x, y in zip(*pair, strict=True)
-                ]
-                for pair in zip(ours, true, strict=True)
-            ]
-        )
+        true = np.array([[f(x) for f in (mpmath.sin, mpmath.cos)] for x in number(angles)])
+        off: FloatArray = (number(sine_and_cosine(angles)) - true).astype(np.float64)
+    return off / np.spacing(np.abs(true.astype(np.float64)))
 
 
 @pytest.mark.slow

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import copy
 import ctypes
-import os
 import pickle
-import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -18,6 +16,7 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.cli.running import python
 from tests.laws.everything import differing
 from tests.laws.subjects import robot_of, state
 from urdfkin import Reference
@@ -37,7 +36,6 @@ def panda() -> Robot:
 
 
 def outcome(compute: Callable[[], FloatArray]) -> FloatArray | str:
-    """The result, or the error's type and words."""
     try:
         return compute()
     except UrdfkinError as error:
@@ -58,7 +56,6 @@ def ways(
 
 
 def agree(outcomes: list[FloatArray | str]) -> bool:
-    """Whether all are the same error, or the same array to the last bit."""
     first = outcomes[0]
     if isinstance(first, str):
         return all(isinstance(other, str) and other == first for other in outcomes)
@@ -249,15 +246,6 @@ def test_names_that_do_not_exist_are_refused_in_the_robots_words(panda: Robot) -
                 refer(FRAME, reference)  # type: ignore[arg-type]
 
 
-def test_a_reference_may_be_named_in_either_case(panda: Robot) -> None:
-    q = panda.sample(1, 4)[0]
-    for reference in Reference:
-        expected = panda.jacobian(q, FRAME, reference, threads=1)
-        for name in (reference, reference.name, reference.name.lower()):
-            assert panda.prepare(FRAME, name).reference is reference
-            assert not differing(panda.prepare(FRAME, name).jacobian(q), expected)
-
-
 def test_a_robot_where_nothing_moves_has_empty_jacobians() -> None:
     robot = urdfkin.load('<robot name="r"><link name="a"/></robot>', verify=False)
     fast = robot.prepare("a")
@@ -289,11 +277,7 @@ def test_it_goes_to_another_process(tmp_path: Any) -> None:
         "import pickle, sys; fast, q, J = pickle.load(open(sys.argv[1], 'rb'));"
         "assert (fast.jacobian(q) == J).all()"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(tmp_path / "fast")],
-        capture_output=True, text=True, check=False, env=os.environ,
-    )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")
+    assert python(program, str(tmp_path / "fast")).stderr == ""
 
 
 def test_functions_take_their_own_number_of_arguments_and_no_other(panda: Robot) -> None:

@@ -1,4 +1,4 @@
-"""One frame compiled for its robot: Robot's results within the bound, its errors, its account."""
+"""A compiled frame has the results of `Robot` within the bound, its errors, and its record of checks."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_it_takes_any_batch_and_writes_where_it_is_told(arm: Robot) -> None:
 
 
 def test_results_that_go_past_the_caches_are_those_of_small_batches_wherever_they_begin(arm: Robot) -> None:
-    fast, n = arm.compiled(arm.tip_frame), 30_000  # 2.9 MB
+    fast, n = arm.compiled(arm.tip_frame), 30_000  # results of 2.9 MB
     q = arm.sample(n, seed=3)
     expected = np.concatenate([fast.jacobian(q[i : i + 1000]) for i in range(0, n, 1000)])
     for first in range(8):
@@ -143,7 +143,7 @@ def test_arrays_that_need_no_conversion_give_the_bits_and_the_errors_of_all_othe
         fast.acceleration(q, v, a, out=out, threads=0)
 
 
-def test_so_is_every_number_of_rows_that_no_register_divides() -> None:
+def test_a_number_that_is_not_finite_is_refused_in_rows_that_no_register_divides() -> None:
     free = urdfkin.load("panda", mimic=False)
     fast, inputs = free.compiled(free.tip_frame), np.zeros((3, 20, 9))
     fast.acceleration(*inputs)

@@ -1,4 +1,4 @@
-"""CUDA's kernels, run on the processor thread by thread; and compiled by CUDA's own compiler where it is."""
+"""CUDA's kernels, run on the processor thread by thread, and compiled by nvcc if it is installed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from urdfkin.export import check as checking
 from urdfkin.export import write
 from urdfkin.export.check import check
 
-#: The folder with a `cuda_runtime.h` for the processor.
+#: Folder with a `cuda_runtime.h` for the processor
 _SHIM = Path(__file__).parent
 _COMPILER = benchmark_gpu.nvcc()
 _NVCC = pytest.mark.skipif(_COMPILER is None, reason="no nvcc; `make nvcc` installs it")
@@ -29,14 +29,14 @@ _NVCC = pytest.mark.skipif(_COMPILER is None, reason="no nvcc; `make nvcc` insta
 
 @pytest.fixture
 def nvcc(monkeypatch: pytest.MonkeyPatch) -> str:
-    """CUDA's compiler, which is on the PATH during a test."""
+    """Put CUDA's compiler on the PATH."""
     assert _COMPILER is not None
     monkeypatch.setenv("PATH", f"{Path(_COMPILER).parent}{os.pathsep}{os.environ['PATH']}")
     return _COMPILER
 
 
 def ran(path: Path, *options: str, status: int = 0) -> str:
-    """What a program says whose kernels run on the processor, with every warning and bad access an error."""
+    """Compile a file with warnings as errors, run its kernels on the processor, and return the output."""
     if shutil.which("g++") is None:
         pytest.skip("no g++")
     strict = ["-Wall", "-Wextra", "-Werror", "-Wno-unknown-pragmas", "-fno-sanitize-recover=all"]
@@ -66,7 +66,7 @@ def test_kernels_compute_true_values_and_touch_only_their_memory(
 
 @pytest.mark.long
 @pytest.mark.parametrize("robot", ["planar_two_link", "planar_and_floating_in_the_middle", "single_link"])
-def test_so_do_those_of_wide_rows_of_other_joints_and_of_no_joint(robot: str, tmp_path: Path) -> None:
+def test_kernels_of_wide_rows_and_of_other_joints_compute_true_values(robot: str, tmp_path: Path) -> None:
     subject = urdfkin.load(robot) if robot == "planar_two_link" else robot_of(robot)
     some = {"planar_two_link": ALL, "single_link": ("placement",)}
     quantities = some.get(robot, ("placement", "jacobian", "acceleration"))

@@ -1,4 +1,4 @@
-"""Exact code is algebra without a double; what an export rounds, by its own expressions."""
+"""Exported code with exact constants has no double; the rounding errors of exported code are as derived."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.laws.subjects import robot_of
 from tests.reading import present
 from urdfkin.export import exact as exact_module
 from urdfkin.export import recursion, write
-from urdfkin.export.c import framed
+from urdfkin.export.c import fill_template
 from urdfkin.export.exact import ExactGraph, ExactProof, PiMultiple, balls, literal
 from urdfkin.export.expression import Graph, Node, needed
 from urdfkin.export.proof import decimal
@@ -131,7 +131,7 @@ def test_the_command_reports_exact_expressions_that_were_not_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: Any = exact_module.exact_functions
-    # The expressions in double precision were compared.
+    # Only the comparison of the exact expressions is turned off.
     monkeypatch.setattr(exact_module, "exact_functions", lambda *given: made(*given[:-1], False))
     done = command("export planar_two_link --to sympy-exact -o", str(tmp_path / "arm.py"))
     assert done.code == 3
@@ -178,12 +178,12 @@ def test_sines_and_roots_that_are_fractions_are_constants() -> None:
     assert graph.root(Fraction(2)).op == "sqrt"
 
 
-# What an export rounds, and leaves out, by its own expressions on numbers that remember their roundings.
+# Rounding errors of exported code, computed with numbers that count their rounding errors.
 
 
-#: Roundings of their own for what is left out, apart from those that numbers count.
+#: Numbers of rounding errors for omitted entries, different from those that `Counted` creates
 _LEFT_OUT = count(-1, -1)
-#: What sine and cosine may be off by, in halves of an eps.
+#: Largest error of sine and cosine, in halves of an eps
 SINE = 2.0
 _OPERATIONS: dict[str, Callable[..., Counted]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "neg": operator.neg,
@@ -191,7 +191,7 @@ _OPERATIONS: dict[str, Callable[..., Counted]] = {
 
 
 def of_constant(R: Matrix, S: FloatArray) -> Matrix:
-    """R S by the expressions that are written; what is left out of S is as large as it may be."""
+    """Return R S by the exported expressions; each omitted entry of S has the largest possible size."""
     graph, kept = Graph(), [recursion._without_rounding(row) for row in S.tolist()]
     letters = [[graph.input("q", 3 * r + c) for c in range(3)] for r in range(3)]
     results = graph.chapter.product(letters, kept)
@@ -211,7 +211,7 @@ def of_constant(R: Matrix, S: FloatArray) -> Matrix:
 
 
 def partly_zero(x: FloatArray) -> FloatArray:
-    """A turn about a coordinate axis, or one that exchanges axes, with numbers to be left out."""
+    """Return a rotation about a coordinate axis, or one that exchanges axes, with tiny numbers."""
     exchange = rotation_from_rpy(np.round(x[4:7]) * math.pi / 2.0)
     about_z = rotation_from_rpy(np.array([0.0, 0.0, x[3] if x[6] > 0.0 else 0.0]))
     S = about_z @ exchange if x[5] > 0.0 else exchange @ about_z
@@ -219,13 +219,13 @@ def partly_zero(x: FloatArray) -> FloatArray:
 
 
 def turned(R: Matrix, angle: float, *, fused: bool) -> Matrix:
-    """R and a joint's turn, sine and cosine as C's batches have them."""
+    """Return R times a joint's rotation, with the sine and cosine of C's batches."""
     numbers = (Counted(f(angle), {next(_LEFT_OUT): SINE}, fused) for f in (math.sin, math.cos))
     return eq.product(R, eq.about_z(*numbers, 0, 1))  # type: ignore[no-any-return]
 
 
 def joint(x: FloatArray, *, fused: bool) -> Matrix:
-    """The rotation so far, the constant, the turn."""
+    """Return a rotation times a joint's constant rotation times the joint's motion."""
     rows = of_sines(x)
     constant = tuple(tuple(Counted(c.value, c.errors, fused) for c in row) for row in rows)
     return turned(eq.product(turn(x[4:], fused=fused), constant), float(x[3]), fused=fused)
@@ -267,7 +267,7 @@ def test_the_sines_of_c_are_right_to_one_eps(real: str, fusing: str, tmp_path: P
     head += "#define SELDOM static\n#define R(x) ((real)(x))\n#define LANES 8\n"
     entrance = "void of(long n, const real *x, real *s, real *c) {\n"
     entrance += "    for (; n > 0; n -= 16, x += 16, s += 16, c += 16) sines_cosines(x, s, c, 2);\n}\n"
-    source.write_text(head + framed("sines.c") + entrance, encoding="utf-8")
+    source.write_text(head + fill_template("sines.c") + entrance, encoding="utf-8")
     flags = ["-std=c99", "-O2", "-march=native", f"-ffp-contract={fusing}", "-fPIC", "-shared"]
     subprocess.run(["cc", *flags, str(source), "-o", str(library), "-lm"], check=True)
     kind, far = (np.float64, 823_549.0) if real == "double" else (np.float32, 8192.0)
@@ -281,8 +281,8 @@ def test_the_sines_of_c_are_right_to_one_eps(real: str, fusing: str, tmp_path: P
     wide = x.astype(np.longdouble)
     error = np.abs(found - np.array([np.sin(wide), np.cos(wide)]))
     assert 0.3 < float(error.max()) / np.finfo(kind).eps < 0.5 * SINE
-    # A small sine of a large angle has an error of eps, not of eps of itself. The bound in single precision
-    # needs both terms.
+    # The error of a small sine of a large angle can be eps, more than eps times the sine.
+    # So the bound in single precision needs both terms.
     within = roundings.SINGLE_OPERATION["sin"] * np.finfo(kind).eps * np.abs([np.sin(wide), np.cos(wide)])
     assert np.any(error > within) == (kind is np.float32)
     assert SINE == 2.0 * roundings.SINGLE_POLYNOMIAL

@@ -1,4 +1,4 @@
-"""Printed expressions and formulas compute what Pinocchio computes, and write nothing twice."""
+"""Exported expressions and formulas agree with Pinocchio, and contain no operation twice."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def value(x: Any) -> float:
-    """What an expression comes to for `INPUTS`."""
+    """Return the value of an expression for `INPUTS`."""
     if not isinstance(x, Node):
         return float(x)
     if x.op == "q":
@@ -48,13 +48,13 @@ def value(x: Any) -> float:
 
 @st.composite
 def written(draw: st.DrawFn) -> list[tuple[str, int, int]]:
-    """Operations, each on two of the numbers so far."""
+    """Draw operations, each on two of the earlier numbers."""
     letters = st.sampled_from("+-*n")
     return [(draw(letters), draw(st.integers(0, 30)), draw(st.integers(0, 30))) for _ in range(12)]
 
 
 def done(steps: list[tuple[str, int, int]], inputs: Iterable[Any]) -> list[Any]:
-    """The results of the operations, on constants and inputs."""
+    """Return the results of the operations, on constants and inputs."""
     numbers = [0.0, 1.0, -1.0, 0.5, *inputs]
     for op, i, k in steps:
         x, y = numbers[i % len(numbers)], numbers[k % len(numbers)]
@@ -108,9 +108,6 @@ def test_an_equation_notes_its_numbers_on_what_it_makes_itself_or_through_anothe
     assert "7.123, 7.130" in str(equations.point_acceleration.__doc__)
 
 
-# The printed expressions compute what Pinocchio computes, for every joint kind, quantity and reference.
-
-
 ODD = (
     "floating_root", "planar_and_floating_in_the_middle", "two_floating_in_a_row", "mimic_hand_40_sliding",
     "followers_of_followers", "sizes", "sliding_only", "default_everything",
@@ -160,15 +157,15 @@ def test_each_joints_sine_and_cosine_stand_there_once_and_no_more_than_are_neede
     assert len(jacobian.angles) == 6, "how the last joint turns moves no axis"
 
 
-def test_it_takes_fewer_operations_than_the_walk_for_any_robot() -> None:
+def test_it_takes_fewer_operations_than_the_recursion_for_any_robot() -> None:
     robot = urdfkin.load("panda", verify=False)
     plan = robot.plan([robot.tree.frame_link("panda_hand")])
     for row in (JACOBIAN, ACCELERATION):
         function = function_of(plan, row, Reference.LOCAL_WORLD_ALIGNED)
         sines = 2 * len(function.angles)
-        # A sine and its cosine are 51 operations in the walk's count, and two in ours.
-        walk = operations(plan, row.name) - 51 * len(plan.steps)
-        assert function.operations - sines < 0.75 * walk
+        # `operations` counts 51 operations for a sine and its cosine, `Function` counts two.
+        recursion = operations(plan, row.name) - 51 * len(plan.steps)
+        assert function.operations - sines < 0.75 * recursion
 
 
 def test_statements_are_in_an_order_in_which_they_can_be_computed() -> None:
@@ -188,7 +185,7 @@ def test_a_robot_with_huge_and_tiny_links_keeps_its_tiny_ones() -> None:
     assert any(x > 100.0 for x in lengths)
 
 
-# The formulas of a document are those of the code: read back as text, they compute what Pinocchio does.
+# -- formulas of a LaTeX document ------------------------------------------------------------------------
 
 
 _LINE = re.compile(r"^(\S+) &= (.*?)(?: \\\\)?$", re.MULTILINE)
@@ -196,7 +193,7 @@ _SYMBOL = re.compile(r"(?:\\(?:d?dot|omega)(?:\{\\?[A-Za-z]+\})?|[A-Za-z])(?:\^\
 
 
 def evaluated(text: str, values: dict[str, float]) -> dict[str, float]:
-    """What each formula comes to; nothing is used before it is defined."""
+    """Add the value of each formula to `values`; a symbol must be defined before its use."""
     for name, formula in _LINE.findall(text):
         plain = re.sub(r" \\cdot 10\^\{(-?\d+)\}", r"e\1", formula)
         plain = re.sub(r"\\operatorname\{(\w+)\}", r"\1", plain).replace(r" \, ", " * ")

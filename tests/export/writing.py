@@ -1,4 +1,4 @@
-"""Files of code in a folder, and what runs them."""
+"""Write exported code into files, and run these files."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
+import urdfkin
+from tests.reading import module_of
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.code import FrameCode, code_of, exported
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
 
 ALL = tuple(row.method for row in exported())
-#: What a file in a language needs to run.
+#: Program that compiles or runs a file in a language
 PROGRAMS = {"c": "cc", "cpp": "c++", "cuda": "c++", "matlab": "octave-cli"}
 LIBRARIES = ("numba", "jax", "torch", "casadi", "sympy", "sympy-exact")
 
@@ -29,20 +32,26 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 def code(
     robot: Robot, frame: str | None = None, quantities: tuple[str, ...] = ALL, reference: Reference = _ALIGNED
 ) -> FrameCode:
-    """What is written about a frame."""
     frame = frame or robot.tip_frame
     return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=None, verify=None)
 
 
 def file(written: FrameCode, to: str, folder: Path) -> Path:
-    """Its text in a language, as a file."""
     path = folder / f"{written.name}{LANGUAGES[to][1]}"
     path.write_text(write(written, to), encoding="utf-8")
     return path
 
 
+def module(
+    robot: Robot | str, to: str, folder: Path, *quantities: str, frame: str | None = None
+) -> ModuleType:
+    """Import an exported file of a Python library."""
+    robot = urdfkin.load(robot) if isinstance(robot, str) else robot
+    return module_of(file(code(robot, frame, quantities or ALL), to, folder))
+
+
 def need(to: str) -> None:
-    """Skip where a language is not there."""
+    """Skip the test if a file in a language cannot run here."""
     if (program := PROGRAMS.get(to)) and shutil.which(program) is None:
         pytest.skip(f"no {program}")
     if to in LIBRARIES and importlib.util.find_spec(to.partition("-")[0]) is None:
@@ -50,7 +59,7 @@ def need(to: str) -> None:
 
 
 def built(path: Path, compiler: str, *options: str) -> str:
-    """What its program says, all warnings being errors."""
+    """Compile a file with warnings as errors, run the program, and return its output."""
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler}")
     name = path.stem.upper()
@@ -62,6 +71,6 @@ def built(path: Path, compiler: str, *options: str) -> str:
 
 
 def ran(path: Path) -> subprocess.CompletedProcess[str]:
-    """A Python file as a program."""
+    """Run a Python file as a program."""
     how: dict[str, Any] = {"env": {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}, "text": True}
     return subprocess.run([sys.executable, str(path)], capture_output=True, check=False, **how)

@@ -42,7 +42,6 @@ def parameters(name: str) -> list[str]:
 
 
 def numbers_of(name: str) -> set[str]:
-    """Which parameters are numbers: a joint's rates, and the two of 7.64."""
     return {"d", "a"} if name == "interorigin_vector" else {"v", "a"}
 
 

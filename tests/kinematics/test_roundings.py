@@ -21,12 +21,10 @@ PACKAGE = Path(roundings.__file__).parent
 
 
 def turn(x: FloatArray, *, fused: bool) -> Matrix:
-    """Any rotation, exactly."""
     return matrix(rotation_from_rpy(x[:3]), fused=fused)
 
 
 def about_z(angle: float, *, fused: bool) -> Matrix:
-    """A joint's own turn."""
     return eq.about_z(*sine_cosine(angle, fused=fused), 0, 1)  # type: ignore[no-any-return]
 
 
@@ -43,7 +41,6 @@ def of_sines(x: FloatArray) -> Matrix:
 
 
 def through_a_quaternion(x: FloatArray) -> Matrix:
-    """As Pinocchio reads them."""
     (sa, ca), (sb, cb), (sc, cc) = (sine_cosine(0.5 * float(angle), fused=False) for angle in x[:3])
     quaternion = (
         sa * cb * cc - ca * sb * sc,
@@ -55,19 +52,16 @@ def through_a_quaternion(x: FloatArray) -> Matrix:
 
 
 def ours(x: FloatArray) -> Matrix:
-    """A joint about a coordinate axis: the rotation so far, the constant, the turn."""
     constant = eq.product(turn(x[4:], fused=True), of_sines(x))
     return eq.product(constant, about_z(float(x[3]), fused=True))  # type: ignore[no-any-return]
 
 
 def theirs(x: FloatArray) -> Matrix:
-    """The constant with the turn, then the rotation so far with both."""
     joint = eq.product(through_a_quaternion(x), about_z(float(x[3]), fused=False))
     return eq.product(turn(x[4:], fused=False), joint)  # type: ignore[no-any-return]
 
 
 def quaternion(angles: FloatArray, *, exact: bool) -> list[Counted]:
-    """(w, x, y, z) of roll, pitch and yaw: a product of three turns, brought to norm 1."""
     parts = []
     for i, angle in enumerate(angles[:3]):
         s, c = sine_cosine(0.5 * float(angle), fused=False)
@@ -149,11 +143,8 @@ def test_all_of_a_joints_roundings_conspiring_are_within_the_count() -> None:
     assert together == pytest.approx(22.5)
     assert together < roundings.ROUNDINGS
     assert math.hypot(most(deviation, ours), most(deviation, theirs)) < roundings.ROUNDINGS / 9.0
-
-
-def test_a_joint_of_mujocos_and_one_of_urdfkins_are_within_their_count() -> None:
-    together = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of MuJoCo's"][1]
-    assert together + 1.5 < roundings.MUJOCO
+    with_mujoco = PARTS["a joint of urdfkin's"][1] + PARTS["a joint of MuJoCo's"][1]
+    assert with_mujoco + 1.5 < roundings.MUJOCO
 
 
 def test_a_file_of_round_angles_is_snapped_by_less_than_a_turn_counts_as() -> None:
@@ -164,7 +155,6 @@ def test_a_file_of_round_angles_is_snapped_by_less_than_a_turn_counts_as() -> No
 
 
 def multiples_of_eps(tree: ast.AST) -> list[int]:
-    """Lines where eps is multiplied with a typed number, or asked for."""
     lines = list[int]()
     for node in ast.walk(tree):
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):

@@ -8,26 +8,26 @@ from urdfkin import Reference
 from urdfkin.compiled.prepared import PreparedFrame
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
+from urdfkin.verify.quantities import recursive_quantities
+
+Results = Iterator[tuple[str, FloatArray]]
 
 
 def by_the_robot(
-    robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray
-) -> Iterator[tuple[str, FloatArray]]:
-    """What it is, and the robot's result, for one configuration or a batch of any shape."""
-    yield "placement", robot.placement(q, frame, verify=False)
-    for reference in Reference:
-        name = reference.name
-        yield f"velocity {name}", robot.velocity(q, v, frame, reference, verify=False)
-        yield f"jacobian {name}", robot.jacobian(q, frame, reference, verify=False)
-        yield f"hessian {name}", robot.hessian(q, frame, reference, verify=False)
-        yield f"acceleration {name}", robot.acceleration(q, v, a, frame, reference, verify=False)
-        yield f"jacobian rate {name}", robot.jacobian_rate(q, v, frame, reference, verify=False)
+    robot: Robot, frame: str | list[str], q: FloatArray, v: FloatArray, a: FloatArray
+) -> Results:
+    for row in recursive_quantities():
+        for reference in row.references:
+            inputs = (q, v, a)[: len(row.inputs)]
+            if reference is None:
+                yield row.name, getattr(robot, row.method)(*inputs, frame, verify=False)
+            else:
+                result = getattr(robot, row.method)(*inputs, frame, reference, verify=False)
+                yield f"{row.name} {reference.name}", result
 
 
-def prepared(
-    robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray
-) -> Iterator[tuple[str, FloatArray]]:
-    """The same of one configuration, by prepared frames, which have no Jacobian rate."""
+def prepared(robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray) -> Results:
+    """Yield the results of prepared frames, which have no rate of the Jacobian."""
     yield "placement", robot.prepare(frame).placement(q)
     for reference in Reference:
         name, fast = reference.name, robot.prepare(frame, reference)
@@ -38,14 +38,11 @@ def prepared(
         yield f"acceleration {name}", fast.acceleration(q, v, a)
 
 
-def on_its_way_alone(
-    robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray
-) -> Iterator[tuple[str, FloatArray]]:
-    """The same of one configuration, by the kernels for batches: a block filled with its copies."""
+def as_a_block(robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray) -> Results:
+    """Yield the results of the kernels for batches, with copies of the configuration in all lanes."""
     for what, batch in by_the_robot(robot, frame, q[None], v[None], a[None]):
         yield what, batch[0]
 
 
 def differing(one: FloatArray, other: FloatArray) -> bool:
-    """Whether two arrays differ in shape or in any bit, the sign of a zero included."""
     return one.shape != other.shape or one.tobytes() != other.tobytes()

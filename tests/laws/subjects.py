@@ -18,13 +18,11 @@ NAMES = (
 
 
 def robot_of(name: str, *, mimic: bool | None = None, root_joint: str | None = None) -> Robot:
-    """One of them; `verify` is off, because a law must not lean on the oracle."""
     source = name if name in ("panda", "a1") else urdf_of(name)
     return loaded(source, verify=False, mimic=mimic, root_joint=root_joint)
 
 
 def state(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Samples within limits and rates of about 1: (n, nq), (n, nv), (n, nv)."""
     v, a = np.random.default_rng(seed).standard_normal((2, n, robot.nv))
     return robot.sample(n, seed), v, a
 

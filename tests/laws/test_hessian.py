@@ -16,7 +16,7 @@ from urdfkin.kinematics import equations as eq
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.tree import FloatArray, JointKind, pose
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
 from urdfkin.verify.exact.numbers import about, exact, from_quaternion, precision, read_exact
@@ -29,7 +29,6 @@ _Z = (0, 0, 1)
 
 
 def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
-    """Coordinates as they go on with one rate, to first order in the step."""
     out: list[Any] = [exact(x) for x in q]
     tree = robot.tree
     for joint, at, rate_at in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -141,8 +140,7 @@ def test_from_one_reference_to_the_other_the_axes_and_the_point_move_too(name: s
 def test_a_base_moves_the_hessian_as_it_moves_the_jacobian() -> None:
     robot = urdfkin.load("panda")
     q = robot.sample(4)
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), (1.0, 2.0, 3.0)
+    T = pose([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]], [1.0, 2.0, 3.0])
     on_base = robot.hessian(q, "panda_hand", base=BaseMotion(T, np.ones(6), np.ones(6)))
     here = robot.hessian(q, "panda_hand").reshape(4, 2, 3, robot.nv, robot.nv)
     np.testing.assert_allclose(

@@ -14,9 +14,9 @@ from tests.robots.odd_urdfs import Urdf
 from urdfkin import VerificationError, load
 from urdfkin.compiled import evaluate
 from urdfkin.kinematics import bodies
-from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.base_motion import STILL_STATE, BaseMotion
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
@@ -35,13 +35,11 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 
 def frames(robot: Robot) -> list[str]:
-    """The tip, the root and one in the middle."""
     links = robot.tree.links
     return [robot.tip_frame, robot.tree.frame_name(0), robot.tree.frame_name(len(links) // 2)]
 
 
 def close(one: FloatArray, other: FloatArray, *sizes: FloatArray) -> bool:
-    """Whether two arrays agree to rounding of what they were computed from."""
     largest = max([1.0, *(float(np.abs(x).max(initial=0.0)) for x in (one, other, *sizes))])
     return bool(np.abs(one - other).max(initial=0.0) <= ROOM * largest)
 
@@ -79,7 +77,6 @@ def test_references_are_related_by_the_motion_of_a_rigid_body(robot: Robot) -> N
 
 
 def turned(R: FloatArray, six: FloatArray) -> FloatArray:
-    """[R^T linear; R^T angular]."""
     pairs = six.reshape(*six.shape[:-1], 2, 3)
     back: FloatArray = np.einsum("...ji,...pj->...pi", R, pairs).reshape(six.shape)
     return back
@@ -138,11 +135,9 @@ def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint(name: str) -> 
     robot, free = robot_of(name), robot_of(name, root_joint="floating")
     q, v, a = state(robot, 6, 8)
     generator = np.random.default_rng(9)
-    R, p = exp_rotation(generator.normal(size=(6, 3))), generator.normal(size=(6, 3))
-    T = np.tile(np.eye(4), (6, 1, 1))
-    T[:, :3, :3], T[:, :3, 3] = R, p
-    base = BaseMotion(T, *generator.normal(size=(2, 6, 6)))
-    quaternion = Rotation.from_matrix(base.placement[:, :3, :3]).as_quat()
+    base = draw_base(6, generator)
+    R, p = base.placement[:, :3, :3], base.placement[:, :3, 3]
+    quaternion = Rotation.from_matrix(R).as_quat()
     spatial = base.acceleration.copy()
     spatial[:, :3] -= np.cross(base.velocity[:, 3:], base.velocity[:, :3])
     q_free = np.hstack((p, quaternion, q))
@@ -199,7 +194,6 @@ def test_an_elbow_of_three_and_four_metres_is_where_pythagoras_puts_it() -> None
 
 
 def room(bound: Bound) -> FloatArray:
-    """What a quantity may be off by, number for number."""
     allowed: FloatArray = EPS * bound.k * bound.scale
     return allowed
 

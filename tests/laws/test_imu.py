@@ -10,15 +10,15 @@ import pytest
 
 import urdfkin
 from tests import urdfs
-from tests.laws.subjects import NAMES, moved, robot_of, rotation_vector, state
+from tests.laws.subjects import NAMES, robot_of, state
 from tests.urdfs import joint, limit
 from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import BaseMotion
+from urdfkin.model.configuration import draw_base
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.oracle import free_flyer, free_flyer_rates, free_flyer_second_rates
+from urdfkin.verify.oracle import free_flyer
 
 G = np.array([0.3, -0.2, -9.81])
 #: Axes askew, a slide between turns.
@@ -33,12 +33,7 @@ WITH_MASSES = re.sub(r'<link name="(\w+)"/>', rf'<link name="\1">{_INERTIA}</lin
 
 
 def moving_base(n: int, seed: int) -> BaseMotion:
-    generator = np.random.default_rng(seed)
-    quaternion = generator.standard_normal((n, 4))
-    T = np.tile(np.eye(4), (n, 1, 1))
-    T[:, :3, :3] = rotation_of(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
-    T[:, :3, 3] = generator.standard_normal((n, 3))
-    return BaseMotion(T, *generator.standard_normal((2, n, 6)))
+    return draw_base(n, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("base", [None, moving_base(7, 1)])
@@ -67,29 +62,6 @@ def test_at_rest_it_reads_gravity_upwards_and_in_free_fall_nothing() -> None:
     falling = BaseMotion(acceleration=np.array([0.0, 0.0, -9.81, 0.0, 0.0, 0.0]))
     assert np.abs(robot.imu(q, still, still, "panda_hand", base=falling)).max() < 1e-14
     assert np.abs(robot.imu(q, still, still, "panda_hand", gravity=[0, 0, 0])).max() == 0.0
-
-
-@pytest.mark.parametrize("name", ["panda", "floating_root", "tree_3"])
-def test_the_gyroscope_reads_the_difference_quotient_of_the_orientation(name: str) -> None:
-    robot = robot_of(name)
-    q, v, a = (x[0] for x in state(robot, 1, 3))
-    h = 2.0**-14
-    Rs = robot.placement(moved(robot, q, v, np.array([-h, h])), robot.tip_frame)[:, :3, :3]
-    turned = rotation_vector((Rs[0].T @ Rs[1])[None])[0] / (2.0 * h)
-    size = max(1.0, np.abs(turned).max())
-    assert np.abs(turned - robot.imu(q, v, a, robot.tip_frame)[3:]).max() < 1e-5 * size**3
-
-
-@pytest.mark.parametrize("name", ["panda", "a1"])
-def test_a_moving_base_is_a_floating_joint(name: str) -> None:
-    base = moving_base(4, 5)
-    robot, free = urdfkin.load(name), urdfkin.load(name, root_joint="floating")
-    q, v, a = state(robot, 4, 6)
-    on_base = robot.imu(q, v, a, robot.tip_frame, base=base)
-    floating = (free_flyer(base), free_flyer_rates(base), free_flyer_second_rates(base))
-    wide = [np.concatenate(pair, axis=-1) for pair in zip(floating, (q, v, a), strict=True)]
-    afloat = free.imu(wide[0], wide[1], wide[2], robot.tip_frame)
-    np.testing.assert_allclose(afloat, on_base, atol=1e-13)
 
 
 @pytest.mark.parametrize("slip", ["sign", "spatial", "none"])

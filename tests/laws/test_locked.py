@@ -26,7 +26,7 @@ from urdfkin.kinematics.rotation import rotation_from_rpy
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.bounds import magnitudes
@@ -61,7 +61,6 @@ def held(robot: Robot, name: str) -> float:
 
 
 def kept(robot: Robot, names: list[str]) -> tuple[list[int], list[int]]:
-    """Return the indices in q and in v of the joints that are not locked."""
     tree = robot.tree
     free = [(i, j) for i, j in enumerate(tree.joints) if j.nv and j.name not in names]
     q = [tree.q_index[i] + c for i, j in free for c in range(j.nq)]
@@ -125,9 +124,7 @@ def test_both_oracles_agree_with_a_locked_robot(name: str, oracle: str) -> None:
 @pytest.mark.parametrize("name", ["panda", "a1"])
 def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> None:
     locked = robot_of(name).locked(joints=lockable(robot_of(name))[:2], lock="ready")
-    T = np.eye(4)
-    T[:3, 3] = 1.0, 2.0, 3.0
-    base = urdfkin.BaseMotion(T, np.array([1.0, 0, 0, 0, 0, 2.0]), np.array([0, 1.0, 0, 3.0, 0, 0]))
+    base = urdfkin.BaseMotion(pose(p=[1.0, 2.0, 3.0]), [1.0, 0, 0, 0, 0, 2.0], [0, 1.0, 0, 3.0, 0, 0])
     q, v, a = state(locked, 2, 4)
     locked.acceleration(q, v, a, locked.link_frames, base=base, verify=True)
     assert locked.certificate().verified
@@ -337,7 +334,10 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
     ("options", "words"),
     [
         ({"lock": {"elbow": 1.0}}, "unknown coordinate 'elbow'"),
-        ({"lock": {"panda_finger_joint2": 0.01}}, "it mimics panda_finger_joint1: give that value"),
+        (
+            {"lock": {"panda_finger_joint2": 0.01}},
+            "it mimics panda_finger_joint1: give that joint's value",
+        ),
         ({"lock": {"panda_joint8": 0.0}}, "leave out this fixed joint"),
         ({"lock": {"panda_finger_joint1": 4.0}}, "4 is outside [0, 0.04]"),
         ({"lock": {"panda_joint1": 90}}, "degrees? write 90deg"),
@@ -351,7 +351,7 @@ def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() ->
         ({"joints": ["elbow"]}, "unknown coordinate 'elbow'"),
         ({"joints": "panda_joint1"}, "must be a list of names"),
         ({"joints": ["panda_joint1"]}, "give a value within them: lock={'panda_joint4': VALUE}"),
-        ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also one of joints"),
+        ({"joints": ["panda_joint1"], "lock": {"panda_joint1": 0.0}}, "is also in the list joints"),
         ({"joints": ["panda_finger_joint2"]}, "it mimics panda_finger_joint1"),
     ],
 )

@@ -17,7 +17,7 @@ from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import VECTORS
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
-from urdfkin.validation.accuracy import judge
+from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.verify.exact import recursion
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -48,7 +48,6 @@ USED = (
 
 
 def with_a_slip(equation: str, term: str) -> ModuleType:
-    """The equations, one term of one of them made larger."""
     tree = ast.parse(inspect.getsource(equations))
     (function,) = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == equation]
 
@@ -66,8 +65,7 @@ def with_a_slip(equation: str, term: str) -> ModuleType:
 
 
 def farthest(robot: Robot) -> float:
-    """How far Pinocchio is from the judge at most, in eps * scale."""
-    return max(line.pinocchio.worst for line in judge(robot, samples=2).lines)
+    return max(line.pinocchio.worst for line in accuracy_study(robot, samples=2).lines)
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint, limit, mimic
 from urdfkin.errors import InputError, UnknownNameError, UrdfkinError
 from urdfkin.errors.numbers import in_radians, parse_quantity
-from urdfkin.model.configuration import places
+from urdfkin.model.configuration import coordinate_layout
 from urdfkin.model.configuration_like import CoordinateLayout
 from urdfkin.robot import Robot
 
@@ -40,7 +40,7 @@ def arm() -> Robot:
 
 
 def q_of(robot: Robot, text: Any) -> list[float]:
-    return places(robot.tree, "q").read(text).tolist()  # type: ignore[no-any-return]
+    return coordinate_layout(robot.tree, "q").read(text).tolist()  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize(
@@ -64,9 +64,9 @@ def test_every_way_of_writing_means_the_same_numbers_to_the_bit(text: Any, arm: 
         ("0,0", "q: 3 numbers are expected (lift, shoulder, elbow): found 2, none for elbow"),
         ("0,0,0,0", "q has that length: robot.from_pinocchio(q, mimic=False) converts it to urdfkin's"),
         ("0,0,0,0", "load with mimic=False"),
-        ("shoulder=1,lift=0", "q: no value for elbow; give it too, or begin with a pose"),
+        ("shoulder=1,lift=0", "q: no value for elbow; give a value for each, or begin with a pose"),
         ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
-        ("echo=1,elbow=1,shoulder=1,lift=0", "'echo' is not a coordinate; it mimics elbow: give that value"),
+        ("echo=1,elbow=1", "'echo' is not a coordinate; it mimics elbow: give that joint's value"),
         ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),
         ("0.1,shoulder=1,elbow=1", "q: unknown pose '0.1'"),
         ("neutral,0,0", "q, lift: not a finite number: found 'neutral'"),
@@ -192,7 +192,7 @@ def test_any_text_is_finite_numbers_or_an_error_of_our_own(text: str) -> None:
     assert found is None or math.isfinite(found.value)
     robot = urdfkin.load("one_link", verify=False)
     with contextlib.suppress(UrdfkinError):
-        assert np.isfinite(places(robot.tree, "q").read(text)).all()
+        assert np.isfinite(coordinate_layout(robot.tree, "q").read(text)).all()
 
 
 def test_a_text_of_any_length_is_refused_at_once(arm: Robot) -> None:
@@ -202,8 +202,6 @@ def test_a_text_of_any_length_is_refused_at_once(arm: Robot) -> None:
 
 
 class Series:
-    """As much of pandas' Series as matters here: labels, the number of each, and an array in order."""
-
     def __init__(self, data: Any, index: Any) -> None:
         self._data, self._index = np.array(data), list(index)
 
@@ -221,15 +219,11 @@ class Series:
 
 
 class DataFrame(Series):
-    """Likewise: a column for each label."""
-
     def __getitem__(self, label: Any) -> Any:
         return self._data[:, self._index.index(label)]
 
 
 class Columns:
-    """A table of another library, such as polars', whose names are its columns'."""
-
     def __init__(self, data: Any, columns: Any) -> None:
         self._data, self.columns = np.array(data), list(columns)
 
@@ -318,7 +312,6 @@ def test_names_that_stand_for_two_numbers_never_set_one_of_them_to_zero() -> Non
 
 
 def swapped(*asked: Any, right: Any = CoordinateLayout._by_name) -> Any:
-    """What a reading by name gives, its first two numbers exchanged."""
     found = right(*asked)
     found[..., [0, 1]] = found[..., [1, 0]]
     return found

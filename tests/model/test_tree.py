@@ -15,7 +15,7 @@ from tests.random_chains import rotation, shift
 from tests.random_chains import z_joint as joint
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.configuration import from_pinocchio, limit_violations, to_pinocchio
-from urdfkin.model.mechanisms.mechanism import apart
+from urdfkin.model.mechanisms.mechanism import pose_difference
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree, with_root_joint
 from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
@@ -23,7 +23,6 @@ from urdfkin.urdf.catalogue import catalogue
 
 @pytest.fixture
 def hand() -> KinematicTree:
-    """A palm with a thumb of one joint and a finger of two, the second following the first."""
     rows = [
         (joint("tip", mimic=Mimic("finger", 0.5, 0.1)), "finger_link", "tip_link"),
         (joint("thumb", kind=JointKind.CONTINUOUS), "palm", "thumb_link"),
@@ -113,11 +112,11 @@ def test_poses_are_apart_by_the_angle_and_the_way_that_one_was_moved(axis: str, 
     T = shift(0.1, -0.2, 0.3) @ rotation("y", 0.7) @ rotation("x", -1.1)
     moved = T @ rotation(axis, angle)
     moved[:3, 3] += [2.0, 3.0, 6.0]
-    turned, way = apart(T, moved)
+    turned, way = pose_difference(T, moved)
     assert turned == pytest.approx(abs(angle), rel=1e-6, abs=1e-15)
     assert way == pytest.approx(7.0, rel=1e-15)
-    assert apart(moved, T) == pytest.approx((turned, way), rel=1e-12)
-    assert np.allclose(apart(T, T), 0.0, atol=1e-15)
+    assert pose_difference(moved, T) == pytest.approx((turned, way), rel=1e-12)
+    assert np.allclose(pose_difference(T, T), 0.0, atol=1e-15)
 
 
 # -- `integrate` and `difference`: Pinocchio's, and each undoes the other ------------------------------------
@@ -187,7 +186,7 @@ def test_batches_broadcast_or_are_refused() -> None:
     q, v = robot.sample(4), np.ones((3, 1, robot.nv))
     assert robot.integrate(q, v).shape == (3, 4, robot.nq)
     assert robot.difference(q, robot.neutral()).shape == (4, robot.nv)
-    with pytest.raises(urdfkin.InputError, match="the batch shapes do not fit"):
+    with pytest.raises(urdfkin.InputError, match="the batch shapes of the arguments do not broadcast"):
         robot.integrate(q, np.ones((3, robot.nv)))
 
 
@@ -206,7 +205,6 @@ LOWER, UPPER = -0.7, 1.3
 
 
 def two_joints(mimic: Mimic | None = None) -> KinematicTree:
-    """A joint `a` with bounds, and a sliding one `b` that may go from 0 to 0.1 m."""
     a = joint("a", limit=Limit(LOWER, UPPER, 1.0, 1.0))
     b = joint("b", kind=JointKind.PRISMATIC, limit=Limit(0.0, 0.1, 1.0, 1.0), mimic=mimic)
     return build_tree("two", "l0", [(a, "l0", "l1"), (b, "l1", "l2")])
@@ -246,7 +244,6 @@ def test_a_joint_without_bounds_and_a_batch_without_rows_are_never_outside() -> 
 
 
 def with_everything() -> KinematicTree:
-    """A wheel, a planar joint, and a follower of the wheel that turns without end too."""
     joints = [
         joint("wheel", kind=JointKind.CONTINUOUS),
         joint("table", kind=JointKind.PLANAR),

@@ -1,4 +1,4 @@
-"""Debian's Chromium, driven through selenium: offline, headless, with a software renderer for WebGL."""
+"""Debian's Chromium for tests: offline, headless, with a software renderer for WebGL."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _FLAGS = (
 
 
 def chromium() -> tuple[str, str] | None:
-    """Chromium and its driver; None where they are not installed."""
+    """Return the paths of Chromium and its driver; None if one is not installed."""
     browser, driver = shutil.which("chromium"), shutil.which("chromedriver")
     return (browser, driver) if browser and driver else None
 
 
 def require_chromium() -> tuple[str, str]:
-    """Skip where there is no Chromium, but never in CI."""
+    """Skip the test without Chromium; in CI, fail the test."""
     found = chromium()
     if found is None:
         if os.environ.get("CI"):
@@ -40,7 +40,7 @@ def require_chromium() -> tuple[str, str]:
     return found
 
 
-#: Nothing is drawn in space: without a graphics card that takes most of the time.
+#: Script that disables WebGL drawing, which takes most of the time without a graphics card.
 _NOTHING_DRAWN = """for (const what of ["Arrays", "Elements", "RangeElements"])
   for (const many of ["", "Instanced"])
     WebGL2RenderingContext.prototype["draw" + what + many] = () => {};"""
@@ -56,7 +56,7 @@ def opened(
     draws: bool = True,
     flags: tuple[str, ...] = (),
 ) -> Iterator[Browser]:
-    """An empty profile; `flags` are Chromium's own; without `draws` nothing is drawn in space."""
+    """Yield Chromium with an empty profile; without `draws`, WebGL draws nothing."""
     binary, driver = require_chromium()
     options = webdriver.ChromeOptions()
     options.binary_location = binary
@@ -76,57 +76,54 @@ def opened(
 
 
 class Browser:
-    """What the tests do with a browser."""
-
     def __init__(self, chrome: webdriver.Chrome) -> None:
         self.chrome = chrome
 
     def become(self, width: int = 1280, height: int = 1000, *, dark: bool = False) -> None:
-        """A desk's or a telephone's screen, in a light or a dark theme."""
+        """Set the size of the screen (a phone below 600 pixels) and the theme."""
         screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
         self.chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
         theme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": theme})
 
     def open(self, path: Path) -> None:
-        """Load a file, then put the probes into it."""
+        """Load a file, and add the functions of `probes.js`."""
         self.chrome.get(path.as_uri())
         self.js(_PROBES)
 
     def js(self, code: str, *arguments: Any) -> Any:
-        """Run a function's body in the page."""
+        """Run the body of a function in the page."""
         return self.chrome.execute_script(code, *arguments)
 
     def probe(self, name: str, *arguments: Any) -> Any:
-        """Ask one of the probes of `probes.js`."""
+        """Call a function of `probes.js`."""
         return self.js("return probe[arguments[0]](...arguments[1])", name, arguments)
 
     def settle(self) -> None:
-        """Wait until everything that was to be drawn next is drawn."""
+        """Wait until the next two frames are drawn."""
         self.chrome.execute_async_script(
             "const done = arguments[0], next = requestAnimationFrame;"
             "next(() => next(() => setTimeout(done, 50)))"
         )
 
     def wait(self, code: str) -> None:
-        """Until a function's body returns something true."""
+        """Wait until the body of a function returns a true value."""
         WebDriverWait(self.chrome, 60).until(lambda _: self.js(code))
 
     def wait_for(self, words: str) -> None:
-        """Until the words stand on the page."""
+        """Wait until the page contains the words."""
         WebDriverWait(self.chrome, 60).until(lambda _: words in self.js("return document.body.innerText"))
 
     def screenshot(self, name: str) -> None:
-        """Keep a picture among the artefacts."""
         ARTEFACTS.mkdir(exist_ok=True)
         self.chrome.save_screenshot(str(ARTEFACTS / f"{name}.png"))
 
     def errors(self) -> list[str]:
-        """What the console holds against the page."""
+        """Return the errors in the console since the last call."""
         return [entry["message"] for entry in self._log("browser") if entry["level"] == "SEVERE"]
 
     def requests(self) -> list[str]:
-        """Every address that was asked for since the last call."""
+        """Return the requested addresses since the last call."""
         events = [json.loads(entry["message"])["message"] for entry in self._log("performance")]
         return [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
 

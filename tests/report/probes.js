@@ -1,6 +1,6 @@
-// What the browser tests ask of a page; put into it after it has loaded.
+// Functions that the browser tests call in a page.
 window.probe = {
-  // How many pixels of the first view are drawn on, a sum that changes when they do, and how many there are.
+  // Return the number of drawn pixels of the first view, a checksum of the pixels, and the number of all pixels.
   pixels() {
     const canvas = document.querySelector("canvas"), { width, height } = canvas;
     const data = canvas.getContext("2d").getImageData(0, 0, width, height).data;
@@ -13,7 +13,7 @@ window.probe = {
     return [drawn, sum, width * height];
   },
 
-  // Pixels of joints (blue) and of bones (grey).
+  // Return the number of pixels of joints (blue) and of links (grey).
   colours() {
     const canvas = document.querySelector("canvas");
     const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
@@ -52,7 +52,7 @@ window.probe = {
     return tables.filter((table) => table.checkVisibility()).map((table) => table.caption.textContent.split(" ")[0]);
   },
 
-  // Where the first view draws the ends of its first chain for a configuration, in rows of four.
+  // Return the tip poses of the first chain in the first view for a configuration: links, standard and modified table.
   chainEnds(q) {
     const { robot } = document.querySelector("[data-view]").view, chain = robot.chains[0];
     robot.q = q;
@@ -77,38 +77,4 @@ window.probe = {
     return [document.querySelector("#shown").textContent, hidden];
   },
   unfoldAll: () => document.querySelectorAll("details").forEach((part) => { part.open = true; }),
-
-  // Texts whose WCAG contrast with what they stand on is below 4.5.
-  poorContrast() {
-    const context = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true }), known = new Map();
-    const rgba = (colour) => {
-      if (!known.has(colour)) {
-        context.clearRect(0, 0, 1, 1);
-        context.fillStyle = colour;
-        context.fillRect(0, 0, 1, 1);
-        known.set(colour, [...context.getImageData(0, 0, 1, 1).data]);
-      }
-      return known.get(colour);
-    };
-    const linear = (x) => (x / 255 <= 0.04045 ? x / 255 / 12.92 : ((x / 255 + 0.055) / 1.055) ** 2.4);
-    const light = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
-    const behind = (element) => {
-      for (; element; element = element.parentElement) {
-        const colour = rgba(getComputedStyle(element).backgroundColor);
-        if (colour[3] > 250) return colour;
-      }
-      return [255, 255, 255];
-    };
-    const low = new Map(), walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-    let count = 0;
-    while (walker.nextNode()) {
-      const words = walker.currentNode.textContent.trim(), element = walker.currentNode.parentElement;
-      if (!words || !element.checkVisibility() || element.closest("svg, script, style, noscript, select")) continue;
-      count += 1;
-      const levels = [light(rgba(getComputedStyle(element).color)), light(behind(element))].sort((a, b) => b - a);
-      const ratio = (levels[0] + 0.05) / (levels[1] + 0.05);
-      if (ratio < 4.5) low.set(`${element.tagName}.${element.className}: ${words.slice(0, 30)}`, ratio);
-    }
-    return [count, [...low]];
-  },
 };

@@ -1,16 +1,18 @@
-"""Pages as axe, the keyboard and paper find them; `scripts/audit_pages.py` tries more pages and screens."""
+"""Accessibility, keyboard control and printing of pages; `scripts/audit_pages.py` has more pages."""
 
 import json
 import re
 import shutil
 import subprocess
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from scripts import audit_pages
 from scripts.audit_pages import Page, as_pdf, axe_script, html_checker, html_errors, look, walk
+from tests.reading import present
 from tests.report.browser import Browser, opened
 from tests.report.documents import arms, failing, hostile, months_runs
 from urdfkin.report.history import as_html as history_page
@@ -27,8 +29,7 @@ UNFOLD = "document.querySelectorAll('details.robot').forEach((one) => { one.open
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     folder = tmp_path_factory.mktemp("pages")
     document = arms()
-    model = document["robots"][0]["model"]
-    assert model is not None
+    model = present(document["robots"][0]["model"])
     model["path"] = "/home/somebody" + 12 * "/a_long_name_of_a_folder" + "/arm.urdf"
     texts = {"arms": as_html(document), "failing": as_html(failing()), "hostile": as_html(hostile())}
     (folder / "runs").mkdir()
@@ -47,9 +48,9 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield browser
 
 
-@pytest.mark.parametrize(("width", "dark"), [(390, False), (768, True)], ids=["390-light", "768-dark"])
+@pytest.mark.parametrize(("width", "dark"), [(390, False), (1280, True)], ids=["390-light", "1280-dark"])
 @pytest.mark.parametrize("name", NAMES)
-def test_no_serious_violation_no_error_no_sideways_scrolling_and_no_request(
+def test_a_page_has_no_serious_violation_no_error_no_horizontal_scrolling_and_no_request(
     name: str, width: int, dark: bool, pages: dict[str, Page], desk: Browser
 ) -> None:
     axe = axe_script()
@@ -58,7 +59,7 @@ def test_no_serious_violation_no_error_no_sideways_scrolling_and_no_request(
     assert look(desk, pages[name], width, dark, axe) == []
 
 
-def test_the_audit_finds_what_is_wrong(tmp_path: Path, desk: Browser) -> None:
+def test_the_audit_finds_faults(tmp_path: Path, desk: Browser) -> None:
     bad = tmp_path / "bad.html"
     bad.write_text(
         "<!doctype html><html><title>t</title><style>*:focus{outline:0}</style><p style='width:900px;"
@@ -91,12 +92,12 @@ def test_the_html_has_no_error(name: str, pages: dict[str, Page]) -> None:
     assert html_errors(pages[name], jar) == []
 
 
-def test_paper_has_every_drawing_in_the_colours_of_paper(pages: dict[str, Page], desk: Browser) -> None:
+def test_a_printed_page_has_every_drawing_in_light_colours(pages: dict[str, Page], desk: Browser) -> None:
     desk.become(1280, 400, dark=True)
     desk.open(Path(pages["arms"].url.removeprefix("file://")))
     desk.js(f"{UNFOLD}; scrollTo(0, 0)")
     drawn = "return [...document.querySelectorAll('canvas')].map((one) => !!one.dataset.drawn)"
-    assert not all(desk.js(drawn)), "a robot far below is not drawn for the screen"
+    assert not all(desk.js(drawn)), "an invisible robot is not drawn"
     desk.js("dispatchEvent(new Event('beforeprint'))")
     assert desk.js(drawn) == [True, True]
     colour = "return document.querySelector('[data-view]').view.materials.turn.color.getHex()"
@@ -105,33 +106,36 @@ def test_paper_has_every_drawing_in_the_colours_of_paper(pages: dict[str, Page],
     assert desk.js(colour) == 0x6EA3EE
 
 
-def test_on_paper_the_reason_is_not_the_smallest_text(pages: dict[str, Page], desk: Browser) -> None:
-    desk.become()
-    desk.open(Path(pages["failing"].url.removeprefix("file://")))
+@contextmanager
+def printing(desk: Browser) -> Iterator[None]:
     desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     try:
+        yield
+    finally:
+        desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+def test_the_reason_has_the_largest_text_of_a_printed_page(pages: dict[str, Page], desk: Browser) -> None:
+    desk.become()
+    desk.open(Path(pages["failing"].url.removeprefix("file://")))
+    with printing(desk):
         sizes = desk.js(
             f"{UNFOLD}; return ['.reason', '.checks td', '.failures code', '.aside'].map((name) =>"
             " parseFloat(getComputedStyle(document.querySelector(name)).fontSize))"
         )
-    finally:
-        desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
     assert sizes[0] == max(sizes)
     assert min(sizes) >= 7.0
 
 
-def test_paper_leaves_out_folded_robots_and_shows_open_ones(pages: dict[str, Page], desk: Browser) -> None:
+def test_a_printed_page_has_open_robots_only(pages: dict[str, Page], desk: Browser) -> None:
     desk.become()
     desk.open(Path(pages["arms"].url.removeprefix("file://")))
     shown = "return [...document.querySelectorAll('.robot')].map((one) => one.checkVisibility())"
     desk.js("document.querySelectorAll('.robot').forEach((one, i) => { one.open = i === 1; })")
     on_screen = desk.js(shown)
-    desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-    try:
+    with printing(desk):
         visible = desk.js(shown)
         note = desk.js("return document.querySelector('main > .paper').checkVisibility()")
-    finally:
-        desk.chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
     assert (on_screen, visible, note) == ([True, True], [False, True], True)
 
 

@@ -1,4 +1,4 @@
-"""A comparison finds every kind of change, and calls a regression what is one and nothing else."""
+"""A comparison of reports finds each kind of change, and which changes are regressions."""
 
 import copy
 import math
@@ -16,7 +16,7 @@ def words(old: Any, new: Any, **how: Any) -> list[tuple[bool, str]]:
     return [(change.regression, str(change)) for change in compare(old, new, **how).changes]
 
 
-def test_a_report_equals_itself_and_a_robot_is_known_again_in_one_file_of_another_name() -> None:
+def test_a_report_equals_itself_and_a_robot_in_a_renamed_file_is_recognized() -> None:
     assert compare(arms(), arms()).changes == ()
     moved = arms()
     moved["robots"][1]["source"] = "models/ur5_v2.urdf"
@@ -27,7 +27,7 @@ def test_a_report_equals_itself_and_a_robot_is_known_again_in_one_file_of_anothe
     assert (True, "ur5: robot: verified -> nothing") in words(arms(), doubled)
 
 
-#: What changed: its place in the document, its new value (none: it is gone), and what is said.
+#: Changes: path in the document, new value (None: the entry is deleted), part of the line about the change.
 WORSE: dict[str, tuple[tuple[Any, ...], Any, str]] = {
     "a robot is gone": (("robots", 1), None, "ur5: robot: verified -> nothing"),
     "failures": (("robots", 0, "checks", 0, "failed"), 2, "0 outside the bound -> 2 outside the bound"),
@@ -42,7 +42,7 @@ WORSE: dict[str, tuple[tuple[Any, ...], Any, str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", WORSE)
-def test_what_got_worse_is_a_regression_and_its_return_is_not(what: str) -> None:
+def test_a_change_for_the_worse_is_a_regression_and_the_reverse_change_is_not(what: str) -> None:
     (*path, key), value, line = WORSE[what]
     spoiled: Any = arms()
     home = reduce(getitem, path, spoiled)
@@ -58,7 +58,7 @@ def test_what_got_worse_is_a_regression_and_its_return_is_not(what: str) -> None
     assert len(back.changes) >= (what != "fewer results")
 
 
-#: The worst disagreement before and after, the factor that is allowed, and whether that is a regression.
+#: The worst disagreement before and after, the allowed factor, and whether the change is a regression.
 GROWTH = [
     (10.0, 19.9, 2.0, False), (10.0, 20.0, 2.0, False), (10.0, 20.1, 2.0, True), (3.0, 6.1, 3.0, False),
     (0.1, 1.9, 2.0, False), (0.1, 2.1, 2.0, True),
@@ -66,7 +66,7 @@ GROWTH = [
 
 
 @pytest.mark.parametrize(("before", "after", "factor", "regression"), GROWTH)
-def test_growth_counts_from_the_factor_on_and_above_a_single_rounding(
+def test_growth_above_the_factor_and_above_a_single_rounding_is_a_regression(
     before: float, after: float, factor: float, regression: bool
 ) -> None:
     old, new = arms(), arms()
@@ -75,7 +75,7 @@ def test_growth_counts_from_the_factor_on_and_above_a_single_rounding(
     assert compare(old, new, factor).exit_code == int(regression)
 
 
-def test_a_run_that_passed_and_does_not_and_fewer_samples_are_regressions() -> None:
+def test_a_failed_run_and_fewer_samples_are_regressions() -> None:
     new = arms()
     new["asked"] = 3
     line = "outcome: passed -> not passed, 1 of 3 robots without a report"
@@ -87,7 +87,7 @@ def test_a_run_that_passed_and_does_not_and_fewer_samples_are_regressions() -> N
     assert (False, "samples: 2 -> 6") in words(new, arms())
 
 
-def test_a_robot_that_moves_otherwise_is_told_joint_by_joint_however_little_it_is() -> None:
+def test_a_changed_joint_is_a_change_even_if_it_is_tiny() -> None:
     new: Any = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     axis = joint["axis"]
@@ -148,7 +148,7 @@ def test_a_wider_bound_and_tables_that_are_compared_no_more_are_regressions() ->
     assert compare(new, arms()).exit_code == 0
 
 
-def test_a_share_of_the_bound_counts_from_the_factor_on_and_from_a_tenth() -> None:
+def test_a_ratio_to_the_bound_above_a_tenth_that_grows_by_more_than_the_factor_is_a_regression() -> None:
     grown = (0.2, 0.41), (0.04, 0.11), (0.2, None)
     for share_old, share_new in (*grown, (0.2, 0.39), (0.01, 0.099)):
         old, new = arms(), arms()
@@ -158,7 +158,7 @@ def test_a_share_of_the_bound_counts_from_the_factor_on_and_from_a_tenth() -> No
         assert bool(compare(old, new).regressions) is regression, (share_old, share_new)
 
 
-def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> None:
+def test_other_versions_settings_and_new_robots_are_no_regressions() -> None:
     new = arms()
     new["versions"]["pin"] = "4.99.0"
     new["seed"] = 7
@@ -171,7 +171,7 @@ def test_versions_settings_and_new_robots_are_changes_and_no_regressions() -> No
     assert compare(old, new).exit_code == 0
 
 
-def test_the_markdown_leads_with_regressions_and_counts_what_does_not_fit() -> None:
+def test_the_markdown_begins_with_regressions_and_counts_the_omitted_changes() -> None:
     found = compare(arms(), failing())
     markdown = markdown_of(arms(), failing(), found)
     lines = [line for line in markdown.splitlines() if "→" in line or line.startswith("| ")]
@@ -186,14 +186,14 @@ def test_the_markdown_leads_with_regressions_and_counts_what_does_not_fit() -> N
         check["failed"] = 2
     found = compare(old, new)
     whole = markdown_of(old, new, found)
-    room = len(whole) + 100  # what is kept free for the last line
+    room = len(whole) + 100  # 100 characters are reserved for the last line
     assert markdown_of(old, new, found, room) == whole
     cut = markdown_of(old, new, found, room - 1)
     assert cut.endswith("\n1 further change left out: the comment is full.\n")
     assert len(cut) <= room - 1
 
 
-def test_robots_that_were_given_several_times_are_told_apart_by_number() -> None:
+def test_repeated_robots_are_numbered() -> None:
     old: Any = arms()
     old["robots"] = [copy.deepcopy(old["robots"][1]) for _ in range(4)]
     for place, name in enumerate(["ur5", "ur5 (2)", "ur5 (3)", "ur5 (4)"]):
@@ -204,7 +204,7 @@ def test_robots_that_were_given_several_times_are_told_apart_by_number() -> None
 
 
 @pytest.mark.parametrize(("before", "after"), [(0, 1), (1, 0), (1, 3), (2, 1), (2, 2), (0, 0)])
-def test_findings_of_one_code_count_with_their_other_places_and_notes_do_not(before: int, after: int) -> None:
+def test_merged_findings_count_separately_and_notes_do_not_count(before: int, after: int) -> None:
     old: Any = arms()
     new = copy.deepcopy(old)
     finding = {"code": "URDF999", "severity": "warning", "also": []}

@@ -1,4 +1,4 @@
-"""The history of several reports: its order, its robots, its changes, and the files that cannot be used."""
+"""The history of several reports: order, robots, changes, and files that cannot be used."""
 
 import json
 import os
@@ -23,13 +23,13 @@ def put(path: Path, report: Document) -> Path:
 
 @pytest.fixture
 def month(tmp_path: Path) -> Path:
-    """A folder with eight runs, the latest with the first name."""
+    """A folder with eight reports; the order of the names is opposite to the order of the runs."""
     for i, report in enumerate(reversed(months_runs())):
         put(tmp_path / f"{i}.json", report)
     return tmp_path
 
 
-def test_runs_are_ordered_by_their_start_and_a_copy_is_counted_once(month: Path) -> None:
+def test_runs_are_ordered_by_start_and_a_copy_counts_once(month: Path) -> None:
     found = history([month])
     assert [run["started"][8:10] for run in found.runs] == [f"{day:02}" for day in range(1, 9)]
     assert [Path(run["file"]).stem for run in found.runs] == list("76543210")
@@ -41,7 +41,7 @@ def test_runs_are_ordered_by_their_start_and_a_copy_is_counted_once(month: Path)
     assert found.exit_code == 0
 
 
-def test_each_robot_has_a_point_for_each_run_that_has_it(month: Path) -> None:
+def test_a_robot_has_a_point_for_each_run_that_contains_it(month: Path) -> None:
     found = history([month])
     assert {name: marks(found, points) for name, points in found.robots.items()} == {
         "panda": "✓✓✓✓✗✓✓✓", "ur5": "✓✓✓✓✓✓✓✓", "broken.urdf": "····✗···",
@@ -53,17 +53,17 @@ def test_each_robot_has_a_point_for_each_run_that_has_it(month: Path) -> None:
     assert [point["warnings"] for point in found.robots["panda"]] == [0, 0, 28, 28, 0, 0, 0, 0]
 
 
-def test_changes_name_their_run_and_regressions_come_first(month: Path) -> None:
+def test_changes_have_the_index_of_the_run_and_regressions_come_first(month: Path) -> None:
     found = history([month])
-    told = [(run, change["robot"], change["what"], change["regression"]) for run, change in changes(found)]
-    assert told[0] == (5, "broken.urdf", "robot", True)
-    assert (5, None, "version of pin", False) in told
-    assert (5, "ur5", "joint shoulder_pan_joint, axis", False) in told
-    assert (4, "panda", "verdict", True) in told
-    assert [run for run, *_ in told] == sorted((run for run, *_ in told), reverse=True)
+    rows = [(run, change["robot"], change["what"], change["regression"]) for run, change in changes(found)]
+    assert rows[0] == (5, "broken.urdf", "robot", True)
+    assert (5, None, "version of pin", False) in rows
+    assert (5, "ur5", "joint shoulder_pan_joint, axis", False) in rows
+    assert (4, "panda", "verdict", True) in rows
+    assert [run for run, *_ in rows] == sorted((run for run, *_ in rows), reverse=True)
 
 
-def test_a_terminal_shows_runs_robots_and_changes_the_latest_only_unless_all_are_asked_for(
+def test_a_terminal_shows_the_latest_runs_and_changes_or_all(
     month: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     done = good("report history", str(month))
@@ -97,11 +97,8 @@ def test_a_store_is_a_run(tmp_path: Path) -> None:
     assert found.exit_code == 0
 
 
-def test_a_broken_file_or_a_pipe_is_named_and_the_rest_is_shown(month: Path) -> None:
+def test_unusable_files_are_listed_and_the_other_files_are_used(month: Path) -> None:
     os.mkfifo(month / "pipe.json")
-    found = history([month])
-    unusable = [(Path(one["file"]).name, one["reason"][:18]) for one in found.unusable]
-    assert unusable == [("pipe.json", "not a regular file")]
     (month / "broken.json").write_text(json.dumps(arms())[:500])
     (month / "other.json").write_text('{"schema": "other/1"}')
     edited = arms()
@@ -109,13 +106,17 @@ def test_a_broken_file_or_a_pipe_is_named_and_the_rest_is_shown(month: Path) -> 
     put(month / "edited.json", edited)
     done = urdfkin("report history", str(month))
     assert done.code == 2
-    assert f"not used: {month / 'broken.json'}: not a JSON file" in done.text
-    assert f"not used: {month / 'other.json'}: not a file with the layout urdfkin-validation/1" in done.text
-    assert f"not used: {month / 'edited.json'}: the report contradicts itself" in done.text
+    for name, reason in (
+        ("pipe", "not a regular file"),
+        ("broken", "not a JSON file"),
+        ("other", "not a file with the layout urdfkin-validation/1"),
+        ("edited", "the report contradicts itself"),
+    ):
+        assert f"not used: {month / name}.json: {reason}" in done.text
     assert "8 runs;" in done.text
 
 
-def test_the_numbers_and_sizes_of_reports_have_limits(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_and_size_of_reports_are_limited(month: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 7)
     with pytest.raises(InputError, match="more than 7 files"):
         history([month])
@@ -149,7 +150,7 @@ def test_the_page_has_no_script_no_address_and_no_hostile_element(tmp_path: Path
     assert "default-src &#39;none&#39;" in page or "default-src 'none'" in page
 
 
-def test_the_page_is_written_by_its_suffix_and_follows_the_latest_verdict(tmp_path: Path) -> None:
+def test_the_suffix_selects_the_page_whose_colour_is_that_of_the_latest_verdict(tmp_path: Path) -> None:
     good, bad = put(tmp_path / "a.json", run_on(1, arms())), put(tmp_path / "b.json", run_on(2, failing()))
     pages = []
     for name, words in (("bad", [good, bad]), ("good", [good])):

@@ -1,4 +1,4 @@
-"""The page is whole in itself, says everything, escapes everything, and stays small."""
+"""The HTML page is self-contained, complete and small, and escapes every name."""
 
 import copy
 import hashlib
@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.markup import Page
+from tests.reading import present
 from tests.report.documents import arms, failing, hostile
 from urdfkin.report import html as html_module
 from urdfkin.report import pages
@@ -31,7 +32,7 @@ def page(name: str) -> Page:
     return Page(as_html({"arms": arms, "hostile": hostile, "failing": failing}[name]()))
 
 
-def test_nothing_refers_to_anywhere_else_and_every_id_stands_once() -> None:
+def test_a_page_refers_to_no_other_file_and_each_id_is_unique() -> None:
     for tag, attributes in page("arms").elements:
         for name in ("src", "href", "xlink:href", "action", "data", "poster", "srcset"):
             value = attributes.get(name)
@@ -49,7 +50,7 @@ def test_nothing_refers_to_anywhere_else_and_every_id_stands_once() -> None:
         assert attributes.get("aria-labelledby") in (*ids, None, ""), attributes
 
 
-def test_it_says_what_was_checked_by_which_versions_and_how_to_repeat_it() -> None:
+def test_a_page_has_checks_versions_and_the_command_that_repeats_the_run() -> None:
     text = page("arms").text
     for words in (
         "Verified against Pinocchio", "seed 0", "urdfkin validate panda ur5 --samples 6 --seed 0", "numpy",
@@ -59,7 +60,7 @@ def test_it_says_what_was_checked_by_which_versions_and_how_to_repeat_it() -> No
         assert words in text, words
 
 
-def test_what_failed_is_said_in_words_and_its_reason_comes_first() -> None:
+def test_a_page_states_failures_in_words_and_the_reason_first() -> None:
     text = page("failing").text
     assert "Not verified against Pinocchio" in text
     assert "1 of 3 robots disagrees, 1 of 3 robots has bad input." in text
@@ -71,7 +72,7 @@ def test_what_failed_is_said_in_words_and_its_reason_comes_first() -> None:
     assert computation.index("bad input") < computation.index("results lie outside")
 
 
-def test_tables_agree_on_the_page_as_far_as_their_share_of_the_bound_allows() -> None:
+def test_tables_agree_on_the_page_if_the_ratio_to_the_bound_is_at_most_one() -> None:
     document = copy.deepcopy(arms())
     chains = [chain for robot in document["robots"] for chain in robot["chains"]]
     assert as_html(document).count("Both tables agree with Pinocchio") == len(chains) > 0
@@ -82,7 +83,7 @@ def test_tables_agree_on_the_page_as_far_as_their_share_of_the_bound_allows() ->
     assert text.count("The tables disagree with Pinocchio") == len(chains) - 1
 
 
-def test_plots_and_pictures_have_words_for_who_cannot_see_them() -> None:
+def test_plots_pictures_and_tables_are_accessible() -> None:
     arms_page = page("arms")
     plots = [a for a in arms_page.all("svg") if a.get("class") == "plot"]
     assert len(plots) == 2
@@ -95,14 +96,14 @@ def test_plots_and_pictures_have_words_for_who_cannot_see_them() -> None:
     assert all(a.get("scope") in ("row", "col") for a in arms_page.all("th"))
 
 
-def test_a_page_without_matplotlib_lacks_the_plots_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_without_matplotlib_states_that_plots_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(html_module, "installed", lambda: False)
     text = as_html(arms())
     assert "pip install &#39;matplotlib&gt;=3.10.7&#39;" in text
     assert 'class="plot"' not in text
 
 
-def test_the_same_document_gives_the_same_page_and_a_robot_costs_little() -> None:
+def test_equal_documents_give_equal_pages_and_a_robot_adds_little() -> None:
     assert as_html(arms()) == as_html(arms())
     two, one = arms(), arms()
     del one["robots"][0]
@@ -122,11 +123,11 @@ def test_the_page_of_all_68_robots_is_at_most_10_megabytes() -> None:
     ("radians", "text"),
     [(0.0, "0"), (1.5707963267948966, "π/2"), (-3.141592653589793, "−π"), (1.5708, "1.5708")],
 )
-def test_only_what_is_a_fraction_of_pi_to_the_last_bit_is_shown_as_one(radians: float, text: str) -> None:
+def test_only_an_exact_fraction_of_pi_is_shown_with_pi(radians: float, text: str) -> None:
     assert angle(radians) == text
 
 
-def test_the_bundled_library_is_the_one_that_was_built() -> None:
+def test_the_bundled_library_has_the_published_checksum_and_version() -> None:
     lines = (ASSETS / "three.sha256").read_text().splitlines()
     sums = {name: digest for digest, name in map(str.split, lines)}
     assert set(sums) == {"three.min.js", "three.LICENSE.txt"}
@@ -137,24 +138,22 @@ def test_the_bundled_library_is_the_one_that_was_built() -> None:
     assert f"three.js {named['dependencies']['three']}, MIT licence" in head
 
 
-def test_what_failed_comes_first_stands_open_and_has_the_line_that_computes_it_again() -> None:
-    document = failing()
-    page = as_html(document)
-    heads = re.findall(r'<details class="robot" id="robot-(\d+)" data-verdict="([^"]*)"[^>]*?( open)?>', page)
-    order = [VERDICTS.index(verdict) for _, verdict, _ in heads]
+def test_failed_robots_come_first_are_open_and_have_the_command_that_computes_the_result_again() -> None:
+    text = as_html(failing())
+    heads = re.findall(r'<details class="robot" id="robot-\d+" data-verdict="([^"]*)"[^>]*?( open)?>', text)
+    order = [VERDICTS.index(verdict) for verdict, _ in heads]
     assert order == sorted(order)
     assert order[0] < order[-1]
-    assert all(bool(opened) == (verdict != "verified") for _, verdict, opened in heads)
-    rows = re.findall(r'<tr data-verdict="([^"]*)"', page)
-    assert rows == [verdict for _, verdict, _ in heads]
-    text = as_html(failing())
+    assert all(bool(opened) == (verdict != "verified") for verdict, opened in heads)
+    rows = re.findall(r'<tr data-verdict="([^"]*)"', text)
+    assert rows == [verdict for verdict, _ in heads]
     panda = text[text.index('data-verdict="disagrees"') :]
     failures = panda.index("Results outside their bound")
     assert failures < panda.index("Distributions against the bound")
     assert failures < panda.index("urdfkin velocity panda --frame") < panda.index("<h3>Checks</h3>")
 
 
-def test_one_configuration_joints_that_move_and_errors_are_counted_as_such() -> None:
+def test_counts_of_configurations_moving_joints_and_errors_are_right() -> None:
     document = failing()
     robot = next(robot for robot in document["robots"] if robot["findings"])
     first = robot["findings"][0]
@@ -168,10 +167,9 @@ def test_one_configuration_joints_that_move_and_errors_are_counted_as_such() -> 
     assert "1 random configuration for each robot" in text
 
 
-def test_the_heat_maps_colour_is_the_share_of_the_bound() -> None:
+def test_the_colour_of_the_heat_map_depends_on_the_ratio_to_the_bound() -> None:
     robot = arms()["robots"][1]
-    model = robot["model"]
-    assert model is not None
+    model = present(robot["model"])
     _, rows = pages.heat_map(robot, model)
     edges = (0.0, *pages.HEAT_STEPS)
     largest = max(check["share_of_bound"] or 0.0 for check in robot["checks"])
@@ -185,12 +183,12 @@ def test_the_heat_maps_colour_is_the_share_of_the_bound() -> None:
 
 
 def banner(document: Document) -> list[str]:
-    """Return the two answers of the banner: of the computation and of the model."""
+    """Return the two texts of the banner, about the computation and about the model."""
     sections = re.findall(r'<section class="verdict .*?</section>', as_html(document), re.DOTALL)
     return [" ".join(re.sub("<[^>]+>", " ", section).split()) for section in sections]
 
 
-def test_the_banner_answers_for_the_computation_and_for_the_model() -> None:
+def test_the_banner_states_the_results_of_the_computation_and_of_the_model() -> None:
     document = arms()
     computation, model = banner(document)
     assert computation.startswith("Does urdfkin compute right? Verified against Pinocchio")
@@ -204,7 +202,7 @@ def test_the_banner_answers_for_the_computation_and_for_the_model() -> None:
     assert "Errors in 1 of 2 files 1 error, 2 warnings. Show the first" in banner(document)[1]
 
 
-def test_each_error_of_a_file_is_on_the_page_once(tmp_path: Path) -> None:
+def test_each_error_in_a_file_is_on_the_page_once(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="a"/><joint name="j"/></robot>')
     document = validate([str(bad)], samples=1).as_dict()
@@ -215,12 +213,11 @@ def test_each_error_of_a_file_is_on_the_page_once(tmp_path: Path) -> None:
     assert as_html(document).count("another link has this name") == 1
 
 
-def test_a_value_that_is_not_finite_has_a_mark_in_the_figure_and_colours_its_own_cell() -> None:
+def test_a_value_that_is_not_finite_has_a_mark_in_the_plot_and_in_its_cell_of_the_heat_map() -> None:
     document = failing()
     robot = next(robot for robot in document["robots"] if robot["verdict"] == "disagrees")
     assert "not finite" in distributions(robot, document["histogram_edges"], "p0-")
-    assert robot["model"] is not None
-    _, rows = pages.heat_map(robot, robot["model"])
+    _, rows = pages.heat_map(robot, present(robot["model"]))
     cells = [cell for _, row in rows for cell in row]
     red = [cell.step > len(pages.HEAT_STEPS) for cell in cells]
     assert red == [cell.text == "not finite" for cell in cells]

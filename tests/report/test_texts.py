@@ -1,4 +1,4 @@
-"""A report in Markdown and on a terminal: whole tables, no name that acts, never too long or too wide."""
+"""Reports in Markdown and on a terminal: complete tables, escaped names, limited length and width."""
 
 import copy
 import io
@@ -23,7 +23,7 @@ def rendered(markdown: str) -> str:
     return str(MarkdownIt("commonmark", {"html": True}).enable("table").render(markdown))
 
 
-def test_failures_come_first_in_markdown_and_a_good_run_has_the_line_that_repeats_it() -> None:
+def test_failures_come_first_in_markdown_and_the_command_repeats_the_run() -> None:
     html = rendered(as_markdown(arms()))
     assert html.count("<tr>") == 3
     assert "✅ Verified against Pinocchio" in html
@@ -35,7 +35,7 @@ def test_failures_come_first_in_markdown_and_a_good_run_has_the_line_that_repeat
     assert "urdfkin velocity panda --frame" in markdown
 
 
-def test_names_and_prose_stay_such_in_markdown_and_a_fence_is_longer_than_what_it_holds() -> None:
+def test_names_and_texts_are_escaped_in_markdown_and_a_fence_is_longer_than_backticks_inside() -> None:
     assert markdown_code(HOSTILE_ROBOT) in as_markdown(hostile())
     shown = rendered(markdown_text("a|b `c` *d* <e> @f #g [h](i)")).strip().replace("\u2060", "")
     assert shown == "<p>a|b `c` *d* &lt;e&gt; @f #g [h](i)</p>"
@@ -43,7 +43,7 @@ def test_names_and_prose_stay_such_in_markdown_and_a_fence_is_longer_than_what_i
 
 
 @pytest.mark.slow
-def test_a_thousand_robots_still_fit_a_comment_and_the_rest_is_counted() -> None:
+def test_a_comment_on_a_thousand_robots_is_limited_and_counts_the_omitted_robots() -> None:
     document = arms()
     document["robots"] = [copy.deepcopy(document["robots"][0]) for _ in range(1000)]
     markdown = as_markdown(document)
@@ -64,12 +64,12 @@ def one(document: Document) -> Document:
 
 @pytest.mark.parametrize("width", [80, 100, 140])
 @pytest.mark.parametrize("make", [arms, failing, hostile, lambda: one(arms())])
-def test_no_line_but_a_replay_line_is_wider_than_the_terminal(make: Any, width: int) -> None:
+def test_only_commands_are_wider_than_the_terminal(make: Any, width: int) -> None:
     lines = printed(make(), width).splitlines()
     assert [line for line in lines if len(line) > width and "urdfkin" not in line] == []
 
 
-def test_without_a_terminal_there_is_no_escape_no_markup_and_no_colour() -> None:
+def test_text_without_a_terminal_has_no_escape_sequence_and_no_markup() -> None:
     assert "\x1b" not in printed(arms(), 80)
     named = arms()
     named["robots"][0]["source"] = "[bold red]name[/]"
@@ -82,7 +82,7 @@ def test_without_a_terminal_there_is_no_escape_no_markup_and_no_colour() -> None
     assert "regressions" in text.splitlines()[-1]
 
 
-def test_80_columns_have_a_row_and_100_a_column_for_each_quantity() -> None:
+def test_with_80_columns_quantities_are_rows_and_with_100_columns_they_are_columns() -> None:
     text = printed(arms(), 80)
     for words in ("panda", "ur5", "Jacobian rate", "acceleration", "data.J", "verified"):
         assert words in text
@@ -91,7 +91,7 @@ def test_80_columns_have_a_row_and_100_a_column_for_each_quantity() -> None:
         assert word in head
 
 
-def test_failures_come_with_their_replay_line_and_reasons_are_told() -> None:
+def test_failures_have_a_command_and_a_reason() -> None:
     text = printed(failing(), 80)
     assert "urdfkin velocity panda --frame" in text
     assert "broken.urdf: bad input" in text

@@ -1,4 +1,4 @@
-"""A line is smooth and its rates are its derivatives; a table is read exactly or refused with its place."""
+"""The velocities of a line are its derivatives; a table is read exactly or rejected with the place."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_line_runs_from_rest_to_rest_and_halfway_at_half_time(robot: Robot) ->
 
 
 def test_a_lines_rates_are_its_derivatives(robot: Robot) -> None:
-    """Fourth-order differences of a quintic are exact up to h^4 times its fifth derivative."""
+    # The error of fourth-order differences of a quintic is h^4 times the fifth derivative.
     x = line(robot, robot.neutral(), END, 1.5, 401)
     h = x.t[1]
     for values, rates in ((x.q, x.v), (x.v, x.a)):
@@ -110,7 +110,7 @@ def test_a_table_without_rates_is_differentiated(robot: Robot, tmp_path: Path) -
         (lambda text: "\n".join(text.splitlines()[:3]), "at least 3 samples"),
     ],
 )
-def test_a_spoiled_table_is_refused_by_name(
+def test_a_spoiled_table_is_refused_by_name_and_a_missing_one_too(
     spoil: object, message: str, robot: Robot, tmp_path: Path
 ) -> None:
     path = write(tmp_path / "x.csv", robot, columns_of(robot, rates=False))
@@ -118,11 +118,9 @@ def test_a_spoiled_table_is_refused_by_name(
     path.write_text(spoil(path.read_text()))
     with pytest.raises(InputError, match=message):
         read_trajectory(robot, path)
-
-
-def test_a_missing_table_says_so(robot: Robot, tmp_path: Path) -> None:
+    path.unlink()
     with pytest.raises(SourceError, match="cannot be read"):
-        read_trajectory(robot, tmp_path / "none.csv")
+        read_trajectory(robot, path)
 
 
 @pytest.mark.parametrize("samples", [41, 100, 1001])
@@ -185,7 +183,7 @@ def test_times_that_are_too_large_for_their_steps_are_told(robot: Robot, tmp_pat
     ],
 )
 def test_a_heading_may_end_with_a_unit(heading: str, value: float) -> None:
-    """A joint may itself have a name that ends like a unit: `wheel_deg` is a name here."""
+    # The name of the joint `wheel_deg` ends like a unit.
     units = {"t": "s", "elbow": "rad", "lift": "m", "wheel_deg": "rad"}
     units |= {"v:elbow": "rad/s", "a:elbow": "rad/s^2"}
     (found,) = read_columns(f"{heading}\n30\n", "x.csv", "q", [], list(units), units=units).values()

@@ -1,6 +1,6 @@
-"""Robots that no catalogue has, as URDF text: every joint kind everywhere, in odd company.
+"""URDF texts of unusual robots, with joints of every kind at unusual places.
 
-Numbers are printed with six digits, as CAD exporters do: angles are nearly, not quite, right ones.
+Numbers have six digits, like those of CAD exporters, so right angles are only approximate.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _ODD_ANGLES = (0.0, 1.5708, -1.5708, 3.14159, 0.785398, -0.001047, 1e-6, 2.0944)
 
 @dataclass
 class Urdf:
-    """Builds a URDF joint by joint; link `links[0]` is the root."""
+    """A URDF that is built joint by joint, with the root link `links[0]`."""
 
     name: str
     seed: int
@@ -38,7 +38,7 @@ class Urdf:
         axis: str | None = None,
         origin: str | None = None,
     ) -> str:
-        """Hang a joint and its child link from link `parent` (the last one if None); returns its name."""
+        """Add a joint with a child link to link `parent` (None: the last link); return the joint's name."""
         number = len(self.joints)
         joint, link = joint or f"joint_{number}", link or f"link_{number}"
         parts = [
@@ -74,7 +74,6 @@ class Urdf:
 
     @property
     def text(self) -> str:
-        """The whole document."""
         links = "".join(f"<link name={quoteattr(link)}/>" for link in self.links)
         return f"<robot name={quoteattr(self.name)}>{links}{''.join(self.joints)}</robot>"
 
@@ -91,7 +90,7 @@ def _chain(name: str, seed: int, kinds: Sequence[str]) -> str:
 
 
 def _hand(name: str, seed: int, *, sliding: bool = False) -> str:
-    """Five fingers of eight joints: 40 joints, of which 10 lead and 30 follow, with odd rules."""
+    """Return five fingers of eight joints, 30 of which mimic one of the other 10 by a random rule."""
     urdf, rng = Urdf(name, seed), np.random.default_rng(seed)
     for finger in range(5):
         parent, leaders = 0, list[str]()
@@ -110,8 +109,8 @@ def _hand(name: str, seed: int, *, sliding: bool = False) -> str:
     return urdf.text
 
 
-def _random_tree(seed: int) -> str:
-    """Fourteen joints of every kind hung anywhere, some following one that came before."""
+def random_tree(seed: int) -> str:
+    """Return fourteen joints of every kind at random links; some mimic an earlier joint."""
     urdf, rng = Urdf(f"tree_{seed}", seed), np.random.default_rng(seed + 1000)
     kinds = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
     leaders: list[str] = []
@@ -135,7 +134,7 @@ def _names() -> str:
 
 
 def _same_names() -> str:
-    """Joint `wrist` carries link `wrist`; joint `elbow` and link `elbow` are two different places."""
+    """Return a robot with a joint and a child link `wrist`, and an unrelated joint and link `elbow`."""
     urdf = Urdf("same", 12)
     urdf.add("revolute", joint="wrist", link="wrist")
     urdf.add("revolute", joint="elbow", link="forearm")
@@ -144,7 +143,7 @@ def _same_names() -> str:
 
 
 def _default_everything() -> str:
-    """Nothing said that need not be: no origin, no axis, no rpy, no limits, axes that are no unit vectors."""
+    """Return a robot without optional elements and attributes, and with axes that are not unit vectors."""
     urdf = Urdf("terse", 13)
     urdf.add("continuous", axis="", origin="")
     urdf.add("continuous", axis='<axis xyz="0 3 4"/>', origin='<origin xyz="0.1 0.2 0.3"/>')
@@ -163,7 +162,7 @@ def _followers_of_followers() -> str:
 
 
 def _sizes() -> str:
-    """A kilometre, a micrometre and half a turn of slide one after the other."""
+    """Return a chain with origins of kilometres and of micrometres, and with angles of many turns."""
     urdf = Urdf("sizes", 15)
     urdf.add("revolute", origin='<origin xyz="1000 -2000 500" rpy="1.5708 0 0"/>')
     urdf.add("revolute", origin='<origin xyz="1e-06 2e-06 0" rpy="0 1e-06 0"/>')
@@ -174,7 +173,7 @@ def _sizes() -> str:
 
 _SIX = ("revolute",) * 6
 
-_MAKERS: dict[str, Callable[[], str]] = {
+_TEXTS: dict[str, Callable[[], str]] = {
     "planar_root": lambda: _chain("planar_root", 1, ("planar", *_SIX)),
     "floating_root": lambda: _chain("floating_root", 2, ("floating", *_SIX)),
     "planar_and_floating_in_the_middle": lambda: _chain(
@@ -196,17 +195,11 @@ _MAKERS: dict[str, Callable[[], str]] = {
     "default_everything": _default_everything,
     "followers_of_followers": _followers_of_followers,
     "sizes": _sizes,
-    **{f"tree_{seed}": partial(_random_tree, seed) for seed in range(12)},
+    **{f"tree_{seed}": partial(random_tree, seed) for seed in range(12)},
 }
 
-NAMES = tuple(_MAKERS)
+NAMES = tuple(_TEXTS)
 
 
 def urdf_of(name: str) -> str:
-    """The text of one of them."""
-    return _MAKERS[name]()
-
-
-def random_tree(seed: int) -> str:
-    """Another tree for each seed."""
-    return _random_tree(seed)
+    return _TEXTS[name]()

@@ -1,4 +1,4 @@
-"""Every robot of the catalogue: found, loaded, laid out, posed and computed as Pinocchio does."""
+"""Every robot of the catalogue has the frames, layout, poses and results of Pinocchio."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import pinocchio
 import pinocchio as pin
 import pytest
 
 import urdfkin
-from tests.robots.against_pinocchio import ask, model_of
+from tests.robots.against_pinocchio import assert_agrees, model_of
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import JointKind
 from urdfkin.robot import Robot
@@ -23,11 +22,11 @@ from urdfkin.urdf.catalogue import catalogue, examples
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.verify.quantities import QUANTITIES
 
-#: Pinocchio 4.1 builds no model with mimic=True of these: it does not find their leaders.
+#: Robots of which Pinocchio 4.1 builds no model with mimic=True, because it does not find the mimicked
+#: joints.
 WITHOUT_MIMIC_MODEL = frozenset({"alex_psyonic_hands", "romeo", "talos", "talos_box"})
 
-
-#: The first of each family, an arm with a follower and a whole humanoid; the others are marked slow.
+#: The first robot of each family, an arm with a mimic joint, and a humanoid; the tests of others are slow.
 QUICK = {"panda", "talos", *{catalogue()[name].family: name for name in reversed(examples())}.values()}
 
 
@@ -50,7 +49,7 @@ def test_the_ends_of_an_enclosure_are_neighbouring_doubles(robot: Robot) -> None
     v, a = np.random.default_rng(1).standard_normal((2, robot.nv))
     proof = robot.enclose(robot.sample(1, 1)[0], v, a, robot.link_frames[-1])
     for one in (proof.placement, proof.velocity, proof.acceleration, proof.jacobian, proof.jacobian_rate):
-        # Where the true number is a double by a sum that intervals cannot see through, two steps; or is 0.
+        # A true number that is itself a double may lie between the ends, which are then two steps apart.
         few = one.upper <= np.nextafter(np.nextafter(one.lower, np.inf), np.inf)
         assert (few | ((one.width < 1e-28) & one.contains(np.zeros_like(one.width)))).all()
 
@@ -97,16 +96,9 @@ def test_every_quantity_agrees_on_many_samples(robot: Robot) -> None:
 def test_a_robots_calls_agree_when_pinocchio_is_asked_directly(robot: Robot) -> None:
     generator = np.random.default_rng(2)
     q, v, a = robot.sample(1, 2)[0], generator.normal(size=robot.nv), generator.normal(size=robot.nv)
-    frame = robot.tree.frame_name(robot.tree.frame_link(robot.tip_frame))
-    body = robot.tree.links[robot.tree.frame_link(frame)]
+    link = f"link:{robot.tree.links[robot.tree.frame_link(robot.tip_frame)]}"
     for reference in Reference:
-        theirs = ask(robot, q, v, a, body, reference)
-        room = 1e-12 * (1.0 + np.abs(theirs.acceleration).max())
-        assert np.abs(robot.placement(q, frame) - theirs.placement).max() < room
-        assert np.abs(robot.velocity(q, v, frame, reference) - theirs.velocity).max() < room
-        assert np.abs(robot.jacobian(q, frame, reference) - theirs.jacobian).max(initial=0.0) < room
-        ours = robot.acceleration(q, v, a, frame, reference)
-        assert np.abs(ours - theirs.acceleration).max() < 10 * room
+        assert_agrees(robot, q, v, a, link, reference)
 
 
 def test_joints_rates_and_frames_have_pinocchios_order_and_names(robot: Robot) -> None:
@@ -196,10 +188,10 @@ def test_an_unknown_name_offers_the_nearest_ones() -> None:
     assert "panda" in caught.value.nearest
 
 
-# Named poses of the catalogue, held against Pinocchio's limits and the SRDF files of example-robot-data.
+# -- named poses of the catalogue, compared with Pinocchio's limits and the SRDF files of example-robot-data
+# ---
 
-
-#: The SRDF's pose that `ready` is, for each robot that has one.
+#: Name of the SRDF's pose that the pose `ready` of a robot equals.
 SRDF = {
     "a1": "standing", "anymal_kinova": "standing_with_arm_up", "b1": "standing",
     "b1_z1": "standing_with_arm_home", "centauro": "homing_nominal", "go1": "standing", "go2": "standing",
@@ -218,7 +210,7 @@ def test_ready_lies_within_every_limit_of_every_robot() -> None:
     for name in catalogue():
         robot = urdfkin.load(name, verify=False)
         outside[name] = robot.limit_violations("ready")
-        # Of what is at 0 in neutral, only that moves which may not be there, but for poses of their own.
+        # `ready` moves only the joints that may not be at 0, except in poses from SRDF files.
         if not catalogue()[name].poses:
             moved = np.flatnonzero(robot.poses["ready"] != robot.neutral())
             assert len(moved) <= len(robot.limit_violations("neutral")), name
@@ -229,7 +221,7 @@ def test_ready_lies_within_every_limit_of_every_robot() -> None:
 @pytest.mark.parametrize("name", SRDF)
 def test_pinocchio_finds_ready_within_its_limits_and_neutral_outside(name: str) -> None:
     robot = urdfkin.load(name, verify=False)
-    model = pinocchio.buildModelFromUrdf(str(catalogue()[name].path))
+    model = pin.buildModelFromUrdf(str(catalogue()[name].path))
 
     def within(pose: str) -> bool:
         q = robot.to_pinocchio(robot.poses[pose])
@@ -253,7 +245,7 @@ def test_ready_is_the_srdfs_pose(name: str) -> None:
     for state in states:
         says = {joint.get("name", ""): joint.get("value", "").split() for joint in state.iter("joint")}
         of_ours = {joint: float(x[0]) for joint, x in says.items() if joint in ready and len(x) == 1}
-        if name == "kinova":  # its limits are a turn further than its pose
+        if name == "kinova":  # the limits differ from the pose by a turn
             of_ours["j2s6s200_joint_3"] = round(of_ours["j2s6s200_joint_3"] + 2.0 * np.pi, 4)
         found.append(
             all(ready[joint] == x for joint, x in of_ours.items()) and len(of_ours) >= len(ready) - 3

@@ -12,7 +12,7 @@ import pytest
 import urdfkin
 from tests.urdfs import loaded
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.tree import FloatArray, KinematicTree, freed, with_tilts
+from urdfkin.model.tree import FloatArray, KinematicTree, with_tilts, without_mimic_rules
 from urdfkin.robot import Robot
 from urdfkin.urdf.lint import Severity, check
 from urdfkin.verify.oracle import QueryBatch
@@ -160,7 +160,7 @@ def test_a_slip_larger_than_the_tilts_allow_is_caught_behind_them_and_any_slip_b
 def test_the_tilt_is_read_from_the_text_and_not_from_the_tree_under_test() -> None:
     robot = loaded(text("revolute", AXES[2], near(1e-13, 1)))
     assert [round(joint.tilt, 16) for joint in robot.tree.joints] == [0.0, 1e-13]
-    assert freed(robot.tree).joints[1].tilt > 0.0
+    assert without_mimic_rules(robot.tree).joints[1].tilt > 0.0
     assert pickle.loads(pickle.dumps(robot)).tree.joints[1].tilt == robot.tree.joints[1].tilt
 
 

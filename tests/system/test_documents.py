@@ -1,4 +1,4 @@
-"""All documents share one header; their schemas are generated from types, which also judge what is read."""
+"""Documents share one header; schemas are generated from the types that check documents from files."""
 
 import json
 from functools import cache
@@ -44,7 +44,6 @@ def _made(name: str) -> str:
 
 
 def made(layout: DocumentKind[Any]) -> Any:
-    """A document of a layout; a fresh copy each time."""
     return json.loads(_made(layout.name))
 
 

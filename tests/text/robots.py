@@ -28,7 +28,6 @@ HALF_PI = mp.pi / 2
 
 @cache
 def robot(name: str) -> Robot:
-    """One of the text's robots; every result is checked against Pinocchio as well."""
     return load(name)
 
 
@@ -68,11 +67,9 @@ class Motion:
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """The robot's table."""
         return ROWS[self.name]
 
     def coordinate(self, i: int, t: Any) -> Any:
-        """Joint i (from 1) at time t."""
         return mp.mpf(self.q[i - 1]) + mp.mpf(self.v[i - 1]) * t + mp.mpf(self.a[i - 1]) * t * t / 2
 
     def R(self, i: int) -> Callable[[Any], Any]:
@@ -139,18 +136,15 @@ class Motion:
 
 
 def motion(name: str, seed: int = 1) -> Motion:
-    """Some motion of a robot."""
     generator = np.random.default_rng(seed)
     n = len(ROWS[name])
     return Motion(name, generator.uniform(0.3, 1.4, n), generator.normal(size=n), generator.normal(size=n))
 
 
 def only(moving: Motion, i: int) -> Motion:
-    """The same with joint i alone moving."""
     unit = np.eye(len(moving.rows))[i - 1]
     return Motion(moving.name, moving.q, moving.v * unit, moving.a * unit)
 
 
 def close(found: Any, expected: Any, size: float = 1.0) -> bool:
-    """Whether two arrays differ by rounding only; `size` is that of the terms they are summed from."""
     return bool(np.abs(np.asarray(found) - expected).max() <= 32 * np.finfo(np.float64).eps * size)

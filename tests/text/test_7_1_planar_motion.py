@@ -18,7 +18,6 @@ THETA, SPEED, A1 = 0.9, -1.7, 0.8
 
 
 def endpoint(t: Any) -> Any:
-    """The tip as a point of the complex plane, a exp(i theta(t))."""
     tip = mp.mpf(A1) * mp.expj(mp.mpf(THETA) + mp.mpf(SPEED) * t)
     return column(tip.real, tip.imag)
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.high_precision import about, array, column, mp, rate, turn
-from tests.kinematics.rotation.strategies import ROUNDING
+from tests.kinematics.rotation.strategies import ROUNDING, close
 from urdfkin.kinematics.rotation import (
     angular_velocity_about,
     circular_velocity,
@@ -33,11 +33,6 @@ def R_z(t: Any) -> Any:
 
 def R_k(t: Any) -> Any:
     return about(column(2, -1, 2), mp.mpf(THETA) + t * mp.mpf(SPEED))
-
-
-def close(found: Any, expected: Any, room: float = 4.0) -> bool:
-    """Whether two arrays of numbers of size one differ by rounding only."""
-    return bool(np.abs(np.asarray(found) - expected).max() <= room * ROUNDING)
 
 
 # -- the one-link manipulator in space ---------------------------------------------------------------

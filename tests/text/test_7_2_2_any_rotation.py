@@ -1,12 +1,13 @@
 """Sections 7.2.2 and 7.2.3: any moving rotation, sums of angular velocities; 7.35 to 7.50, example 7.2."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from tests.high_precision import about, angular_velocity, array, column, mp, rate, turn
-from tests.kinematics.rotation.strategies import ROUNDING
+from tests.kinematics.rotation import strategies
 from urdfkin.kinematics.bodies import MovingFrame, compose, point_position
 from urdfkin.kinematics.rotation import (
     add_angular_velocities,
@@ -19,6 +20,8 @@ from urdfkin.kinematics.rotation import (
     skew,
     turning_vector_rate,
 )
+
+close = partial(strategies.close, room=8.0)
 
 T = 0.8
 P_1 = np.array([0.3, 1.1, -0.7])
@@ -39,10 +42,6 @@ def R_23(t: Any) -> Any:
 
 def now(R: Callable[[Any], Any]) -> Any:
     return array(R(mp.mpf(T)))
-
-
-def close(found: Any, expected: Any, room: float = 8.0) -> bool:
-    return bool(np.abs(np.asarray(found) - expected).max() <= room * ROUNDING)
 
 
 W_01, W_12, W_23 = (array(angular_velocity(R, T)) for R in (R_01, R_12, R_23))

@@ -1,13 +1,16 @@
 """Section 7.3: points in moving frames, equations 7.58 to 7.61."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from tests.high_precision import array, column, mp, rate
-from tests.kinematics.rotation.strategies import ROUNDING
+from tests.kinematics.rotation import strategies
 from tests.moving import ORIENTATIONS, ORIGINS, T, frame
 from urdfkin.kinematics.bodies import compose, point_position, point_velocity
+
+close = partial(strategies.close, room=32.0)
 
 P = column(mp.mpf(3) / 10, mp.mpf(11) / 10, -mp.mpf(7) / 10)
 
@@ -18,10 +21,6 @@ def p_0_in_frame_1(t: Any) -> Any:
 
 def p_0_in_frame_2(t: Any) -> Any:
     return ORIGINS[0](t) + ORIENTATIONS[0](t) * (ORIGINS[1](t) + ORIENTATIONS[1](t) * P)
-
-
-def close(found: Any, expected: Any, room: float = 32.0) -> bool:
-    return bool(np.abs(np.asarray(found) - expected).max() <= room * ROUNDING)
 
 
 def test_7_58_a_point_of_frame_1_is_displaced_and_turned() -> None:

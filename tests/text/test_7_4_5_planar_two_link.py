@@ -90,11 +90,3 @@ def test_7_98_the_moment_arms_make_the_linear_rows_of_the_jacobian() -> None:
 def test_7_99_and_7_100_with_the_axes_below_it_is_the_full_velocity_jacobian() -> None:
     assert close(jacobian()[3:], np.stack((Z, Z), axis=-1))
     assert close(jacobian() @ V, np.concatenate((MOVING.vel(2), MOVING.w(2))))
-
-
-def test_all_three_derivations_agree() -> None:
-    geometric = [-A1 * V[0] * S1 - A2 * V.sum() * S12, A1 * V[0] * C1 + A2 * V.sum() * C12, 0.0]
-    recursive = tip()[:3]
-    separated = jacobian()[:3] @ V
-    assert close(recursive, geometric)
-    assert close(separated, geometric)

@@ -74,8 +74,6 @@ def test_7_114_the_jacobian_with_the_shortened_moment_arms_is_the_same() -> None
 
 
 class Counted:
-    """A number that counts multiplications."""
-
     multiplications = 0
 
     def __init__(self, value: float) -> None:
@@ -93,7 +91,6 @@ class Counted:
 
 
 def counted(x: Any) -> Any:
-    """An array of such numbers."""
     return np.vectorize(Counted, otypes=[object])(x)
 
 

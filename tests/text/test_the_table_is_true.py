@@ -40,7 +40,6 @@ ROOT = Path(__file__).parents[2]
 
 
 def resolve(function: str) -> Any:
-    """The function that "module:Class.name" names."""
     module, _, name = function.partition(":")
     found: Any = importlib.import_module(module)
     for part in name.split("."):
@@ -50,7 +49,6 @@ def resolve(function: str) -> Any:
 
 @cache
 def test_function(test: str) -> Callable[..., None]:
-    """The test that "file::name" names."""
     file, _, name = test.partition("::")
     assert (ROOT / file).is_file(), file
     module = importlib.import_module(file.removesuffix(".py").replace("/", "."))
@@ -62,7 +60,6 @@ test_function.__test__ = False  # type: ignore[attr-defined]
 
 
 def arguments(function: Callable[..., None]) -> Iterator[dict[str, Any]]:
-    """The argument sets of a test that is parametrised at most once."""
     marks = [mark for mark in getattr(function, "pytestmark", []) if mark.name == "parametrize"]
     assert len(marks) <= 1
     if not marks:
@@ -75,7 +72,6 @@ def arguments(function: Callable[..., None]) -> Iterator[dict[str, Any]]:
 
 
 def passes(test: str) -> bool:
-    """Whether a test passes with every set of its arguments."""
     function = test_function(test)
     try:
         for given in arguments(function):
@@ -151,7 +147,6 @@ _BETWEEN = re.compile(r"[\s_{}()\[\],;&\\]")
 
 
 def of_latex(latex: str) -> str:
-    """LaTeX read aloud."""
     text = re.sub(r"\\(?:begin|end)\{bmatrix\}", "", latex)
     for word, plain in _WORDS.items():
         text = text.replace(word, plain)

@@ -1,4 +1,4 @@
-"""Robots that another library holds: the same robot as from the file, or one clear line."""
+"""Objects of other libraries become the robot of their file, or are an error with the reason."""
 
 from __future__ import annotations
 
@@ -22,11 +22,9 @@ from tests.urdfs import joint, limit, loaded
 from tests.urdfs import robot as urdf
 from urdfkin import InputError, SourceError, UnknownNameError, UrdfError
 from urdfkin.errors import OracleError
-from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.verify import model_check
 
-#: Straight and forked, with axes askew, with followers, with continuous joints, with a frame without a joint.
 ROBOTS = ("panda", "talos", "ur5", "polar", "kinova")
 
 
@@ -48,7 +46,11 @@ HOLDERS: dict[str, Callable[[str], Any]] = {
 }
 
 
-def demand_the_same(one: Robot, other: Robot) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("holder", HOLDERS)
+def test_an_object_of_another_library_is_the_robot_of_its_file(holder: str, name: str) -> None:
+    one, other = loaded(file(name)), loaded(HOLDERS[holder](file(name)))
     assert other.coordinate_names == one.coordinate_names
     q, frames = one.sample(3, seed=1), one.link_frames
     np.testing.assert_allclose(other.placement(q, frames), one.placement(q, frames), atol=3e-14)
@@ -57,14 +59,7 @@ def demand_the_same(one: Robot, other: Robot) -> None:
     assert other.certificate().verified
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("holder", HOLDERS)
-def test_a_robot_that_another_library_holds_is_the_files(holder: str, name: str) -> None:
-    demand_the_same(loaded(file(name)), loaded(HOLDERS[holder](file(name))))
-
-
-def test_comments_and_instructions_of_a_tree_are_no_matter_and_findings_are_told() -> None:
+def test_comments_and_instructions_of_an_element_tree_are_ignored_and_findings_are_reported() -> None:
     text = '<?x y?><robot name="r"><!-- arm --><link name="a"/><link name="b"/></robot>'
     for tree in (etree.fromstring(text), ElementTree.fromstring(text)):
         with pytest.raises(UrdfError, match=r"<ElementTree>.*URDF411"):
@@ -72,24 +67,24 @@ def test_comments_and_instructions_of_a_tree_are_no_matter_and_findings_are_told
 
 
 @pytest.mark.parametrize("value", [1.5, "a\0b"])
-def test_a_tree_that_is_no_xml_is_one_clear_error(value: Any) -> None:
+def test_an_element_tree_that_is_no_xml_is_an_error_of_urdfkin(value: Any) -> None:
     with pytest.raises(urdfkin.UrdfkinError):
         urdfkin.load(ElementTree.Element("robot", {"name": value}))
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"type": "ball"}, {"name": None}, {"axis": np.ones(2)}, {"limit": None}, {"origin": 1}]
+    ("name", "value"),
+    [("type", "ball"), ("name", None), ("axis", np.ones(2)), ("limit", None), ("origin", 1)],
 )
-def test_a_yourdfpy_robot_that_is_no_urdf_is_one_clear_error(wrong: dict[str, Any]) -> None:
+def test_a_yourdfpy_robot_that_is_no_urdf_is_an_error_of_urdfkin(name: str, value: Any) -> None:
     robot = yourdfpys(file("polar"))
-    for name, value in wrong.items():
-        setattr(robot.robot.joints[0], name, value)
+    setattr(robot.robot.joints[0], name, value)
     with pytest.raises(urdfkin.UrdfkinError):
         urdfkin.load(robot)
 
 
 @pytest.mark.parametrize("joints", [0, 2])
-def test_a_model_without_bodies_is_held_against_its_joints(joints: int) -> None:
+def test_a_model_without_bodies_is_compared_by_its_joints(joints: int) -> None:
     model = pin.Model()
     for k in range(joints):
         model.addJoint(k, pin.JointModelRX(), pin.SE3.Random(), f"turn_{k}")
@@ -98,15 +93,14 @@ def test_a_model_without_bodies_is_held_against_its_joints(joints: int) -> None:
     assert f"{joints + 1} links agree" in made.verifier.reading
 
 
-def test_a_model_whose_workspace_would_fill_the_memory_is_not_asked() -> None:
+def test_a_model_with_320_joints_is_not_compared_because_its_data_would_fill_the_memory() -> None:
     model = pin.Model()
     for k in range(320):
         model.addJoint(k, pin.JointModelRX(), pin.SE3.Identity(), f"turn_{k}")
     assert "not compared with the model itself: nv is 320" in loaded(model).verifier.reading
 
 
-def test_an_axis_of_another_length_is_told_when_it_comes_from_yourdfpy() -> None:
-    """Yourdfpy moves such a joint twice as far; who comes from there must hear of it."""
+def test_an_axis_of_a_yourdfpy_robot_that_is_no_unit_vector_is_a_warning() -> None:
     robot = yourdfpys(file("polar"))
     slide = next(joint for joint in robot.robot.joints if joint.type == "prismatic")
     slide.axis = 2.0 * np.asarray(slide.axis)
@@ -114,22 +108,23 @@ def test_an_axis_of_another_length_is_told_when_it_comes_from_yourdfpy() -> None
         urdfkin.load(robot)
 
 
-def test_a_quaternion_that_yourdfpy_dropped_is_no_secret(tmp_path: Path) -> None:
-    """The object has neither the attribute nor the text: a finding says so, and so does the certificate."""
-    path, said = tmp_path / "r.urdf", {}
+def test_a_finding_and_the_certificate_name_a_quaternion_that_yourdfpy_may_have_ignored(
+    tmp_path: Path,
+) -> None:
+    path, texts = tmp_path / "r.urdf", {}
     for rotation in ('quat_xyzw="0 0 1 0"', 'rpy="0 0 1"', 'xyz="1 2 3"'):
         path.write_text(urdf(joint("j", "continuous", "a", "b", rotation), attributes='version="1.1"'))
         robot = urdfkin.load(yourdfpys(str(path)))
         robot.placement([0.0], "b")
-        said[rotation] = [str(f) for f in robot.findings], robot.certificate().reading
-    assert said['rpy="0 0 1"'] == ([], "")
-    assert said['xyz="1 2 3"'] == said['quat_xyzw="0 0 1 0"']
-    (finding,), reading = said['quat_xyzw="0 0 1 0"']
-    assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw: if the file has one" in finding
+        texts[rotation] = [str(f) for f in robot.findings], robot.certificate().reading
+    assert texts['rpy="0 0 1"'] == ([], "")
+    assert texts['xyz="1 2 3"'] == texts['quat_xyzw="0 0 1 0"']
+    (finding,), reading = texts['quat_xyzw="0 0 1 0"']
+    assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw, so the rotation of joint j " in finding
     assert "drops quat_xyzw; the file was not read" in reading
 
 
-def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
+def test_a_yourdfpy_robot_that_is_not_connected_is_refused() -> None:
     robot = yourdfpys(file("polar"))
     robot.robot.joints.pop()
     with pytest.raises(InputError, match="a robot must have one root link"):
@@ -141,7 +136,7 @@ def test_a_yourdfpy_robot_in_two_pieces_is_refused() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*ROBOTS, "tiago_dual", "anymal"])
-def test_a_model_is_the_robot_it_was_built_from(name: str) -> None:
+def test_a_pinocchio_model_is_the_robot_of_its_urdf(name: str) -> None:
     robot = loaded(file(name), mimic=False)
     made = loaded(pin.buildModelFromUrdf(file(name)))
     assert made.frame_names == robot.frame_names
@@ -156,15 +151,17 @@ def test_a_model_is_the_robot_it_was_built_from(name: str) -> None:
     assert "compared with the model itself" in str(made.certificate())
 
 
-def test_a_model_made_by_hand_with_frames_and_joints_in_any_order_is_held_against_itself() -> None:
+def test_a_pinocchio_model_may_have_joints_and_frames_in_any_order() -> None:
     model = pin.Model()
     model.name = "by hand"
     generator = np.random.default_rng(3)
     pin.seed(3)
+    axes = generator.standard_normal((2, 3))
+    tilted, along = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     last = model.addJoint(0, pin.JointModelPlanar(), pin.SE3.Random(), "z")
-    model.addJoint(last, pin.JointModelRevoluteUnaligned(*_unit(generator)), pin.SE3.Random(), "b")
+    model.addJoint(last, pin.JointModelRevoluteUnaligned(*tilted), pin.SE3.Random(), "b")
     last = model.addJoint(last, pin.JointModelRUBY(), pin.SE3.Random(), "a")
-    model.addJoint(last, pin.JointModelPrismaticUnaligned(*_unit(generator)), pin.SE3.Random(), "slide")
+    model.addJoint(last, pin.JointModelPrismaticUnaligned(*along), pin.SE3.Random(), "slide")
     model.addFrame(pin.Frame("tool", last, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME))
     model.addFrame(pin.Frame("tool", last, model.nframes - 1, pin.SE3.Random(), pin.FrameType.SENSOR))
     made = loaded(model)
@@ -184,14 +181,8 @@ def test_a_model_made_by_hand_with_frames_and_joints_in_any_order_is_held_agains
         np.testing.assert_allclose(made.placement(q, link), data.oMf[frame].homogeneous, atol=1e-13)
 
 
-def _unit(generator: np.random.Generator) -> list[float]:
-    axis = generator.standard_normal(3)
-    found: list[float] = (axis / np.linalg.norm(axis)).tolist()
-    return found
-
-
 @pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
-def test_a_joint_of_a_model_may_have_any_axis(kind: str) -> None:
+def test_a_joint_of_a_pinocchio_model_may_have_any_axis(kind: str) -> None:
     tilted = joint("j", kind, "b", "c", 'xyz="1 2 3"', "0 0.6 -0.8", limit())
     text = urdf(joint("i", "continuous", "a", "b", axis="1 0 0"), tilted)
     robot, made = loaded(text), loaded(pin.buildModelFromXML(text))
@@ -202,35 +193,32 @@ def test_a_joint_of_a_model_may_have_any_axis(kind: str) -> None:
     assert made.certificate().verified
 
 
-def test_a_floating_base_of_the_model_stays_one() -> None:
+def test_a_floating_base_of_a_pinocchio_model_is_a_floating_joint() -> None:
     model = pin.buildModelFromUrdf(file("a1"), pin.JointModelFreeFlyer())
     made = loaded(pin.RobotWrapper(model))
     assert (made.nq, made.nv) == (model.nq, model.nv)
     assert made.coordinate_names == loaded(file("a1"), root_joint="floating").coordinate_names
 
 
-@pytest.mark.parametrize("made", [pin.JointModelSpherical, pin.JointModelTranslation])
-def test_a_joint_that_no_urdf_has_is_told_by_its_name(made: Any) -> None:
-    model = pin.Model()
-    model.addJoint(0, made(), pin.SE3.Identity(), "wrist")
-    with pytest.raises(InputError, match="joint wrist: URDF has no equivalent of this joint"):
-        urdfkin.load(model)
-
-
-def test_a_model_with_followers_is_refused_with_the_cure() -> None:
+def test_joints_of_a_pinocchio_model_without_an_equivalent_are_refused() -> None:
+    for kind in (pin.JointModelSpherical, pin.JointModelTranslation):
+        model = pin.Model()
+        model.addJoint(0, kind(), pin.SE3.Identity(), "wrist")
+        with pytest.raises(InputError, match="joint wrist: URDF has no equivalent of this joint"):
+            urdfkin.load(model)
     with pytest.raises(InputError, match=r"mimic joint.*build the model with mimic=False"):
         urdfkin.load(pin.buildModelFromUrdf(file("panda"), mimic=True))
 
 
 @pytest.mark.parametrize("number", [(0, 1), (0, 3)], ids=["turned", "moved"])
-def test_a_reading_that_is_off_by_little_more_than_rounding_is_refused(
+def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
     number: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = model_check._placements
 
     def moved(*arguments: Any) -> Any:
         T = right(*arguments)
-        assert np.linalg.norm(T[0, -1, :3, 3]) > 0.1  # at the root nothing may differ, whatever the bound
+        assert np.linalg.norm(T[0, -1, :3, 3]) > 0.1  # at the root, the bound is zero
         T[:, -1, *number] += 3e-13
         return T
 
@@ -242,10 +230,12 @@ def test_a_reading_that_is_off_by_little_more_than_rounding_is_refused(
 @pytest.mark.parametrize(
     ("name", "root_joint"), [("ur5", None), ("kinova", None), ("a1", "floating"), ("a1", "planar")]
 )
-def test_the_model_that_comes_back_takes_the_robots_configurations(name: str, root_joint: str | None) -> None:
+def test_pinocchio_model_returns_a_new_model_for_the_robots_configurations(
+    name: str, root_joint: str | None
+) -> None:
     robot = loaded(file(name), root_joint=root_joint)
     model, again = robot.pinocchio_model(), robot.pinocchio_model()
-    assert model is not again  # what is done to one is nobody else's matter
+    assert model is not again
     q = robot.sample(1, seed=5)[0]
     data = model.createData()
     pin.framesForwardKinematics(model, data, robot.to_pinocchio(q))
@@ -253,7 +243,7 @@ def test_the_model_that_comes_back_takes_the_robots_configurations(name: str, ro
     np.testing.assert_allclose(data.oMf[frame].homogeneous, robot.placement(q, robot.tip_frame), atol=1e-13)
 
 
-def test_followers_follow_in_the_model_where_that_is_wanted() -> None:
+def test_pinocchio_model_has_mimic_joints_on_request() -> None:
     robot = urdfkin.load("panda")
     model = robot.pinocchio_model(mimic=True)
     assert model.nq == robot.nq == robot.pinocchio_model().nq - 1
@@ -276,7 +266,7 @@ def test_a_robot_that_pinocchio_refuses_has_no_model() -> None:
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package as robot_descriptions is, with one robot that is there and one that cannot be fetched."""
+    """Create a package robot_descriptions with a robot, and with descriptions that cannot be loaded."""
     folder = tmp_path / "robot_descriptions"
     folder.mkdir()
     names = ["toy_description", "far_description", "empty_description"]
@@ -301,10 +291,12 @@ def test_a_description_is_loaded_by_its_name_and_by_its_module(package: Path) ->
     sys.modules.pop("robot_descriptions")
 
 
-def test_a_description_that_is_not_there_is_told_and_nothing_else_is_imported(package: Path) -> None:
+def test_a_description_that_cannot_be_loaded_is_an_error_and_no_unlisted_module_is_imported(
+    package: Path,
+) -> None:
     for name, error, words in (
         ("toys", UnknownNameError, "unknown robot description 'toys_description'; did you mean toy_desc"),
-        ("other", UnknownNameError, "unknown"),  # a module, but not listed
+        ("other", UnknownNameError, "unknown"),  # a module that is not in DESCRIPTIONS
         ("far", SourceError, r"cannot be downloaded: found fatal: no route to host; .*the network"),
         ("empty", InputError, "neither URDF_PATH nor XACRO_PATH nor MJCF_PATH"),
     ):
@@ -314,7 +306,7 @@ def test_a_description_that_is_not_there_is_told_and_nothing_else_is_imported(pa
 
 
 @pytest.mark.slow
-def test_a_module_with_a_xacro_file_brings_its_arguments(tmp_path: Path) -> None:
+def test_a_description_module_with_a_xacro_file_has_default_arguments(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf.xacro"
     path.write_text(
         '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
@@ -328,7 +320,7 @@ def test_a_module_with_a_xacro_file_brings_its_arguments(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_without_the_package_its_name_says_what_to_install() -> None:
+def test_without_robot_descriptions_the_error_names_the_package_to_install() -> None:
     done = python(
         "import sys\nsys.modules['robot_descriptions'] = None\nimport importlib.util as u\n"
         "find = u.find_spec\nu.find_spec = lambda name: None if name.startswith('robot_d') else find(name)\n"
@@ -337,7 +329,9 @@ def test_without_the_package_its_name_says_what_to_install() -> None:
     assert done.stdout.startswith("panda_description: robot_descriptions is not installed; pip install")
 
 
-def test_a_file_of_such_a_name_is_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_whose_name_looks_like_a_description_is_loaded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     Path("my_description").write_text(urdfkin.load("polar", verify=False).urdf)
     assert urdfkin.load("my_description").name == "polar"

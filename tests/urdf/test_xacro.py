@@ -1,4 +1,4 @@
-"""xacro without ROS: arguments, packages by a documented search, and failures that say what to do."""
+"""The expansion of xacro files without ROS, with arguments, packages and errors."""
 
 import os
 from pathlib import Path
@@ -58,13 +58,15 @@ def test_a_xacro_file_is_loaded_with_its_arguments(arm: Path) -> None:
         assert robot.certificate().verified
 
 
-def test_the_working_directory_is_left_alone(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_expansion_does_not_change_the_working_directory(
+    arm: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(arm.parents[1])
     assert b'name="tool"' in expand(Path("urdf/arm.urdf.xacro"), {})
     assert Path.cwd() == arm.parents[1]
 
 
-def test_the_line_that_replays_a_result_names_the_arguments(arm: Path) -> None:
+def test_the_command_and_the_call_that_load_a_robot_again_contain_the_arguments(arm: Path) -> None:
     robot = urdfkin.load(arm, xacro_args={"n": 3})
     assert robot.source == str(arm)
     assert robot.origin.words == f"{arm} --xacro-arg n:=3"
@@ -73,7 +75,7 @@ def test_the_line_that_replays_a_result_names_the_arguments(arm: Path) -> None:
     assert report.command == f"urdfkin validate {arm} --samples 0 --seed 0 --xacro-arg n:=3"
 
 
-def test_findings_are_about_the_expanded_text(arm: Path) -> None:
+def test_findings_refer_to_the_expanded_text(arm: Path) -> None:
     write(arm.parent / "part.xacro", PART.replace("continuous", "hinge"))
     (finding,) = urdfkin.check(arm)
     assert (finding.code, finding.file) == ("URDF501", f"{arm} (expanded)")
@@ -89,48 +91,40 @@ def test_findings_are_about_the_expanded_text(arm: Path) -> None:
         ("<link", "not well-formed|unclosed|invalid"),
     ],
 )
-def test_what_cannot_be_expanded_says_why_in_one_error(tmp_path: Path, text: str, reason: str) -> None:
+def test_a_file_that_cannot_be_expanded_is_an_error_with_the_reason(
+    tmp_path: Path, text: str, reason: str
+) -> None:
     path = write(tmp_path / "r.xacro", f'<robot name="r" {NAMESPACE}>{text}</robot>')
     with pytest.raises(XacroError, match=f"(?s)cannot expand the file: found .*({reason})"):
         urdfkin.load(path)
 
 
-def test_a_macro_without_end_is_given_up(tmp_path: Path) -> None:
+def test_an_endless_expansion_ends_with_an_error(tmp_path: Path) -> None:
     endless = '<xacro:property name="x" value="${9**9**9**9}"/><link name="${x}"/>'
     path = write(tmp_path / "r.xacro", f'<robot name="r" {NAMESPACE}>{endless}</robot>')
     with pytest.raises(XacroError, match="did not finish"):
         expand(path, {}, patience=3.0)
 
 
-def test_a_file_that_does_not_exist_is_no_such_file(tmp_path: Path) -> None:
+def test_mistakes_with_xacro_are_errors_with_a_remedy(
+    arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(SourceError, match="no such file"):
         urdfkin.load(tmp_path / "r.xacro")
-
-
-def test_without_the_extra_the_error_says_what_to_install(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match="xacro_args"):
+        read_source("panda", xacro_args={"n": 1})
+    with pytest.raises(urdfkin.UrdfError, match="expand the file first"):
+        urdfkin.load(f'<robot name="r" {NAMESPACE}><link name="a"/><xacro:b/></robot>')
     monkeypatch.setattr(xacro, "find_spec", lambda name: None)
     with pytest.raises(XacroError, match="pip install 'xacrodoc>=2'"):
         urdfkin.load(arm)
 
 
-def test_arguments_for_a_plain_urdf_are_a_mistake() -> None:
-    with pytest.raises(InputError, match="xacro_args"):
-        read_source("panda", xacro_args={"n": 1})
-
-
-def test_xacro_that_comes_as_text_says_what_to_do() -> None:
-    with pytest.raises(urdfkin.UrdfError, match="expand the file first"):
-        urdfkin.load(f'<robot name="r" {NAMESPACE}><link name="a"/><xacro:b/></robot>')
-
-
-def test_the_commands_take_xacro_arguments(arm: Path) -> None:
+def test_commands_and_validate_accept_xacro_arguments(arm: Path) -> None:
     for command in (["check", str(arm)], ["placement", str(arm), "--frame", "tool", "--format", "csv"]):
         done = run(*command, "--xacro-arg", "n:=6")
         assert done.code == 0, done.err
     assert "1.5" in done.text
-
-
-def test_validate_expands_once_and_passes(arm: Path) -> None:
     report = urdfkin.validate([arm], samples=3, xacro_args={"n": 4})
     assert report.passed
     assert "--xacro-arg n:=4" in str(report.as_dict())
@@ -139,7 +133,7 @@ def test_validate_expands_once_and_passes(arm: Path) -> None:
 # -- packages ----------------------------------------------------------------------------------------
 
 
-def test_packages_are_found_in_the_documented_order(tmp_path: Path) -> None:
+def test_packages_are_searched_in_the_documented_order(tmp_path: Path) -> None:
     above = tmp_path / "up" / "pkg"
     places = [tmp_path / place for place in ("ros/pkg", "src/repository/pkg", "opt/share/pkg")]
     for folder in (*places, above / "urdf"):
@@ -156,14 +150,13 @@ def test_packages_are_found_in_the_documented_order(tmp_path: Path) -> None:
     assert find_package("other", beside, environ) is None
 
 
-def test_an_entry_may_be_the_package_itself_and_a_manifest_names_a_folder(tmp_path: Path) -> None:
+def test_a_package_is_also_found_by_its_search_path_or_its_manifest_but_not_by_an_invalid_name(
+    tmp_path: Path,
+) -> None:
     clone = tmp_path / "clone-main"
     write(clone / "package.xml", "<package><name> my_arm </name></package>")
     (tmp_path / "pkg").mkdir()
     assert find_package("pkg", None, {"ROS_PACKAGE_PATH": str(tmp_path / "pkg")}) == tmp_path / "pkg"
     assert find_package("my_arm", clone / "urdf" / "a.urdf", {}) == clone
-
-
-@pytest.mark.parametrize("name", ["", ".", "..", "a\0b"])
-def test_a_name_that_is_no_folders_name_is_not_looked_for(name: str, tmp_path: Path) -> None:
-    assert find_package(name, tmp_path / "a.urdf", {}) is None
+    for name in ("", ".", "..", "a\0b"):
+        assert find_package(name, tmp_path / "a.urdf", {}) is None

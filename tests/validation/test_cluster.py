@@ -1,4 +1,4 @@
-"""A cluster computes what one process does, whoever is killed, and blames a robot and no neighbour."""
+"""A cluster gives the results of one process, even if workers are killed; a crash is its robot's result."""
 
 import contextlib
 import gc
@@ -30,11 +30,12 @@ from distributed.comm.core import CommClosedError
 from distributed.core import Status
 
 from tests.reading import present
+from tests.validation import faulty_worker
 from tests.validation.test_store import numbers
-from tests.validation.test_workers import DIED
 from urdfkin.errors import InputError
 from urdfkin.system.processes import own_python
 from urdfkin.validation import cluster
+from urdfkin.validation.answer import CRASHED_TWICE
 from urdfkin.validation.campaign import stored, validate
 from urdfkin.validation.cluster import Cluster, ClusterError, connected
 from urdfkin.validation.collector import CampaignProgress
@@ -46,8 +47,8 @@ pytestmark = [pytest.mark.long, pytest.mark.filterwarnings("ignore")]  # Dask's 
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 SAMPLES = 150
-#: Whose workers are killed, and with how many seeds: URDFKIN_SEEDS=20 takes some minutes.
 KILLED = ["planar_two_link", "double_pendulum"]
+#: Number of seeds for killed workers; 20 seeds take some minutes.
 SEEDS = int(os.environ.get("URDFKIN_SEEDS", "2"))
 
 
@@ -58,16 +59,16 @@ def undisturbed() -> str:
 
 @pytest.fixture(scope="module")
 def two() -> Iterator[Cluster]:
-    """Two workers, for all tests here."""
-    said: list[str] = []
-    with connected("local:2", said.append) as found:
-        assert said == ["2 workers"]
+    """Two local workers."""
+    messages: list[str] = []
+    with connected("local:2", messages.append) as found:
+        assert messages == ["2 workers"]
         yield found
 
 
 @pytest.fixture(scope="module")
 def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cluster, LocalCluster]]:
-    """Two of Dask's worker processes, which can be killed, and the cluster that replaces them."""
+    """Two of Dask's worker processes, and the cluster that replaces a killed process."""
     folder = str(tmp_path_factory.mktemp("dask"))
     how: dict[str, Any] = {"threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
     with (
@@ -82,7 +83,7 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cluste
             yield found, there
 
 
-def test_workers_of_a_local_cluster_open_no_port_that_anybody_could_reach(two: Cluster) -> None:
+def test_workers_of_a_local_cluster_open_no_port(two: Cluster) -> None:
     validate("planar_two_link", samples=SAMPLES, executor=two)
     mine = psutil.Process()
     for process in (mine, *mine.children(recursive=True)):
@@ -97,10 +98,10 @@ def test_a_version_of_dask_that_opens_a_port_is_refused(monkeypatch: pytest.Monk
         pass
 
 
-def test_nothing_of_a_local_cluster_lies_where_another_user_could_have_put_it(
+def test_a_local_cluster_imports_no_module_from_a_scratch_folder_of_another_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Dask puts its scratch folder first on the path; another user may have made it, with modules in it."""
+    """Dask adds its scratch folder to the front of the path."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     planted = tmp_path / "dask-scratch-space"
     planted.mkdir()
@@ -121,8 +122,10 @@ def test_nothing_of_a_local_cluster_lies_where_another_user_could_have_put_it(
     assert [place.name for place in tmp_path.iterdir()] == ["dask-scratch-space"]
 
 
-def test_no_process_takes_a_module_from_dasks_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As a worker on a real cluster has it, where Dask has put it on the path before urdfkin is there."""
+def test_no_process_imports_a_module_from_dasks_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a real cluster, Dask has added its folder to the path before urdfkin is imported."""
     for folder in ("dask-scratch-space", "dask-scratch-space-1000/worker-x"):
         (tmp_path / folder).mkdir(parents=True)
         (tmp_path / folder / "planted.py").write_text("")
@@ -132,7 +135,7 @@ def test_no_process_takes_a_module_from_dasks_folder(tmp_path: Path, monkeypatch
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl")
-def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobody_else(
+def test_a_cluster_with_the_settings_of_the_page_serves_only_clients_with_the_key(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = (Path(__file__).parents[2] / "docs" / "campaigns.md").read_text("utf-8")
@@ -145,8 +148,7 @@ def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobo
     config = tmp_path / "dask.yaml"
     config.write_text(text.replace("/home/me/dask", str(tmp_path)))
 
-    def key_of(folder: Path) -> dict[str, Any]:
-        """Dask's settings with the key in a folder."""
+    def settings_with_key(folder: Path) -> dict[str, Any]:
         mine = yaml.safe_load(text.replace("/home/me/dask", str(folder)))
         merged: dict[str, Any] = dask.config.merge(dask.config.config, mine)
         return merged
@@ -158,9 +160,9 @@ def test_a_cluster_with_the_settings_of_the_page_serves_who_has_its_key_and_nobo
         assert address.startswith("tls://127.0.0.1:")
         for other in (address, address.replace("tls", "tcp")):
             nobody_answers(other, 2)
-        with dask.config.set(key_of(stranger)):
+        with dask.config.set(settings_with_key(stranger)):
             nobody_answers(address, 2)
-        with dask.config.set(key_of(tmp_path)), connected(address) as there:
+        with dask.config.set(settings_with_key(tmp_path)), connected(address) as there:
             there._client.wait_for_workers(1, timeout=60)
             assert validate("planar_two_link", samples=SAMPLES, executor=there).passed
 
@@ -181,7 +183,7 @@ def test_a_cluster_changes_no_number_and_sends_each_robot_once(
     assert numbers(stored(tmp_path)) == undisturbed
 
 
-def test_what_is_carried_needs_no_file_and_no_catalogue_path(tmp_path: Path) -> None:
+def test_a_carried_robot_needs_no_file_and_no_catalogue_path(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text('<robot name="a"><link name="l"/></robot>')
     for source in (str(path), "ur5"):
@@ -196,59 +198,55 @@ def test_what_is_carried_needs_no_file_and_no_catalogue_path(tmp_path: Path) -> 
             assert {f.file for f in robot.findings} == {f.file for f in plain.read().findings}
 
 
-def test_no_more_chunks_are_in_flight_than_workers_can_take(two: Cluster) -> None:
+def test_the_number_of_pending_chunks_is_bounded(two: Cluster) -> None:
     most = 0
 
-    def look(_: CampaignProgress) -> None:
+    def count(_: CampaignProgress) -> None:
         nonlocal most
-        most = max(most, len(two._flying))
+        most = max(most, len(two._pending))
 
-    assert validate("planar_two_link", samples=1600, executor=two, progress=look).passed
+    assert validate("planar_two_link", samples=1600, executor=two, progress=count).passed
     assert 2 <= most <= 2 * 2 + 4
 
 
-def test_a_robot_that_kills_its_process_is_blamed_and_none_of_its_neighbours(
-    two: Cluster, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_a_crash_is_the_result_of_its_robot_and_the_other_robots_and_dasks_workers_continue(
+    two: Cluster, tmp_path: Path
 ) -> None:
-    """One of fifty, by a signal, as often as it is tried; Dask's workers live on."""
-    deaths = tmp_path / "deaths"
-    deaths.write_text("99")
+    crashes = tmp_path / "crashes"
+    crashes.write_text("99")
     workers = two._client.run(os.getpid)
     one = '<robot name="r{}"><link name="l"/></robot>'
     robots = [*(one.format(i) for i in range(25)), "ur5", *(one.format(i) for i in range(25, 49))]
-    two._client.run(_deadly, str(deaths), "tests.validation.deadly_worker")
+    two._client.run(_start_processes_of, faulty_worker.MODULE, str(crashes))
     try:
         report = validate(robots, samples=0, executor=two)
     finally:
-        two._client.run(_deadly, str(deaths), "urdfkin.validation.worker_processes")
+        two._client.run(_start_processes_of, "urdfkin.validation.worker_processes", "")
     assert [i for i, robot in enumerate(report.robots) if robot.verdict != ValidationVerdict.VERIFIED] == [25]
-    words = "crashed twice; the second time it computed nothing else"
-    assert report.robots[25].reason == DIED.format(words)
-    assert deaths.read_text() == "97"
+    assert report.robots[25].reason == f"ur5: {CRASHED_TWICE}: found signal SIGSEGV"
+    assert crashes.read_text() == "97"
     assert two._client.run(os.getpid) == workers
 
 
-def _deadly(deaths: str, module: str) -> None:
-    """On a worker: the processes that it starts from now on are others."""
+def _start_processes_of(module: str, fault: str) -> None:
+    """Let a worker start the processes of another module from now on."""
     from urdfkin.validation import remote, worker_processes
 
-    os.environ["URDFKIN_TEST_DEATHS"] = deaths
+    os.environ[faulty_worker.FAULT] = fault
     worker_processes.WORKER = module
-    while remote._idle:
-        remote._idle.pop().end()
+    remote.end_idle()
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_workers_killed_at_random_times_cost_time_and_nothing_else(
+def test_workers_killed_at_random_times_change_no_number(
     processes: tuple[Cluster, LocalCluster], seed: int
 ) -> None:
-    """Dask starts another; `test_workers` has twenty seeds of the processes that compute."""
     rng, killed = np.random.default_rng(seed), list[int]()
     times = rng.choice(np.arange(1, 12), 2, replace=False)
     engine, there = processes
 
-    def kill(standing: CampaignProgress) -> None:
-        if standing.chunks_done in times:
+    def kill(state: CampaignProgress) -> None:
+        if state.chunks_done in times:
             time.sleep(rng.uniform(0.0, 0.2))
             deadline = time.monotonic() + 60
             while not (workers := [worker for worker in _running(there) if worker not in killed]):
@@ -262,13 +260,13 @@ def test_workers_killed_at_random_times_cost_time_and_nothing_else(
 
 
 def _running(there: LocalCluster) -> list[int]:
-    """Return the workers that Dask replaces when they end; it replaces none that ends while it starts."""
+    """Return the running workers, which Dask replaces if they end."""
     return [nanny.pid for nanny in there.workers.values() if nanny.status == Status.running]
 
 
 @contextmanager
 def programs(folder: Path, **env: str) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
-    """Dask's own programs, started by role and options, with a file for the address in the folder."""
+    """Yield a function that starts Dask's programs, with a file for the scheduler's address in the folder."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), **env}
     started = list[subprocess.Popen[bytes]]()
 
@@ -288,7 +286,7 @@ def programs(folder: Path, **env: str) -> Iterator[Callable[..., subprocess.Pope
 
 
 def _address(folder: Path) -> str:
-    """The address that the scheduler writes to its file, which exists for a moment without content."""
+    """Return the address from the scheduler's file, which is empty for a moment."""
     deadline = time.monotonic() + 60
     while True:
         with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
@@ -311,25 +309,24 @@ def _serial() -> str:
     return numbers(validate(KILLED, samples=400))
 
 
-def test_workers_may_come_and_go(monkeypatch: pytest.MonkeyPatch) -> None:
-    """None is there when it begins; Dask starts two for the work, and ends one of them on the way."""
+def test_the_number_of_workers_may_change_from_none_to_two_and_one(monkeypatch: pytest.MonkeyPatch) -> None:
     # Dask's own workers import the main module again, which would run these tests where it has no guard.
     monkeypatch.delattr(sys.modules["__main__"], "__file__", raising=False)
     counts = list[int]()
     with LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address="127.0.0.1:0") as there:
         scaled = there.adapt(minimum=1, maximum=2, target_duration="200ms")
 
-        def count(standing: CampaignProgress) -> None:
+        def count(state: CampaignProgress) -> None:
             counts.append(len(there.scheduler.workers))
-            if standing.chunks_done == 8:
+            if state.chunks_done == 8:
                 scaled.maximum = 1
             time.sleep(0.2)  # Dask looks once a second
 
-        def tell(said: str) -> None:
-            if "workers; dashboard: http://127.0.0.1:" in said:
-                counts.append(int(said[0]))
+        def tell(message: str) -> None:
+            if "workers; dashboard: http://127.0.0.1:" in message:
+                counts.append(int(message[0]))
             else:
-                assert said.startswith("an address with tcp:// is not protected")
+                assert message.startswith("an address with tcp:// is not protected")
 
         with connected(there.scheduler_address, tell) as engine:
             found = numbers(validate(KILLED, samples=400, executor=engine, progress=count))
@@ -343,8 +340,8 @@ def test_another_version_is_refused_before_any_work(two: Cluster, monkeypatch: p
     monkeypatch.setattr(cluster, "provenance", lambda: other)
     words = r"different versions of the code: found pin 4\S* on the cluster and 3"
     with pytest.raises(ClusterError, match=words):
-        cluster._demand_same(two._client)
-    report = validate("planar_two_link", samples=0, executor=two)  # a worker that came later
+        cluster._check_versions(two._client)
+    report = validate("planar_two_link", samples=0, executor=two)  # as with a worker that starts later
     assert "the cluster and this machine have different versions of the code" in str(report.robots[0].reason)
 
 
@@ -355,40 +352,40 @@ def test_a_local_cluster_has_a_number_of_workers(word: str) -> None:
 
 
 def test_a_client_that_finds_no_scheduler_is_deleted_at_once() -> None:
-    """If the garbage collector deletes it in Dask's next thread, that thread waits for ever."""
+    """If the garbage collector deleted the client in a thread of Dask, this thread would wait for ever."""
+
+    def clients() -> set[int]:
+        return {id(thing) for thing in gc.get_objects() if type(thing) is Client}
+
     gc.collect()
-    before = _clients()
+    before = clients()
     gc.disable()
     try:
         nobody_answers("tcp://127.0.0.1:9", 0.5)
-        assert _clients() <= before
+        assert clients() <= before
     finally:
         gc.enable()
 
 
-def _clients() -> set[int]:
-    return {id(thing) for thing in gc.get_objects() if type(thing) is Client}
-
-
-def test_a_lost_scheduler_loses_nothing_that_the_store_holds(undisturbed: str, tmp_path: Path) -> None:
+def test_a_run_resumes_from_its_store_after_the_scheduler_was_lost(undisturbed: str, tmp_path: Path) -> None:
     with programs(tmp_path) as start:
         scheduler = start("scheduler", "--port 0 --host 127.0.0.1")
         start("worker", f"--nthreads 1 --no-nanny --local-directory {tmp_path}")
 
-        def killed(standing: CampaignProgress) -> None:
-            if standing.chunks_done >= 3:
+        def kill(state: CampaignProgress) -> None:
+            if state.chunks_done >= 3:
                 scheduler.kill()
 
         with contextlib.suppress(Exception), connected(_address(tmp_path)) as there:
             there._client.wait_for_workers(1, timeout=60)
-            report = validate(ROBOTS, samples=SAMPLES, executor=there, store=tmp_path / "s", progress=killed)
+            report = validate(ROBOTS, samples=SAMPLES, executor=there, store=tmp_path / "s", progress=kill)
     reason = str(report.robots[-1].reason)
     assert "connection to the scheduler is lost" in reason
     assert "repeat the same command" in reason
     assert numbers(validate(ROBOTS, samples=SAMPLES, store=tmp_path / "s")) == undisturbed
 
 
-def test_a_scheduler_that_goes_while_a_result_is_on_its_way_is_lost() -> None:
+def test_a_scheduler_that_is_lost_while_a_result_arrives_is_an_error() -> None:
     class Gone:
         status = "finished"
 
@@ -397,4 +394,4 @@ def test_a_scheduler_that_goes_while_a_result_is_on_its_way_is_lost() -> None:
 
     there: Any = Cluster(SimpleNamespace(status="running", scheduler=None))  # type: ignore[arg-type]
     with pytest.raises(ClusterError, match="connection to the scheduler is lost"):
-        there._found(Gone(), None)
+        there._found(Gone(), None, 1)

@@ -1,4 +1,4 @@
-"""`verify_function` accepts correct functions, and names the usual mistake of a wrong one."""
+"""`verify_function` accepts correct functions, and names common mistakes of wrong functions."""
 
 import json
 import shutil
@@ -26,7 +26,7 @@ from urdfkin.validation.diagnosis import _HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
 from urdfkin.verify.quantities import recursive_quantities
 
-#: Robots and frames: serial arms, a branched robot, a hand, and fingers that mimic.
+#: Robots with a frame: arms, a quadruped, and grippers with mimic joints.
 FRAMES = {
     "ur5": "tool0", "kinova": "j2s6s200_end_effector", "a1": "FL_foot", "xarm7": "link_eef",
     "panda": "panda_rightfinger",
@@ -46,7 +46,6 @@ def robot_of(name: str) -> Robot:
 
 
 def computed(robot: Robot, quantity: str, frame: str, reference: str | None = None) -> Callable[..., Any]:
-    """Return urdfkin's method as the function of a user."""
     method = getattr(robot, quantity.replace(" ", "_"))
     named = {} if quantity == "placement" else {"reference": reference or "local_world_aligned"}
     return lambda *inputs: method(*inputs, frame, verify=False, **named)
@@ -58,8 +57,16 @@ def check(
     return verify_function(function, robot_of(name), quantity, frame=frames[name], samples=60)
 
 
-def turned(q: np.ndarray, robot: Robot, factor: float) -> np.ndarray:
-    """Return q with all angles multiplied by a factor."""
+def ur5_jacobian(q: np.ndarray) -> np.ndarray:
+    return robot_of("ur5").jacobian(q, "tool0", verify=False)
+
+
+def check_diagnosis(found: FunctionCheck, words: str) -> None:
+    assert not found.agrees
+    assert any(words in diagnosis for diagnosis in found.diagnoses), found
+
+
+def scale_angles(q: np.ndarray, robot: Robot, factor: float) -> np.ndarray:
     at = [robot.tree.q_index[i] for i, x in enumerate(robot.tree.joints) if x.kind.turns and not x.mimic]
     q[..., at] *= factor
     return q
@@ -67,13 +74,13 @@ def turned(q: np.ndarray, robot: Robot, factor: float) -> np.ndarray:
 
 Wrong = Callable[[Callable[..., Any], Robot, str], Callable[..., Any]]
 
-#: Mistake -> the quantities that have it, part of the diagnosis, and the wrong function of the right one.
+#: Mistakes: quantities, part of the diagnosis, and a function that makes a right function wrong.
 SIX = ("velocity", "jacobian", "jacobian rate", "hessian", "acceleration")
 MISTAKES: dict[str, tuple[tuple[str, ...], str, Wrong]] = {
     "angular rows first": (SIX, "the angular rows come first", lambda f, r, x: lambda *i: f(*i)[_HALVES]),
     "transposed": (("placement", "jacobian"), "transposed", lambda f, r, x: lambda *i: f(*i).T),
     "degrees": (("placement", "jacobian", "acceleration"), "takes q in degrees",
-                lambda f, r, x: lambda q, *i: f(turned(q, r, np.pi / 180), *i)),
+                lambda f, r, x: lambda q, *i: f(scale_angles(q, r, np.pi / 180), *i)),
     "millimetres": (("velocity", "jacobian"), "millimetres",
                     lambda f, r, x: lambda *i: (f(*i).T * ([1000.0] * 3 + [1.0] * 3)).T),
     "spatial acceleration": (("acceleration",), "the spatial acceleration was computed",
@@ -98,27 +105,26 @@ def test_a_planted_mistake_is_named(name: str, mistake: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
     for quantity in quantities:
         found = check(name, quantity, wrong(computed(robot, quantity, frame), robot, frame))
-        assert not found.agrees
-        assert words in " | ".join(found.diagnoses), (quantity, found)
+        check_diagnosis(found, words)
 
 
-@pytest.mark.parametrize("quantity", ["velocity", "jacobian", "jacobian rate", "hessian", "acceleration"])
+@pytest.mark.parametrize("quantity", SIX)
 @pytest.mark.parametrize("name", FRAMES)
 def test_another_reference_frame_is_named(name: str, quantity: str) -> None:
     for reference in ("local", "world"):
         found = check(name, quantity, computed(robot_of(name), quantity, FRAMES[name], reference))
-        assert any(f"is in {reference.upper()} instead of " in words for words in found.diagnoses), found
+        check_diagnosis(found, f"is in {reference.upper()} instead of ")
 
 
 @pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 @pytest.mark.parametrize("name", FRAMES)
-def test_the_frame_of_a_wrong_point_is_named(name: str, quantity: str) -> None:
+def test_a_wrong_frame_is_named(name: str, quantity: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
     tree = robot.tree
     joint = next(i for i in reversed(tree.path(tree.frame_link(frame))) if tree.joints[i].kind.nv)
     other = tree.links[tree.joints[joint].parent]  # the link before the last moving joint
     found = check(name, quantity, computed(robot, quantity, f"link:{other}"))
-    assert any(f"that of the frame {other!r}" in words for words in found.diagnoses), found
+    check_diagnosis(found, f"that of the frame {other!r}")
 
 
 def flip(x: np.ndarray, at: list[int]) -> np.ndarray:
@@ -135,31 +141,26 @@ def exchange(x: np.ndarray, at: list[int]) -> np.ndarray:
 
 @pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 @pytest.mark.parametrize("name", FRAMES)
-def test_the_sign_and_the_exchange_of_joints_are_named(name: str, quantity: str) -> None:
+def test_a_reversed_joint_and_exchanged_joints_are_named(name: str, quantity: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
     tree = robot.tree
     path = [i for i in tree.path(tree.frame_link(frame)) if tree.joints[i].nv][1:3]
     at_q, at_v = ([each[i] for i in path] for each in (tree.q_index, tree.v_index))
     one, other = (tree.joints[i].name for i in path)
     right = computed(robot, quantity, frame)
+    shape = next(row.shape for row in recursive_quantities() if row.name == quantity)
 
     def wrong(change: Callable[..., np.ndarray]) -> Callable[..., Any]:
         def function(q: np.ndarray, *rates: np.ndarray) -> Any:
             result = right(change(q, at_q), *(change(x, at_v) for x in rates))
-            for axis in range(1, result.ndim) if "nv" in str(quantity_shape(quantity)) else ():
+            for axis in range(1, result.ndim) if "nv" in str(shape) else ():
                 result = np.moveaxis(change(np.moveaxis(result, axis, 0), at_v), 0, axis)
             return result
 
         return function
 
-    said = (flip, f"{one!r} has the opposite sign"), (exchange, f"{one!r} and {other!r} are exchanged")
-    for change, words in said:
-        found = check(name, quantity, wrong(change))
-        assert any(words in line for line in found.diagnoses), found
-
-
-def quantity_shape(name: str) -> tuple[object, ...]:
-    return next(row.shape for row in recursive_quantities() if row.name == name)
+    check_diagnosis(check(name, quantity, wrong(flip)), f"{one!r} has the opposite sign")
+    check_diagnosis(check(name, quantity, wrong(exchange)), f"{one!r} and {other!r} are exchanged")
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # an inertia of the PR2
@@ -175,27 +176,23 @@ def test_a_missing_mimic_column_is_named(name: str) -> None:
         return free.jacobian(every, frame)[:, own]
 
     found = check(name, "jacobian", function, MIMICS)
-    assert not found.agrees
-    assert any("mimic joint" in words and "not added" in words for words in found.diagnoses), found
+    check_diagnosis(found, "the columns of the mimic joints (")
+    check_diagnosis(found, ") are not added")
 
 
 def test_two_mistakes_and_the_order_of_another_tool_are_named() -> None:
-    robot = robot_of("ur5")
-    found = check("ur5", "jacobian", lambda q: robot.jacobian(q, "tool0", "local", verify=False)[_HALVES])
-    (words,) = found.diagnoses
+    local = computed(robot_of("ur5"), "jacobian", "tool0", "local")
+    (words,) = check("ur5", "jacobian", lambda q: local(q)[_HALVES]).diagnoses
     assert "is in LOCAL" in words
     assert words.endswith("and the angular rows come first")
-    robot = robot_of("a1")
-    mujoco = robot.with_convention("isaaclab")
-    found = check("a1", "jacobian", lambda q: mujoco.jacobian(q, "FL_foot", verify=False))
-    assert any("order of isaaclab" in words for words in found.diagnoses), found
+    tool = robot_of("a1").with_convention("isaaclab")
+    check_diagnosis(check("a1", "jacobian", computed(tool, "jacobian", "FL_foot")), "order of isaaclab")  # type: ignore[arg-type]
 
 
 # -- correct functions ----------------------------------------------------------------------------------
 
 
 def pinocchio_function(robot: Robot, quantity: str, frame: str) -> Callable[..., Any]:
-    """Return the quantity by Pinocchio's own calls."""
     model = robot.pinocchio_model()
     data, at = model.createData(), model.getFrameId(frame)
     aligned = pin.LOCAL_WORLD_ALIGNED
@@ -227,15 +224,15 @@ def test_no_correct_function_is_called_wrong(seed: int) -> None:
     assert not found.diagnoses
 
 
-def test_a_function_by_another_algorithm_or_that_reuses_its_arrays_agrees() -> None:
+def test_a_function_with_another_algorithm_or_that_reuses_its_arrays_agrees() -> None:
     robot = robot_of("ur5")
     screws = robot.screws("tool0")
     found = verify_function(screws.placement, robot, "placement", frame="tool0", samples=200)
     assert found.agrees, found
-    robot, out = robot_of("ur5"), np.zeros((6, 6))
+    out = np.zeros((6, 6))
 
     def function(q: np.ndarray) -> np.ndarray:
-        out[:] = robot.jacobian(q, "tool0", verify=False)
+        out[:] = ur5_jacobian(q)
         q[:] = 0.0
         return out
 
@@ -245,11 +242,9 @@ def test_a_function_by_another_algorithm_or_that_reuses_its_arrays_agrees() -> N
 # -- what a check reports -------------------------------------------------------------------------------
 
 
-def test_one_wrong_number_is_found_in_its_place_and_the_factor_that_suffices_is_reported() -> None:
-    robot = robot_of("ur5")
-
+def test_one_wrong_number_is_named_and_the_needed_factor_is_reported() -> None:
     def function(q: np.ndarray) -> np.ndarray:
-        J = robot.jacobian(q, "tool0", verify=False)
+        J = ur5_jacobian(q)
         J[1, 3] += 1e-9
         return J
 
@@ -258,22 +253,21 @@ def test_one_wrong_number_is_found_in_its_place_and_the_factor_that_suffices_is_
     assert [name for name, share in found.rows.items() if share > 1] == ["vy"]
     assert [name for name, share in found.columns.items() if share > 1] == ["wrist_1_joint"]
     assert "The number vy, wrist_1_joint is" in str(found)
-    robot = robot_of("ur5")
-    single = lambda q: robot.jacobian(q, "tool0", verify=False).astype(np.float32)  # noqa: E731
+
+    def single(q: np.ndarray) -> np.ndarray:
+        return ur5_jacobian(q).astype(np.float32)
+
     found = check("ur5", "jacobian", single)
-    assert not found.agrees
-    assert "single precision" in found.diagnoses[0]
-    factor = found.needed_factor * 1.0001
-    assert verify_function(single, robot, "jacobian", frame="tool0", samples=60, factor=factor).agrees
+    check_diagnosis(found, "single precision")
+    how: dict[str, Any] = {"samples": 60, "factor": found.needed_factor * 1.0001}
+    assert verify_function(single, robot_of("ur5"), "jacobian", frame="tool0", **how).agrees
 
 
 def test_exceptions_and_wrong_shapes_are_results() -> None:
-    robot = robot_of("ur5")
-
     def function(q: np.ndarray) -> Any:
         if q[0] > 0:
             raise ValueError("no solution")
-        return robot.jacobian(q, "tool0", verify=False) if q[1] > 0 else [1.0, 2.0]
+        return ur5_jacobian(q) if q[1] > 0 else [1.0, 2.0]
 
     found = check("ur5", "jacobian", function)
     assert not found.agrees
@@ -284,7 +278,7 @@ def test_exceptions_and_wrong_shapes_are_results() -> None:
     assert found.share == 0.0
 
 
-def test_numbers_that_are_not_finite_disagree_and_the_end_of_the_process_is_an_error() -> None:
+def test_numbers_that_are_not_finite_disagree_and_an_exit_of_the_function_is_an_error() -> None:
     found = check("ur5", "jacobian", lambda q: np.full((6, 6), np.nan))
     assert not found.agrees
     assert found.diagnoses == ("63 results are not finite",)
@@ -298,7 +292,7 @@ def test_numbers_that_are_not_finite_disagree_and_the_end_of_the_process_is_an_e
     assert found.errors == found.samples
 
 
-def test_a_batch_is_one_call() -> None:
+def test_a_batch_of_configurations_is_one_call() -> None:
     robot, sizes = robot_of("ur5"), list[int]()
 
     def function(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -312,7 +306,9 @@ def test_a_batch_is_one_call() -> None:
 
 @pytest.mark.parametrize("convention", ["drake", "mujoco", "rtb", "isaaclab"])
 @pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
-def test_a_function_in_a_convention_agrees_and_its_mistakes_are_named(convention: str, quantity: str) -> None:
+def test_a_function_in_a_convention_agrees_and_exchanged_rows_are_named(
+    convention: str, quantity: str
+) -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     tool = robot.with_convention(convention)
     right = computed(tool, quantity, "FL_foot")  # type: ignore[arg-type]
@@ -325,10 +321,10 @@ def test_a_function_in_a_convention_agrees_and_its_mistakes_are_named(convention
     assert verify_function(right, robot, quantity, **how).agrees
     if quantity != "placement":
         found = verify_function(lambda *i: right(*i)[_HALVES], robot, quantity, **how)
-        assert any("rows come first" in words for words in found.diagnoses), found
+        check_diagnosis(found, "rows come first")
 
 
-def test_a_robot_that_no_oracle_can_check_is_compared_with_a_note() -> None:
+def test_a_function_is_compared_without_an_oracle_and_the_result_says_so() -> None:
     arm = urdfkin.load("planar_two_link")
     arm.verifier.unverifiable = "a reason"
     found = verify_function(lambda q: arm.jacobian(q, "tip", verify=False), arm, samples=5)
@@ -343,7 +339,7 @@ def test_a_robot_that_no_oracle_can_check_is_compared_with_a_note() -> None:
     [({"quantity": "torque"}, "torque"), ({"quantity": "joint jacobian"}, "cannot be compared"),
      ({"factor": 0.0}, "factor must be positive"), ({"samples": -1}, "samples"), ({"frame": "hand"}, "hand")],
 )  # fmt: skip
-def test_a_wrong_argument_is_one_error(arguments: dict[str, Any], words: str) -> None:
+def test_a_wrong_argument_is_an_error(arguments: dict[str, Any], words: str) -> None:
     with pytest.raises(urdfkin.UrdfkinError, match=words):
         verify_function(lambda q: q, robot_of("ur5"), **arguments)
 
@@ -357,13 +353,12 @@ def test_a_wrong_argument_is_one_error(arguments: dict[str, Any], words: str) ->
     ],
 )
 def test_a_result_that_is_no_array_of_real_numbers_is_an_error(result: Any, words: str) -> None:
-    robot = robot_of("ur5")
-    found = check("ur5", "jacobian", lambda q: result(robot.jacobian(q, "tool0", verify=False)))
+    found = check("ur5", "jacobian", lambda q: result(ur5_jacobian(q)))
     assert not found.agrees
     assert words in found.first_errors[0].message
 
 
-def test_a_robot_without_a_moving_joint_is_compared_and_a_locked_ones_missing_column_named() -> None:
+def test_a_robot_without_moving_joints_is_compared_and_a_missing_column_of_a_locked_robot_is_named() -> None:
     robot = urdfkin.load(robot_text(joint("j", "fixed", "a", "b", 'xyz="1 0 0"', "")))
     assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees
     assert not verify_function(lambda q: np.eye(4), robot, "placement", samples=3).agrees
@@ -375,7 +370,7 @@ def test_a_robot_without_a_moving_joint_is_compared_and_a_locked_ones_missing_co
         return free.jacobian(np.r_[q, q[-1]], "panda_rightfinger")[:, own]
 
     found = verify_function(function, robot, "jacobian", frame="panda_rightfinger", samples=30)
-    assert any("not added" in words for words in found.diagnoses), found
+    check_diagnosis(found, "not added")
 
 
 # -- programs and the command ---------------------------------------------------------------------------
@@ -386,11 +381,11 @@ import json, sys, time
 import urdfkin
 robot = None
 for k, line in enumerate(sys.stdin):
-    asked = json.loads(line)
+    request = json.loads(line)
     if robot is None:
-        robot = urdfkin.load(asked["robot"], verify=False)
+        robot = urdfkin.load(request["robot"], verify=False)
     {fault}
-    J = robot.jacobian(asked["q"], asked["frame"], asked["reference"])
+    J = robot.jacobian(request["q"], request["frame"], request["reference"])
     print(json.dumps({{"result": J.tolist()}}), flush=True)
 """
 FAULTS = {
@@ -406,7 +401,7 @@ FAULTS = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path: Path) -> None:
+def test_a_fault_of_a_program_is_reported_and_the_check_continues(fault: str, tmp_path: Path) -> None:
     code, words = FAULTS[fault]
     adapter = tmp_path / "adapter.py"
     adapter.write_text(ADAPTER.format(fault=code))
@@ -423,7 +418,9 @@ def test_a_broken_program_is_reported_and_the_check_goes_on(fault: str, tmp_path
     assert data["compared"] >= 10 - 3
 
 
-def test_a_file_called_as_a_library_hides_none_and_a_program_is_told_of_locked_joints(tmp_path: Path) -> None:
+def test_a_file_named_like_a_library_does_not_replace_it_and_a_request_has_locked_joints(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "mujoco.py"
     file.write_text("def jacobian(q):\n    return q\n")
     pytest.importorskip("mujoco")
@@ -493,7 +490,7 @@ def test_all_functions_of_a_file_are_checked(tmp_path: Path) -> None:
     assert "velocity: DISAGREES" in text
 
 
-def test_a_bad_target_is_one_line(tmp_path: Path) -> None:
+def test_a_wrong_target_is_refused_in_one_line(tmp_path: Path) -> None:
     for name, text in (
         ("mine", "def jacobian(q):\n    return q\n\n\ncompute = jacobian\n"),
         *(("empty", "x = 1\n"), ("ends", "raise SystemExit(0)\n"), ("broken", "1 / 0\n")),

@@ -1,4 +1,4 @@
-"""A process that dies costs its robot and nothing else, and every task is dealt once."""
+"""A crash affects only the robot of the crashed process, and each task is given to one worker."""
 
 import os
 import pickle
@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from tests.attacks.test_validation_signals import children
-from tests.validation import canned_worker
+from tests.reading import present
+from tests.validation import canned_worker, faulty_worker
 from tests.validation.test_store import numbers
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation import answer, engines, memory, worker_processes
@@ -22,70 +23,59 @@ from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, Cut
 from urdfkin.validation.collector import CampaignProgress
 from urdfkin.validation.engines import RobotTasks, Task, WorkQueue
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import RobotInput
 
 ROBOTS = ["double_pendulum", "ur5", "iris_simple"]
-DIED = "ur5: the process that validated the robot {}: found signal SIGSEGV"
+CRASH = "ur5: the process that validated the robot {}: found signal SIGSEGV"
 HOW: list[dict[str, Any]] = [{"jobs": 2}, {"jobs": 2, "isolate": True}, {"isolate": True}]
 
 
 @pytest.fixture
-def deaths(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """Workers that die over a robot: as often as the file says."""
-    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.deadly_worker")
-    path = tmp_path / "deaths"
-    monkeypatch.setenv("URDFKIN_TEST_DEATHS", str(path))
-    return path
+def crashes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A file with the number of times that the robot ur5 crashes its process."""
+    monkeypatch.setattr(worker_processes, "WORKER", faulty_worker.MODULE)
+    monkeypatch.setenv(faulty_worker.FAULT, str(tmp_path / "crashes"))
+    return tmp_path / "crashes"
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("how", HOW, ids=str)
-def test_processes_change_no_number(how: dict[str, Any]) -> None:
-    with_them = validate(["ur5", "double_pendulum"], samples=60, **how)
-    without = validate(["ur5", "double_pendulum"], samples=60)
-    assert with_them.passed
-    assert numbers(with_them) == numbers(without)
+def test_processes_change_no_number() -> None:
+    robots = ["ur5", "double_pendulum", "<robot/>", "no such robot"]
+    alone = validate(robots, samples=60)
+    assert [robot.verdict for robot in alone.robots] == ["verified"] * 2 + ["bad input"] * 2
+    for how in HOW:
+        assert numbers(validate(robots, samples=60, **how)) == numbers(alone)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("how", HOW)
-def test_a_death_is_that_robots_result_and_the_others_go_on(how: dict[str, Any], deaths: Path) -> None:
-    deaths.write_text("99")
+def test_a_crash_is_the_result_of_its_robot_and_the_other_robots_are_verified(
+    how: dict[str, Any], crashes: Path
+) -> None:
+    crashes.write_text("99")
     report = validate(ROBOTS, samples=60, **how)
-    verdicts = [ValidationVerdict.VERIFIED, ValidationVerdict.NOT_VERIFIED, ValidationVerdict.VERIFIED]
-    assert [robot.verdict for robot in report.robots] == verdicts
+    assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
     twice = "crashed twice; the second process computed nothing else"
-    assert report.robots[1].reason == DIED.format("crashed" if "isolate" in how else twice)
+    assert report.robots[1].reason == CRASH.format("crashed" if "isolate" in how else twice)
     assert not report.passed
     assert report.exit_code == 3
 
 
 @pytest.mark.long
-def test_a_robot_over_which_one_worker_died_is_tried_again_and_verified_in_full(deaths: Path) -> None:
-    deaths.write_text("1")
+def test_a_robot_that_crashed_one_process_is_retried_and_verified_in_full(crashes: Path) -> None:
+    crashes.write_text("1")
     report = validate(ROBOTS, samples=60, jobs=2)
     assert report.passed
-    assert deaths.read_text() == "0"
+    assert crashes.read_text() == "0"
     assert numbers(report) == numbers(validate(ROBOTS, samples=60))
 
 
 @pytest.mark.long
-def test_what_cannot_be_read_is_reported_as_without_processes() -> None:
-    robots = ["<robot/>", "no such robot"]
-    plain = validate(robots, samples=60)
-    assert {robot.verdict for robot in plain.robots} == {ValidationVerdict.BAD_INPUT}
-    assert plain.exit_code == 2
-    for how in HOW:
-        assert numbers(validate(robots, samples=60, **how)) == numbers(plain)
-
-
-@pytest.mark.long
-def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A library's process lives on after an interrupt; what hangs in compiled code must not."""
-    monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.sleeping_worker")
+def test_an_interrupt_kills_processes_that_hang_in_compiled_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker_processes, "WORKER", faulty_worker.MODULE)
+    monkeypatch.setenv(faulty_worker.FAULT, "hang")
     started: list[Any] = []
-    right = worker_processes._interpreter
+    right = worker_processes._start_interpreter
 
     def kept(pipe: int) -> Any:
         started.append(right(pipe))
@@ -93,7 +83,7 @@ def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pyte
             raise KeyboardInterrupt
         return started[-1]
 
-    monkeypatch.setattr(worker_processes, "_interpreter", kept)
+    monkeypatch.setattr(worker_processes, "_start_interpreter", kept)
     try:
         report = validate(["ur5", "panda"], samples=0, isolate=True, jobs=2)
         assert report.interrupted
@@ -104,35 +94,37 @@ def test_a_worker_that_notices_nothing_is_killed_with_its_crew(monkeypatch: pyte
             process.wait()
 
 
-def test_a_robot_for_which_no_process_can_be_started_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(_: int) -> None:
+def test_a_robot_without_a_process_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: int) -> None:
         raise OSError(24, "Too many open files")
 
-    monkeypatch.setattr(worker_processes, "_interpreter", none)
+    monkeypatch.setattr(worker_processes, "_start_interpreter", fail)
     for how in HOW:
         report = validate(["ur5", "planar_two_link"], samples=60, **how)
-        assert [robot.verdict for robot in report.robots] == [ValidationVerdict.NOT_VERIFIED] * 2
+        assert [robot.verdict for robot in report.robots] == ["not verified"] * 2
         reason = "no process could be started: OSError: [Errno 24] Too many open files"
         assert {robot.reason for robot in report.robots} == {reason}
         assert not report.passed
 
 
 @pytest.mark.long
-def test_what_does_not_start_any_more_is_done_by_those_that_are_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    right, asked = worker_processes._interpreter, 0
+def test_running_processes_take_the_work_of_a_process_that_does_not_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    start, count = worker_processes._start_interpreter, 0
 
-    def one(pipe: int) -> Any:
-        nonlocal asked
-        asked += 1
-        if asked == 2:
+    def fail_second(pipe: int) -> Any:
+        nonlocal count
+        count += 1
+        if count == 2:
             raise OSError(24, "Too many open files")
-        return right(pipe)
+        return start(pipe)
 
-    monkeypatch.setattr(worker_processes, "_interpreter", one)
+    monkeypatch.setattr(worker_processes, "_start_interpreter", fail_second)
     for how in HOW[:2]:
-        asked = 0
+        count = 0
         assert validate(["double_pendulum", "planar_two_link"], samples=60, **how).passed
-        assert asked >= 2
+        assert count >= 2
 
 
 def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,7 +140,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("subprocess.Popen", started)
     monkeypatch.syspath_prepend("")
     with pytest.raises(RecordedError):
-        worker_processes._interpreter(3)
+        worker_processes._start_interpreter(3)
     assert codes[0][1] == "-I"
     path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
     assert "''" not in path
@@ -156,91 +148,85 @@ def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.long
-def test_workers_killed_at_any_time_change_no_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Twenty seeds: when, which of two, and how often; real processes, whose answers are known beforehand."""
+def test_processes_killed_at_random_times_change_no_number(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     robots, right = ["planar_two_link", "double_pendulum", "<robot/>", "iris_simple"], answer.answer
 
-    def remembered(chunk: Chunk) -> Answer:
+    def store_answer(chunk: Chunk) -> Answer:
         found = right(chunk)
-        (tmp_path / canned_worker.name(bytes(ForkingPickler.dumps(chunk)))).write_bytes(pickle.dumps(found))
+        name = canned_worker.file_name(bytes(ForkingPickler.dumps(chunk)))
+        (tmp_path / name).write_bytes(pickle.dumps(found))
         return found
 
-    monkeypatch.setattr(engines, "answer", remembered)
-    monkeypatch.setattr(memory, "share", lambda *_: None)  # it is part of a chunk, and free memory changes
+    monkeypatch.setattr(engines, "answer", store_answer)
+    monkeypatch.setattr(memory, "limit", lambda *_: None)  # the limit is part of a chunk, and would change
     expected = numbers(validate(robots, samples=100))
     monkeypatch.setattr(worker_processes, "WORKER", "tests.validation.canned_worker")
     monkeypatch.setenv("URDFKIN_TEST_ANSWERS", str(tmp_path))
-    killed, others = 0, set(children(os.getpid()))  # of the tests that ran before
+    killed, others = 0, set(children(os.getpid()))  # processes of other tests
     for seed in range(20):
         rng = np.random.default_rng(seed)
 
         def kill(_: CampaignProgress, rng: np.random.Generator = rng) -> None:
             nonlocal killed
-            # One process is a robot's second, alone with it, whose death is its result.
-            if len(crew := sorted({*children(os.getpid())} - others)) == 2 and rng.uniform() < 0.4:
+            # A single process may be the second try of a robot, whose crash would be the robot's result.
+            if len(workers := sorted({*children(os.getpid())} - others)) == 2 and rng.uniform() < 0.4:
                 time.sleep(rng.uniform(0.0, 0.02))
-                os.kill(int(rng.choice(crew)), signal.SIGKILL)
+                os.kill(int(rng.choice(workers)), signal.SIGKILL)
                 killed += 1
 
         assert numbers(validate(robots, samples=100, jobs=2, progress=kill)) == expected
     assert killed > 20
 
 
-# -- who has which task ----------------------------------------------------------------------------
+# -- the queue of tasks ------------------------------------------------------------------------------
 
 
-CUT, NOBODY = Cut(100), RobotInput(b"", Origin(""))
+CUT, NO_ROBOT = Cut(100), RobotInput(b"", Origin(""))
 
 
 def work(robots: int) -> Iterator[Iterator[Task]]:
-    """Four chunks for each robot."""
-    return (iter([Task(i, CUT.chunk(NOBODY, 0, k)) for k in range(4)]) for i in range(robots))
+    """Return four chunks for each robot."""
+    return (iter([Task(i, CUT.chunk(NO_ROBOT, 0, k)) for k in range(4)]) for i in range(robots))
 
 
-def step(deal: WorkQueue, row: RobotTasks | None) -> tuple[tuple[int, int] | None, RobotTasks | None]:
-    """What somebody with a row, or without, is given; and the row that they have then."""
-    if row is not None and (task := deal.next(row)) is not None:
-        return (task.robot, task.chunk.index), row
-    if (found := deal.first()) is None:
-        return None, None
-    task, row = found
-    return (task.robot, task.chunk.index), row
+def take(queue: WorkQueue, tasks: RobotTasks | None = None) -> tuple[Task, RobotTasks]:
+    """Take the next task of a worker's robot, or the first task for a worker without a robot."""
+    task = queue.next(tasks) if tasks is not None else None
+    return (task, tasks) if task is not None and tasks is not None else present(queue.first())
 
 
-def test_two_have_a_robot_each_and_share_the_last_and_what_is_put_back_is_dealt_again() -> None:
-    deal, rows = WorkQueue(work(3)), list[RobotTasks | None]([None, None])
-    seen = [list[tuple[int, int]](), list[tuple[int, int]]()]
-    for turn in (0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1):
-        given, rows[turn] = step(deal, rows[turn])
-        assert given is not None
-        seen[turn].append(given)
-    assert {robot for robot, _ in seen[0]} == {0, 2}
-    assert {robot for robot, _ in seen[1]} == {1, 2}
-    assert sorted(seen[0] + seen[1]) == [(i, k) for i in range(3) for k in range(4)]
-    assert deal.first() is None
-    for shared in (True, False):
-        deal = WorkQueue(work(2), shared=shared)
-        found = deal.first()
-        assert found is not None
-        task, row = found
-        deal.put_back(task, row)
-        again = deal.first()
-        assert again is not None
-        assert again[0] == task
-        assert [left.chunk.index for left in deal.withdraw(0)] == [1, 2, 3]
-        assert deal.next(row) is None
-        assert [(step(deal, None)[0] or (0, 0))[0]] == [1]
+def test_two_workers_have_a_robot_each_and_share_the_last_robot() -> None:
+    queue, tasks = WorkQueue(work(3)), list[RobotTasks | None]([None, None])
+    taken = list[tuple[int, int, int]]()
+    for turn in range(12):
+        task, tasks[turn % 2] = take(queue, tasks[turn % 2])
+        taken.append((turn % 2, task.robot, task.chunk.index))
+    assert {(worker, robot) for worker, robot, _ in taken} == {(0, 0), (1, 1), (0, 2), (1, 2)}
+    assert sorted((robot, chunk) for _, robot, chunk in taken) == [(i, k) for i in range(3) for k in range(4)]
+    assert queue.first() is None
 
 
-def test_help_goes_to_the_robot_of_which_most_is_left_and_nobody_helps_where_each_is_alone() -> None:
-    deal = WorkQueue(work(2))
-    (_, first), (_, second) = deal.first() or ((), RobotTasks(())), deal.first() or ((), RobotTasks(()))
+@pytest.mark.parametrize("shared", [True, False])
+def test_a_task_that_is_put_back_is_taken_again_and_a_withdrawn_robot_has_no_task(shared: bool) -> None:
+    queue = WorkQueue(work(2), shared=shared)
+    task, tasks = take(queue)
+    queue.put_back(task, tasks)
+    assert take(queue)[0] == task
+    assert [left.chunk.index for left in queue.withdraw(0)] == [1, 2, 3]
+    assert queue.next(tasks) is None
+    assert take(queue)[0].robot == 1
+
+
+def test_a_free_worker_helps_at_the_robot_with_the_most_chunks_left_unless_robots_are_not_shared() -> None:
+    queue = WorkQueue(work(2))
+    (_, first), (_, second) = take(queue), take(queue)
     for _ in range(2):
-        deal.next(first)
-    task, row = deal.first() or (None, None)
-    assert task is not None
-    assert row is second
+        queue.next(first)
+    task, tasks = take(queue)
+    assert tasks is second
     assert (task.robot, task.chunk.index) == (1, 1)
-    deal = WorkQueue(work(1), shared=False)
-    assert deal.first() is not None
-    assert deal.first() is None
+    queue = WorkQueue(work(1), shared=False)
+    assert queue.first() is not None
+    assert queue.first() is None

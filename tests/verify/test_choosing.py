@@ -1,4 +1,4 @@
-"""A check in parts, or of a sample, says what a check of everything at once says."""
+"""A check in parts, or of a sample, has the result of a check of all configurations at once."""
 
 from __future__ import annotations
 
@@ -20,17 +20,16 @@ from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.quantities import PLACEMENT, Quantity
 from urdfkin.verify.verifier import SAMPLE, Verify, parts
 
-#: Numbers of a part: one configuration at a time, a few, and all.
+#: Numbers of values in a part: of one configuration, of a few, and of all.
 SIZES = (1, 200, 10**9)
 FRAMES = ("panda_hand", "panda_link2", "panda_link7")
-#: The number that marks configurations about which Pinocchio is made to lie.
+#: Value of the finger joint that marks the configurations with a wrong result of Pinocchio.
 MARK = 0.123456
 
 
 def calls(
     robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray, base: BaseMotion | None, verify: Verify
 ) -> dict[str, Callable[[], FloatArray]]:
-    """One call for each quantity; two of them are of several frames."""
     asked: dict[str, Any] = {"base": base, "verify": verify}
     return {
         "placement": lambda: robot.placement(q, FRAMES, **asked),
@@ -43,7 +42,6 @@ def calls(
 
 
 def moving(shape: tuple[int, ...] | None) -> BaseMotion | None:
-    """A base that moves, and elsewhere in each configuration, unless there is none."""
     if shape is None:
         return None
     generator = np.random.default_rng(8)
@@ -63,7 +61,7 @@ def panda() -> Robot:
 
 @pytest.fixture
 def fresh(panda: Robot) -> Robot:
-    """The same with an empty ledger; Pinocchio's models are kept."""
+    """Empty the ledger, without building Pinocchio's models again."""
     panda.verifier.ledger = type(panda.verifier.ledger)()
     panda._prepared.clear()
     return panda
@@ -71,13 +69,13 @@ def fresh(panda: Robot) -> Robot:
 
 @pytest.fixture
 def lies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pinocchio is off by a millionth where the finger stands at the mark, and by more where it is beyond."""
+    """Add a relative error of 1e-6 to Pinocchio's results at `MARK`, and a larger error beyond `MARK`."""
     right = verifier.oracle_results
 
     def wrong(quantity: Quantity, oracle: Oracle, asked: QueryBatch) -> FloatArray:
         theirs, finger = right(quantity, oracle, asked), asked.inputs[0][:, 7]
         size = np.where(np.abs(finger - MARK) < 1e-3, 1e-6 + np.abs(finger - MARK), 0.0)
-        # Numbers that must agree exactly stay as they are: wherever they do not, there is nothing worse.
+        # The last row of a placement must be exact: any error in this row would be the worst.
         rows = theirs[..., :3, :] if quantity is PLACEMENT else theirs
         rows *= 1.0 + size.reshape(-1, *[1] * (theirs.ndim - 1))
         return theirs
@@ -109,7 +107,7 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
         q[(*other, 7)] = MARK
         q[(*worst, 7)] = MARK + 1e-4
         for size in SIZES:
-            monkeypatch.setattr(verifier, "_AT_A_TIME", size)
+            monkeypatch.setattr(verifier, "_PART_SIZE", size)
             for quantity, compute in calls(fresh, q, v, a, motion, True).items():
                 with pytest.raises(urdfkin.VerificationError) as caught:
                     compute()
@@ -130,7 +128,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
     found = list[Certificate]()
     q, v, a = batch(fresh, shape)
     for size in SIZES:
-        monkeypatch.setattr(verifier, "_AT_A_TIME", size)
+        monkeypatch.setattr(verifier, "_PART_SIZE", size)
         fresh.verifier.ledger = type(fresh.verifier.ledger)()
         for compute in calls(fresh, q, v, a, moving(base), True).values():
             compute()
@@ -155,7 +153,7 @@ def test_pinocchios_jacobians_in_blocks_have_the_bits_of_those_at_once(
         query = QueryBatch(frames, (robot.sample(n, 1),), "world")
         at_once = oracle.jacobians(query)
         with monkeypatch.context() as patch:
-            patch.setattr(pinocchio, "_AT_A_TIME", size)
+            patch.setattr(pinocchio, "_BLOCK_SIZE", size)
             blocks = [block.copy() for block in oracle.jacobian_blocks(query)]
         assert np.concatenate(blocks).tobytes() == at_once.tobytes()
         assert len(blocks) == 1 or all(block.size <= max(size, at_once[0].size) for block in blocks)
@@ -175,7 +173,7 @@ def test_a_robot_without_moving_joints_has_jacobians_without_columns_in_blocks_t
 def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
 ) -> None:
-    monkeypatch.setattr(verifier, "_AT_A_TIME", size)
+    monkeypatch.setattr(verifier, "_PART_SIZE", size)
     q, v, a = batch(fresh, (250,))
     for compute in calls(fresh, q, v, a, moving(base), "sample").values():
         compute()

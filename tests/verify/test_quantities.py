@@ -1,4 +1,4 @@
-"""A quantity is one row: what stands in the table is computed, checked, validated, shown and replayed."""
+"""A row of the table of quantities is computed, checked, validated, displayed and replayed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from urdfkin.verify.bounds import Magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch, coupled
 from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, recursive_quantities
 
-# -- a made-up row: the angular velocity alone ---------------------------------------------------------
+# -- an invented row: the angular velocity -------------------------------------------------------------
 
 
 def turning(*x: Any, out: FloatArray | None = None, **how: Any) -> FloatArray:
@@ -171,7 +171,8 @@ def test_what_is_no_row_or_takes_other_inputs_is_refused() -> None:
         robot.compute("analytical jacobian", ([0.0, 0.0],), "slider")
 
 
-# -- followers' columns are added to their leaders' as J_full G says, whatever the numbers are ---------------
+# -- J_full G adds the columns of mimic joints to those of mimicked joints
+# ------------------------------------
 
 
 @given(st.data())
@@ -207,7 +208,8 @@ def test_a_robot_without_rates_has_no_columns(rows: int) -> None:
     assert coupled(np.zeros((rows, 6, 0)), nothing, nothing, np.zeros(0), 0).shape == (rows, 6, 0)
 
 
-# -- what a validation draws: as many as asked for, special configurations first, some rates large -----------
+# -- random samples of a validation
+# ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("with_special", [True, False])
@@ -228,7 +230,6 @@ def test_every_eighth_sample_has_rates_a_hundred_times_as_large() -> None:
 
 
 def demand_large_rates(*rates: FloatArray) -> None:
-    """Demand that every eighth is a hundred times as large as the others."""
     for each in rates:
         sizes = np.sqrt((each**2).mean(axis=-1))
         assert 80.0 < sizes[::8].mean() < 120.0
@@ -249,6 +250,6 @@ def test_more_configurations_than_memory_holds_are_refused_in_one_line() -> None
         robot.sample(10**15)
     assert str(caught.value) == (
         "ur5: this number of configurations does not fit into memory: found n = 1000000000000000, which are "
-        "48000000 GB; draw them in parts, each with a seed of its own"
+        "48000000 GB; draw several smaller samples, each with another seed"
     )
     assert caught.value.__cause__ is None

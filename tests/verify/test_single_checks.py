@@ -1,4 +1,4 @@
-"""A check of one configuration, prepared or for many frames: the same comparison within the same bound."""
+"""The check of one configuration has the comparison and the bound of the check of a batch."""
 
 import cProfile
 import pickle
@@ -57,13 +57,13 @@ def test_a_single_call_records_the_numbers_that_the_check_of_a_batch_records(nam
                 assert one.tobytes() == other.tobytes()
                 assert entries(prompt) == entries(usual)
     assert prompt.certificate().verified
-    # The first call of each method, too, was made by the function for single calls.
+    # Even the first call of each method used the function for single configurations.
     fast = prompt._checked[frame]
     assert all(getattr(fast, f"_{method}").__name__ == "compute_and_check" for method in METHODS)
 
 
 def planted(robot: Robot, method: str, place: int, by: float) -> Any:
-    """The checked function of a method whose computation returns one wrong number; by 0, the next double."""
+    """Return the checked function of a method with one number that is wrong by `by`; 0: by one double."""
     frame = robot.tip_frame
     plan = robot.plan([robot.tree.frame_link(frame)])
     compute, _ = single(method, plan, Reference.LOCAL_WORLD_ALIGNED)
@@ -137,15 +137,6 @@ def test_a_prepared_frame_checks_if_asked_and_so_does_its_copy() -> None:
     assert copied._robot.certificate().verified
     with pytest.raises(InputError, match="verify"):
         robot.prepare("panda_hand", verify="sample")  # type: ignore[arg-type]
-
-
-def test_a_robot_that_pinocchio_cannot_check_is_computed_with_a_warning() -> None:
-    robot = urdfkin.load("planar_two_link")
-    robot.verifier.unverifiable = "a reason"
-    for _ in range(2):
-        with pytest.warns(urdfkin.NotVerifiedWarning, match="a reason"):
-            robot.jacobian(np.zeros(2))
-    assert entries(robot)["jacobian"][0::3] == (0, 2)
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos"])

@@ -1,4 +1,4 @@
-"""The compiled comparison is its definition, `bounds.disagreement`, whatever the numbers are."""
+"""The compiled comparison is its definition, `disagreement`, whatever the numbers are."""
 
 from collections.abc import Iterator
 
@@ -11,8 +11,7 @@ from scripts.check_bits import WAYS
 from urdfkin.compiled.preload import Way, only
 from urdfkin.kinematics.roundings import EPS, SMALLEST
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.bounds import Bound, disagreement
-from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.comparison import disagreement, worst_of_each
 
 ODD = (0.0, -0.0, 5e-324, 1e-310, SMALLEST, 1.0, 1.0 + EPS, -1.0, 1e300, 1.7e308, -1.7e308)
 NEVER = (np.inf, -np.inf, np.nan)
@@ -31,7 +30,7 @@ def _in_both_ways(request: pytest.FixtureRequest) -> Iterator[None]:
 
 def definition(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
     """The largest disagreement over the axes of each result; none where a result has no numbers."""
-    units = disagreement(ours, theirs, Bound(scale, np.ones(1)))
+    units = disagreement(ours, theirs, scale)
     return np.asarray(units.reshape(*ours.shape[:axes], -1).max(axis=-1, initial=0.0))
 
 

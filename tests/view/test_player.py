@@ -1,4 +1,4 @@
-"""The viewer plays a trajectory sample by sample, checks each, and saves pictures and motions."""
+"""The viewer plays the samples of a trajectory, checks each sample, and saves pictures and motions."""
 
 import io
 import re

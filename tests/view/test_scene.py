@@ -1,4 +1,4 @@
-"""Shapes are read from the URDF, their files are found, and ellipsoids and arrows are the numbers."""
+"""The viewer reads shapes from the URDF, finds mesh files, and draws ellipsoids and arrows to scale."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The viewer listens to this machine alone, follows its controls, and says what to install without viser."""
+"""The viewer's sliders, text field and overlays show the checked motion of the robot."""
 
 import re
 import signal
@@ -56,7 +56,7 @@ def viewer() -> Iterator[Viewer]:
 
 @pytest.fixture(scope="module")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """A browser for all tests that draw nothing."""
+    """Open a browser for the tests that need no pictures."""
     with opened(tmp_path_factory.mktemp("profile"), width=900, height=700, draws=False) as browser:
         yield browser
 
@@ -89,7 +89,7 @@ def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> 
         viewer.set_q(q)
         np.testing.assert_array_equal(viewer.q, q)
         np.testing.assert_allclose(shown(viewer), q, rtol=1e-15)
-        viewer.sliders.handles[seed].value = 0.25  # in either unit
+        viewer.sliders.handles[seed].value = 0.25  # 0.25 degrees or radians
         np.testing.assert_allclose(shown(viewer), viewer.q, rtol=1e-15)
         assert checked(viewer.robot.tree, viewer.words_of_q.value, "q").tolist() == viewer.q.tolist()
     far = np.full(viewer.robot.nq, 7.0)  # beyond every limit of a UR5
@@ -108,7 +108,7 @@ def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
         assert numbers == mujoco.to(q).tolist()
         assert viewer.words_of_q.label == "q of mujoco, to copy or type"
         viewer.words_of_q.value = written(mujoco.to(other := robot.sample(1, 6)[0]))
-        viewer._typed(SimpleNamespace(client=object()))
+        viewer._read_q(SimpleNamespace(client=object()))
         np.testing.assert_array_equal(viewer.q, other)
 
 
@@ -254,7 +254,7 @@ def test_a_browser_draws_it_without_errors_and_asks_nothing_elsewhere(viewer: Vi
     viewer.ellipsoid.value, viewer.columns.value = "linear", "linear"
     viewer.update()
     address = f"http://127.0.0.1:{viewer.server.get_port()}"
-    with opened(tmp_path, width=640, height=400) as browser:  # drawn by software, pixel by pixel
+    with opened(tmp_path, width=640, height=400) as browser:  # the browser draws slowly in software
         browser.requests()
         browser.chrome.get(viewer.server.address)
         browser.wait_for("verified")
@@ -267,7 +267,7 @@ def test_a_browser_draws_it_without_errors_and_asks_nothing_elsewhere(viewer: Vi
         assert browser.js(_UNNAMED) == []
 
 
-#: Controls in sight that a screen reader cannot name.
+#: Visible controls without a name for a screen reader
 _UNNAMED = """return [...document.querySelectorAll("[role=slider], [role=button], input, button")]
   .filter((e) => e.offsetParent !== null && !e.ariaLabel && !e.textContent.trim())
   .map((e) => e.outerHTML.slice(0, 300))"""
@@ -296,7 +296,7 @@ def test_the_page_follows_the_theme_of_the_browser_and_its_words_and_focus_stand
     assert kinds >= {"INPUT", "BUTTON"}
 
 
-#: The colour of each label and button, and the first colour behind it that is not transparent.
+#: Colour of each label and button, and the colour of its background
 _COLOURS = """return [...document.querySelectorAll("label, button, .mantine-Slider-markLabel")]
   .filter((e) => e.offsetParent !== null && e.textContent.trim()).map((e) => {
     let behind = e;
@@ -307,7 +307,7 @@ _COLOURS = """return [...document.querySelectorAll("label, button, .mantine-Slid
 
 
 def _contrast(*colours: list[float]) -> float:
-    """The contrast of WCAG 2.2 of two opaque colours."""
+    """Return the contrast of two opaque colours, as WCAG 2.2 defines it."""
     light = []
     for colour in colours:
         parts = np.array(colour[:3]) / 255.0
@@ -316,7 +316,7 @@ def _contrast(*colours: list[float]) -> float:
     return max(light) / min(light)
 
 
-#: The element with the focus: its kind, the width and colour of its outline, and the colour behind it.
+#: Kind of the element with the focus, width and colour of its outline, and colour of its background
 _RING = """const e = document.activeElement, style = getComputedStyle(e);
   const colour = (x) => getComputedStyle(x).backgroundColor;
   let behind = e.parentElement;
@@ -368,7 +368,7 @@ def _until(holds: Callable[[], bool]) -> bool:
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium: Browser, width: int) -> None:
-    # Without its shapes, and nothing is drawn: by software a browser would spend its time there.
+    # The robot has no shapes, because a browser draws them slowly in software.
     bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
     with shown_robot(urdfkin.load(bare)) as viewer:
         n = len(viewer.sliders.rows)
@@ -393,12 +393,12 @@ def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium:
             assert _until(lambda before=before: bool((viewer.q != before).any())), label  # type: ignore[misc]
             assert _until(equal), label
         before = viewer.q.copy()
-        chromium.chrome.find_elements("css selector", "[role=slider]")[4].send_keys("\ue014")  # a step right
+        chromium.chrome.find_elements("css selector", "[role=slider]")[4].send_keys("\ue014")  # right arrow
         assert _until(lambda: viewer.q[4] != before[4])
         assert (np.delete(viewer.q, 4) == np.delete(before, 4)).all(), "the others stay, to the bit"
         assert abs(np.rad2deg(viewer.q[4] - before[4]) - 1.0) < 0.01, "one key moves one degree"
         assert _until(equal)
-        # On a telephone, too, nothing lies beyond the edge.
+        # On a phone, too, all sliders are within the window.
         assert all(0 <= left < right <= width for left, right in chromium.js(_EDGES)[:n])
         chromium.screenshot(f"viewer-{width}")
 

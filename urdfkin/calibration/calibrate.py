@@ -1,8 +1,7 @@
 """Calibrate a robot: fit its parameters to measured poses, and report their uncertainty and warnings.
 
-A fit that is not plausible (`plausible.py`) is refused. If the fit is plausible, only the parameters that
-changed by more than two standard deviations are written. The other parameters keep their original values, and
-the parameters to write are fitted again.
+A fit that is not plausible (`plausible.py`) is refused. Otherwise the parameters that changed by more than
+two standard deviations are fitted again and written. The other parameters keep their original values.
 
 `read_poses` reads measured poses. A CSV file has a column for each coordinate, with the coordinate's name.
 The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. Instead
@@ -23,23 +22,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.calibration.fit import (
-    WRONGLY,
+    FALSE_ALARM,
     Fit,
     Identification,
     Measured,
     Noise,
     best_fit,
-    demand_plausible,
+    demand_metres,
     first_names,
     identify,
-    odd_poses,
+    outliers,
     quantile,
     significant,
     stacked,
-    starting,
+    start_values,
 )
 from urdfkin.calibration.parameters import CalibrationModel, Parameter, table_model, urdf_model
-from urdfkin.calibration.plausible import Ended, Plausibility, judge
+from urdfkin.calibration.plausible import FitWithData, Plausibility, check_plausibility
 from urdfkin.calibration.write_back import Rewritten
 from urdfkin.comparison.result import length
 from urdfkin.dh.table import DHTable
@@ -58,23 +57,22 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general`.
 _GENERAL = 40
-#: A warning is shown if the residuals differ from the stated noise by more standard deviations than this.
+#: Number of standard deviations by which the residuals must differ from the stated noise for a warning.
 _UNLIKELY = 4.0
-#: A parameter is poorly observable if its ratio of uncertainties (`Calibration.weak`) exceeds this number.
+#: Ratio of uncertainties (`Calibration.weak`) above which a parameter is poorly observable.
 _WEAK = 10.0
-#: `Calibration.weak` uses this seed of random configurations; `Calibration.general` uses another seed.
-_OTHERS = 1
-#: In J = Q R, a diagonal entry of R of at most this fraction of the largest entry means dependent columns.
+#: Seed of the random configurations for `Calibration.weak`.
+_WEAK_SEED = 1
+#: Diagonal entry of R in J = Q R below which columns count as dependent, relative to R's largest entry.
 _DEPENDENT = 1e-12
-#: The robot's size divided by these numbers gives the coordinates of a target that lies on no joint axis.
-_ASIDE = {"x": 5.0, "y": 6.0, "z": 7.0}
-#: `ParametricChain.rounding` is multiplied by this factor for the comparison with Pinocchio.
-#: Pinocchio's result has more rounding errors: it computes the poses of base and tip separately.
-#: It also reads the origins from the written file.
+#: Divisors of the robot's size that give the coordinates of a target that lies on no joint axis.
+_TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
+#: Factor of `ParametricChain.rounding` for the comparison with Pinocchio.
+#: Pinocchio rounds more often: it reads the written file, and computes the poses of base and tip separately.
 _READ_BACK = 4.0
-#: A warning names this number of parameters or poses.
+#: Maximum number of parameters or poses that a warning names.
 _NAMED = 6
-#: The error has this text if no common mistake in the data explains a refused fit.
+#: Message for a refused fit that no common mistake in the data explains.
 _NO_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
 )
@@ -93,13 +91,11 @@ class Calibration:
         before: The fit of only base and tool, with the robot's original parameters.
         odd: Indices of those poses that are outliers.
         without_odd: The fit without the outliers.
-        weak: Indices of poorly observable parameters, each with a ratio of uncertainties. The ratio is the
-            uncertainty at the measured configurations, divided by the uncertainty at the same number of
-            random configurations.
+        weak: Indices of poorly observable parameters, each with a ratio of uncertainties: the uncertainty at
+            the measured configurations, divided by the uncertainty at as many random configurations.
         certificate: The result of checking the written model with Pinocchio.
         stated: Whether the user stated the noise.
-        written_fit: The fit of the written parameters. The other parameters have their original values. If
-            all parameters are written, `written_fit` is equal to `fitted`.
+        written_fit: The fit of the written parameters; the other parameters have their original values.
         significant: Indices of the parameters that `written_fit` fits.
         plausibility: The reasons why the fit is refused; empty for a plausible fit.
     """
@@ -126,9 +122,10 @@ class Calibration:
     @cached_property
     def values(self) -> FloatArray:
         """(p,) change of each parameter, m and rad; 0 for fixed parameters."""
-        return (
-            np.zeros(len(self.parameters)) if self.fitted is None else self.fitted.at - self.model.way.start
-        )
+        return self._change(self.fitted)
+
+    def _change(self, fit: Fit | None) -> FloatArray:
+        return np.zeros(len(self.parameters)) if fit is None else fit.at - self.model.way.start
 
     @cached_property
     def writable(self) -> frozenset[int]:
@@ -144,16 +141,15 @@ class Calibration:
     @cached_property
     def written_values(self) -> FloatArray:
         """(p,) change of each parameter in the written fit, m and rad."""
-        found = self.written_fit
-        return np.zeros(len(self.parameters)) if found is None else found.at - self.model.way.start
+        return self._change(self.written_fit)
 
     @cached_property
     def deviations(self) -> FloatArray:
         """(p,) standard deviations, m and rad; 0 for fixed parameters."""
-        found = np.zeros(len(self.parameters))
+        deviations = np.zeros(len(self.parameters))
         if self.fitted is not None:
-            found[list(self.identification.kept)] = np.sqrt(np.diag(self.fitted.covariance))
-        return found
+            deviations[list(self.identification.kept)] = np.sqrt(np.diag(self.fitted.covariance))
+        return deviations
 
     @property
     def origins(self) -> dict[str, FloatArray]:
@@ -188,12 +184,12 @@ class ImplausibleError(InputError):
     """
 
     def __init__(self, calibration: Calibration, remedy: str) -> None:
-        model, judged = calibration.model, calibration.plausibility
-        reason = f"likeliest reason: {judged.reason}" if judged.reason else _NO_REASON
+        model, plausibility = calibration.model, calibration.plausibility
+        reason = f"likeliest reason: {plausibility.reason}" if plausibility.reason else _NO_REASON
         super().__init__(
             "the calibration is not plausible and was refused",
             where=f"{calibration.robot.name}, {model.base} to {model.tip}",
-            found="; ".join(judged.objections),
+            found="; ".join(plausibility.objections),
             remedy=f"{reason}; {remedy}",
         )
         self.calibration = calibration
@@ -288,11 +284,11 @@ def fitted_model(
     complete: bool = True,
     radians: bool = False,
     every: bool = True,
-    judged: bool = True,
+    check: bool = True,
 ) -> Calibration:
     """Fit as `calibrate` does, but also return fits that are not plausible.
 
-    If `judged` is False, the plausibility is not checked.
+    If `check` is False, the plausibility is not checked.
     """
     robot = source if isinstance(source, Robot) else load(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
@@ -309,18 +305,16 @@ def fitted_model(
     drop_odd, complete = as_bool(drop_odd, "drop_odd"), as_bool(complete, "complete")
     if (q is None) != (poses is None):
         raise InputError("`q` and `poses` must be given together", found="only one of the two")
-    given = None if q is None or poses is None else _check_measured(robot, model, q, poses)
-    if given is not None:
-        complete = given[1].complete
     general = _values(model, robot, robot.sample(_GENERAL))
-    if given is None:
-        could = identify(model, general, complete=complete, at=_general_target(model))
-        return Calibration(robot, model, could, could)
-    path_q, measured = given
-    ended, found = _fit(robot, model, path_q, measured, noise, drop_odd, every=every)
-    found = replace(found, general=identify(model, general, complete=complete, at=ended.fitted.at))
-    if judged:
-        found = replace(found, plausibility=judge(model, ended, radians=radians))
+    if q is None or poses is None:
+        identifiable = identify(model, general, complete=complete, at=_general_target(model))
+        return Calibration(robot, model, identifiable, identifiable)
+    path_q, measured = _check_measured(robot, model, q, poses)
+    data, found = _fit(robot, model, path_q, measured, noise, drop_odd, every=every)
+    identifiable = identify(model, general, complete=measured.complete, at=data.fitted.at)
+    found = replace(found, general=identifiable)
+    if check:
+        found = replace(found, plausibility=check_plausibility(data, radians=radians))
     return replace(
         found, certificate=_verify_written(found, measured, np.atleast_2d(np.asarray(q, dtype=np.float64)))
     )
@@ -331,7 +325,7 @@ def _general_target(model: CalibrationModel) -> FloatArray:
     at = model.way.start.copy()
     for k, parameter in enumerate(model.way.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
-            at[k] = model.way.size / _ASIDE[parameter.what]
+            at[k] = model.way.size / _TARGET_DIVISORS[parameter.what]
     return at
 
 
@@ -357,7 +351,7 @@ def _check_measured(
     if not len(T):
         raise InputError("no poses", remedy="give more measured numbers than there are parameters")
     measured = Measured(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measured(values, T)
-    demand_plausible(model, measured)
+    demand_metres(model, measured)
     return path_q, measured
 
 
@@ -370,24 +364,24 @@ def _fit(
     drop_odd: bool,
     *,
     every: bool,
-) -> tuple[Ended, Calibration]:
-    stated, start = None if noise is None else _parse_noise(noise), starting(model, measured)
+) -> tuple[FitWithData, Calibration]:
+    stated, start = None if noise is None else _parse_noise(noise), start_values(model, measured)
     identification = identify(model, measured.values, complete=measured.complete, at=start)
     ends = [k for k in identification.kept if model.way.parameters[k].end]
     before = best_fit(model, measured, ends, stated, start)
     found = best_fit(model, measured, identification.kept, stated, before.at)
     identification, found = _add_identifiable(model, measured, identification, stated, found)
-    odd, clean = odd_poses(model, measured, identification.kept, stated, found)
+    odd, clean = outliers(model, measured, identification.kept, stated, found)
     if drop_odd and odd:
         chosen = np.ones(len(measured), dtype=bool)
         chosen[list(odd)] = False
         q, measured, found = q[chosen], measured.some(chosen), clean
         before = best_fit(model, measured, ends, stated, before.at)
-    ended = Ended(q, measured, identification, before, found)
-    significant_, written = identification.kept, found
+    fit = FitWithData(model, q, measured, identification, before, found)
+    chosen_parameters, written = identification.kept, found
     if not every:
-        significant_, written = _significant(model, ended, stated)
-    return ended, Calibration(
+        chosen_parameters, written = _significant(fit, stated)
+    return fit, Calibration(
         robot,
         model,
         identification,
@@ -399,26 +393,22 @@ def _fit(
         _weak(robot, model, measured, identification.kept, found.at),
         stated=noise is not None,
         written_fit=written,
-        significant=significant_,
+        significant=chosen_parameters,
     )
 
 
-def _significant(model: CalibrationModel, ended: Ended, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
+def _significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
     """Return the parameters to write, which always include base and tool, and their fit."""
-    kept, found = ended.identification.kept, ended.fitted
-    fixed = [model.way.parameters[k].end for k in kept]
-    moved = found.at[list(kept)] - model.way.start[list(kept)]
-    chosen = tuple(
-        k
-        for k, is_written in zip(kept, significant(moved, found.covariance, fixed), strict=True)
-        if is_written
-    )
+    model, kept, found = fit.model, fit.identification.kept, fit.fitted
+    is_end = [model.way.parameters[k].end for k in kept]
+    change = found.at[list(kept)] - model.way.start[list(kept)]
+    chosen = tuple(np.array(kept, dtype=int)[significant(change, found.covariance, is_end)].tolist())
     if chosen == kept:
         return kept, found
     at = found.at.copy()
     out = [k for k in kept if k not in chosen]
     at[out] = model.way.start[out]
-    return chosen, best_fit(model, ended.measured, chosen, stated, at)
+    return chosen, best_fit(model, fit.measured, chosen, stated, at)
 
 
 def _add_identifiable(
@@ -430,9 +420,8 @@ def _add_identifiable(
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values, if they significantly reduce the residuals.
 
-    A nominal model is often a special case in which fewer parameters are identifiable. For example, the
-    position of a tip on the last axis does not depend on the last joint's angle. The position of a tip beside
-    this axis depends on this angle.
+    Fewer parameters are identifiable in special cases, and a nominal model is often such a case. For example,
+    the position of a tip depends on the last joint's angle, but not if the tip is on the last axis.
     """
     again = identify(model, measured.values, complete=measured.complete, at=found.at)
     more = again.rank - identification.rank
@@ -441,7 +430,7 @@ def _add_identifiable(
     trial = best_fit(model, measured, again.kept, stated, found.at)
     scale = trial.noise.of(measured.complete)
     explained = float(((found.errors / scale) ** 2).sum() - ((trial.errors / scale) ** 2).sum())
-    return (again, trial) if explained > quantile(1.0 - WRONGLY, more) else (identification, found)
+    return (again, trial) if explained > quantile(1.0 - FALSE_ALARM, more) else (identification, found)
 
 
 def _parse_noise(noise: tuple[float, float]) -> Noise:
@@ -461,23 +450,22 @@ def _weak(
     robot: Robot, model: CalibrationModel, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
     """Return the poorly observable parameters, each with the ratio that `Calibration.weak` explains."""
-    general = _values(model, robot, robot.sample(len(measured), seed=_OTHERS))
-    sizes = []
+    general = _values(model, robot, robot.sample(len(measured), seed=_WEAK_SEED))
+    uncertainties = []
     for values in (measured.values, general):
         J = stacked(model, values, complete=measured.complete, at=at)[:, list(kept)]
         _, R = np.linalg.qr(J)
         if (np.abs(np.diag(R)) <= _DEPENDENT * np.abs(R).max(initial=0.0)).any() or len(R) < len(kept):
             return {}
-        sizes.append(np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
-    ratios = sizes[0] / sizes[1]
+        uncertainties.append(np.linalg.norm(np.linalg.solve(R, np.eye(len(R))), axis=1))
+    ratios = uncertainties[0] / uncertainties[1]
     return {k: float(ratio) for k, ratio in zip(kept, ratios, strict=True) if ratio > _WEAK}
 
 
 def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
     """Compare the written model with Pinocchio at the measured configurations.
 
-    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison. A calibrated table
-    is checked by `load`.
+    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison.
     """
     model, fitted = found.model, found.written_fit
     if fitted is None:
@@ -485,20 +473,20 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
     at = fitted.at.copy()
     at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # `load` already gave these warnings.
+        warnings.simplefilter("ignore")  # the first `load` gave these warnings
         if (table := found.table) is not None:
-            made = load(table)
-            made.placement(made.neutral(), made.tip_frame)
-            return made.certificate()
+            robot = load(table)
+            robot.placement(robot.neutral(), robot.tip_frame)
+            return robot.certificate()
         T = found.written.loaded.placement(q, [model.base, model.tip])
     theirs = np.linalg.solve(T[:, 0], T[:, 1])
-    away = np.abs(theirs - model.way.poses(measured.values, at))
+    error = np.abs(theirs - model.way.poses(measured.values, at))
     bound = _READ_BACK * model.way.rounding(measured.values)
-    if away[:, :3, 3].max() > bound or away[:, :3, :3].max() > bound / model.way.size:
+    if error[:, :3, 3].max() > bound or error[:, :3, :3].max() > bound / model.way.size:
         raise UrdfkinError(
             "the written URDF disagrees with the fit",
             where=f"{found.robot.name}, {model.base} to {model.tip}",
-            found=f"a difference of {float(away.max()):.3g} m or rad, but rounding explains only {bound:.3g}",
+            found=f"a difference of {error.max():.3g} m or rad, but rounding explains only {bound:.3g}",
             remedy="please report this as an error of urdfkin, with the robot and the poses",
         )
     return found.written.loaded.certificate()
@@ -506,10 +494,10 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
 
 def doubts(found: Calibration) -> list[str]:
     """Return the warnings about a calibration, one line each."""
-    return list(_doubts(found))
+    return list(_warnings(found))
 
 
-def _doubts(found: Calibration) -> Iterator[str]:
+def _warnings(found: Calibration) -> Iterator[str]:
     fitted, name = found.fitted, [str(parameter) for parameter in found.parameters]
     if fitted is None:
         return
@@ -558,12 +546,12 @@ def _doubts(found: Calibration) -> Iterator[str]:
         )
 
 
-#: A rotation matrix or a quaternion's length may have this error: a file contains rounded digits.
+#: Largest error of a rotation matrix or of a quaternion's length in a file, which contains rounded digits.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 _LAST_ROW = tuple(f"T3{j}" for j in range(4))
-#: Units of positions, metres.
+#: Length (m) of each unit of positions.
 UNITS = {"m": 1.0, "mm": 1e-3}
 
 
@@ -577,16 +565,15 @@ def read_poses(
 ) -> tuple[FloatArray, FloatArray]:
     """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
 
-    A file with the suffix .npz is read as such, any other file as CSV. A file that cannot be read raises
-    SourceError, and wrong content InputError.
+    A file without the suffix .npz is read as CSV. A file that cannot be read raises SourceError, and wrong
+    content raises InputError.
 
     Args:
         path: The file.
         coordinates: Names of the coordinates of q.
         needed: Names of the required columns.
         unit: Unit of the positions: "m" or "mm".
-        units: Unit of each coordinate, from `column_units`; the heading of a coordinate's column may end with
-            a unit.
+        units: Unit of each coordinate, from `column_units`. The heading of a column may end with a unit.
         rest: (nq,) values of coordinates without a column; None: zeros.
     """
     if path.suffix.lower() == ".npz":
@@ -653,12 +640,13 @@ def _archive(path: Path, nq: int) -> tuple[FloatArray, FloatArray]:
 
 def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray:
     lengths = np.linalg.norm(quat, axis=-1, keepdims=True)
-    off = np.abs(lengths - 1.0)
-    if off.size and off.max() > _WRITTEN:
+    errors = np.abs(lengths - 1.0)
+    if errors.max(initial=0.0) > _WRITTEN:
+        worst = int(errors.argmax())
         raise InputError(
             "an orientation must be a quaternion of length 1, scalar last",
-            where=f"{where}, pose {int(off.argmax())}",
-            found=f"length {float(lengths[off.argmax(), 0]):.6g}",
+            where=f"{where}, pose {worst}",
+            found=f"length {float(lengths[worst, 0]):.6g}",
         )
     T = np.broadcast_to(np.eye(4), (len(p), 4, 4)).copy()
     T[:, :3, :3], T[:, :3, 3] = rotation_of(quat / lengths), p
@@ -668,16 +656,16 @@ def _with_quaternions(p: FloatArray, quat: FloatArray, where: str) -> FloatArray
 def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
     """Replace each measured rotation by the nearest rotation matrix, because the input may be rounded."""
     R = T[:, :3, :3]
-    bad = rotation_defect(R) > _WRITTEN
-    if bad.any():
+    wrong = rotation_defect(R) > _WRITTEN
+    if wrong.any():
         raise InputError(
             "a pose must be a rotation and a translation",
-            where=f"{where}, pose {int(bad.argmax())}",
-            found=str(T[bad.argmax()].tolist()),
+            where=f"{where}, pose {int(wrong.argmax())}",
+            found=str(T[wrong.argmax()].tolist()),
         )
-    good = T.copy()
-    good[:, :3, :3] = polar_factor(R)
-    return good
+    exact = T.copy()
+    exact[:, :3, :3] = polar_factor(R)
+    return exact
 
 
 def checked_poses(poses: ArrayLike) -> FloatArray:

@@ -2,24 +2,24 @@
 
 **Identifiability.** A change of parameters cannot be identified if it has no effect on the measurements. Such
 a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
-parameters. For each singular value, `urdfkin.verify.singular_values` computes a lower bound. The bound takes
+parameters. For each singular value, `urdfkin.verify.singular_values` computes a lower bound, which takes
 rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
-lower bound. You do not have to choose a tolerance.
+lower bound, so no tolerance must be chosen.
 
-The frame of a revolute joint can be shifted along the joint's axis and rotated about it, if the next frame
-compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the joint's
-direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable. For each prismatic joint,
-2 of the 6 parameters are identifiable. All 6 parameters of the tip are identifiable (Everett, Driels and
-Mooring, 1987). If only positions are measured, 3 fewer parameters are identifiable, because the tool's
-orientation is unknown.
+The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis, if the next
+frame compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
+joint's direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable, and 2 of the 6
+parameters of each prismatic joint. All 6 parameters of the tip are identifiable (Everett, Driels and Mooring,
+1987). If only positions are measured, 3 fewer parameters are identifiable, because the tool's orientation is
+unknown.
 
-The parameters that are not fitted are fixed. Orthogonal elimination chooses the fixed parameters joint by
-joint, from base to tip. Each parameter has a column in the Jacobian. In each step, the elimination subtracts
-from every other column its projection onto the kept columns. The length of the remainder measures how
-independent the column is. A column is a candidate if its remainder is at least half as long as the longest
-remainder. The elimination keeps the first candidate in the model's order of preference. As a result, no
-fitted parameter becomes large to compensate for a fixed parameter. Without this choice, four parameters of
-nearly parallel axes would become hundreds of metres long and cancel each other.
+Orthogonal elimination chooses the parameters that are not fitted, joint by joint, from base to tip. Each
+parameter has a column in the Jacobian. In each step, the elimination subtracts from every other column its
+projection onto the kept columns. The length of the remainder measures how independent the column is. A column
+is a candidate if its remainder is at least half as long as the longest remainder. The elimination keeps the
+first candidate in the model's order of preference. As a result, no fitted parameter becomes large to
+compensate for a fixed parameter. Without this choice, four parameters of nearly parallel axes would become
+hundreds of metres long and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -30,22 +30,21 @@ and r the weighted residuals. The covariance of the parameters is
 The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
 
 Noise that you do not state is estimated from the residuals, separately for positions and rotations. The
-variance of the positions is estimated as a quotient. The numerator is the sum of the squared position
-residuals. The denominator is the sum of the redundancies 1 - H_ii of the measured position coordinates. The
-variance of the rotations is computed in the same way. This estimate is repeated until it is constant
-(Foerstner's variance components).
+variance of the positions is the sum of the squared position residuals, divided by the sum of the redundancies
+1 - H_ii of the measured position coordinates. The variance of the rotations is computed in the same way. The
+estimates are repeated until they are constant (Foerstner's variance components).
 
 A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a correct pose this number is chi^2
 distributed, with 3 degrees of freedom for a position and 6 for a full pose. The limit is chosen so that only
-one of a hundred data sets without outliers exceeds it. One outlier can hide another. Therefore each step
+one of a hundred data sets without outliers exceeds the limit. One outlier can hide another, so each step
 removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
 
 **Start values.** Base and tool are computed from the poses before the fit. With the robot's poses T_i, the
 measured poses M_i, the base B and the tool X, M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are linear in
-the two unknown rotations. Together these rotations form the null vector of the equations (Shah, 2013). The
-measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only
-positions are measured, the base and the position of the target on the tip are unknown. With a known target,
-the equations for the base are linear. With a known base, the equations for the target are linear. The module
+the two unknown rotations, which together form the null vector of the equations (Shah, 2013). The measured
+positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only positions are
+measured, the base and the position of the target on the tip are unknown. The equations for the base are
+linear if the target is known, and the equations for the target are linear if the base is known. The module
 therefore computes base and target alternately.
 """
 
@@ -67,11 +66,12 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: The elimination may keep a column if its remainder is at least this fraction of the longest remainder.
+#: Smallest remainder of a column that the elimination may keep, as a fraction of the longest remainder.
 _AS_GOOD = 0.5
-#: If a parameter is fixed, a message names fitted parameters that together have the same effect.
-#: It names at most `_NAMED` of them, each with more than the fraction `_SHARE` of the fixed one's effect.
-_NAMED, _SHARE = 3, 1e-6
+#: Maximum number of fitted parameters that a message names because they have the effect of a fixed parameter.
+_NAMED = 3
+#: Smallest fraction of a fixed parameter's effect for which a message names a fitted parameter.
+_SHARE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -97,17 +97,16 @@ class Identification:
 def stacked(
     model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
 ) -> FloatArray:
-    """Return the Jacobian (rows, p) of all measured coordinates, in metres.
+    """Return the Jacobian (rows, p) of all measured coordinates, for the arguments of `identify`.
 
-    The rows for rotations are multiplied by the length `way.size`, and are then in metres too. The arguments
-    are those of `identify`.
+    All entries are in metres: the rows for rotations are multiplied by the length `way.size`.
     """
     L = model.way.size
     _, columns = model.way.columns(values, at)
     columns[:, 3:] *= L
     lengths = np.array([1.0 if parameter.unit == "m" else 1.0 / L for parameter in model.way.parameters])
-    seen = columns[:, : 6 if complete else 3] * lengths
-    return seen.reshape(-1, len(lengths)) if len(lengths) else np.empty((seen.size, 0))
+    J = columns[:, : 6 if complete else 3] * lengths
+    return J.reshape(-1, len(lengths)) if len(lengths) else np.empty((J.size, 0))
 
 
 def identify(
@@ -115,16 +114,16 @@ def identify(
 ) -> Identification:
     """Determine which parameters of a model are identifiable from the joint values (s, n).
 
-    `complete` is True for measured full poses, False for positions. The Jacobian is computed at the
-    parameters `at` (p,), by default the model's start values.
+    `complete` is True if full poses are measured, and False if positions are measured. The Jacobian is
+    computed at the parameters `at` (p,), by default at the model's start values.
     """
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.way.rounding(values))
     kept = list[int]()
     for group in model.groups:
-        among = [*kept, *group]
-        wanted = _rank(J[:, among], error[:, among]) - len(kept)
-        kept += _most_independent(J, kept, group, wanted)
+        columns = [*kept, *group]
+        count = _rank(J[:, columns], error[:, columns]) - len(kept)
+        kept += _most_independent(J, kept, group, count)
     still = {k: _reason(model, J, error, kept, k) for group in model.groups for k in group if k not in kept}
     return Identification(tuple(kept), still, len(J))
 
@@ -136,26 +135,24 @@ def _rank(J: FloatArray, error: FloatArray) -> int:
     return int(np.count_nonzero(lower > 0.0))
 
 
-def _most_independent(J: FloatArray, kept: Sequence[int], group: Sequence[int], wanted: int) -> list[int]:
-    Q, left, chosen = np.linalg.qr(J[:, list(kept)])[0], J[:, list(group)].copy(), list[int]()
-    left -= Q @ (Q.T @ left)
-    for _ in range(max(wanted, 0)):
-        sizes = np.linalg.norm(left, axis=0)
-        i = int(np.argmax(sizes >= _AS_GOOD * sizes.max()))
+def _most_independent(J: FloatArray, kept: Sequence[int], group: Sequence[int], count: int) -> list[int]:
+    Q, remainders, chosen = np.linalg.qr(J[:, list(kept)])[0], J[:, list(group)].copy(), list[int]()
+    remainders -= Q @ (Q.T @ remainders)
+    for _ in range(max(count, 0)):
+        lengths = np.linalg.norm(remainders, axis=0)
+        i = int(np.argmax(lengths >= _AS_GOOD * lengths.max()))
         chosen.append(group[i])
-        direction = left[:, i] / sizes[i]
-        left -= np.outer(direction, direction @ left)
-        left[:, i] = 0.0
+        direction = remainders[:, i] / lengths[i]
+        remainders -= np.outer(direction, direction @ remainders)
+        remainders[:, i] = 0.0
     return sorted(chosen, key=list(group).index)
 
 
 def _reason(model: CalibrationModel, J: FloatArray, error: FloatArray, kept: Sequence[int], k: int) -> str:
-    column = J[:, k]
+    column, others = J[:, k], J[:, list(kept)]
     if np.linalg.norm(column) <= np.linalg.norm(error[:, k]):
         return "no effect on the measured numbers"
-    shares = np.linalg.lstsq(J[:, list(kept)], column, rcond=None)[0] * np.linalg.norm(
-        J[:, list(kept)], axis=0
-    )
+    shares = np.linalg.lstsq(others, column, rcond=None)[0] * np.linalg.norm(others, axis=0)
     shares = np.abs(shares) / np.linalg.norm(column)
     order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
     names = first_names((str(model.way.parameters[kept[i]]) for i in order), _NAMED)
@@ -163,24 +160,26 @@ def _reason(model: CalibrationModel, J: FloatArray, error: FloatArray, kept: Seq
 
 
 def first_names(names: Iterable[str], most: int) -> str:
-    """Return the first `most` names for a message, and the number of the others."""
+    """Return the first `most` names for a message, and how many more names there are."""
     every = list(names)
     return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
-#: A fit cannot be checked if the sum of all redundancies is below this number.
+#: Smallest sum of all redundancies with which a fit can be checked; the sum is a whole number up to rounding.
 _ONE_OR_MORE = 0.5
-#: An eigenvalue of 1 - H_ii below this fraction of the largest eigenvalue is replaced by zero.
+#: Fraction of the largest eigenvalue of 1 - H_ii below which an eigenvalue is replaced by zero.
 #: The residuals do not show an error of the pose along the eigenvector of such an eigenvalue.
-_FOLLOWED = 1e-9
-#: At most `_ESTIMATES` noises are estimated; a relative change of at most `_STAYS` ends the estimation.
-_ESTIMATES, _STAYS = 20, 1e-3
-#: An outlier is reported with this probability for a data set that has no outliers.
-WRONGLY = 0.01
-#: A parameter that changed by less than this number of standard deviations is not written.
+_UNOBSERVED = 1e-9
+#: Maximum number of estimates of the noise.
+_ESTIMATES = 20
+#: Relative change of the estimated noise at which the estimation ends.
+_CONSTANT = 1e-3
+#: Probability that an outlier is reported for a data set without outliers.
+FALSE_ALARM = 0.01
+#: Number of standard deviations by which a parameter must change to be written.
 SIGMAS = 2.0
-#: At most this share of all poses may be outliers.
-_MOST_ODD = 0.25
+#: Maximum fraction of outliers among all poses.
+_MOST_OUTLIERS = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,13 +209,13 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations: of each position coordinate (m), and of the rotation about each axis (rad)."""
+    """Standard deviations of each position coordinate (m), and of the rotation about each axis (rad)."""
 
     metres: float
     radians: float
 
     def of(self, complete: bool) -> FloatArray:
-        """Return the standard deviations of one pose, (6,), or of one position, (3,)."""
+        """Return the standard deviations (6,) of a full pose, or (3,) of a position."""
         return np.array([self.metres] * 3 + ([self.radians] * 3 if complete else []))
 
 
@@ -230,21 +229,21 @@ class Fit:
         noise: The standard deviations by which the residuals are divided.
         covariance: (k, k) covariance of the fitted parameters, in the units of the parameters. The covariance
             is infinite if the redundancy is 0.
-        left: (s, 6) or (s, 3) array with the redundancy of each measured coordinate, which is 1 - H_ii.
-        odd: (s,) chi^2 statistic of each pose.
+        redundancies: (s, 6) or (s, 3) redundancy 1 - H_ii of each measured coordinate.
+        chi_squares: (s,) chi^2 statistic of each pose.
     """
 
     at: FloatArray
     errors: FloatArray
     noise: Noise
     covariance: FloatArray
-    left: FloatArray
-    odd: FloatArray
+    redundancies: FloatArray
+    chi_squares: FloatArray
 
     @property
     def freedom(self) -> float:
         """The total redundancy: the number of measured coordinates minus the number of fitted parameters."""
-        return float(self.left.sum())
+        return float(self.redundancies.sum())
 
     @property
     def is_judged(self) -> bool:
@@ -253,10 +252,7 @@ class Fit:
 
     @property
     def ratio(self) -> float:
-        """The ratio of the noise in the residuals to the stated noise.
-
-        If the stated noise is correct, the ratio is about 1, with the standard deviation 1/sqrt(2 `freedom`).
-        """
+        """The ratio of the noise in the residuals to the stated noise; about 1 if the noise is correct."""
         if not self.is_judged:
             return math.nan
         whitened = self.errors / self.noise.of(self.errors.shape[1] == 6)
@@ -264,13 +260,13 @@ class Fit:
 
     @property
     def spread(self) -> float:
-        """The standard deviation of `ratio`."""
+        """The standard deviation of `ratio` if the stated noise is correct."""
         return 1.0 / math.sqrt(2.0 * max(self.freedom, _ONE_OR_MORE))
 
     def rms(self) -> tuple[float, float | None]:
         """Return the root mean square of the position errors (m) and of the orientation errors (rad)."""
-        position, turn = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))
-        return float(position), float(turn) if self.errors.shape[1] == 6 else None
+        position, rotation = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))
+        return float(position), float(rotation) if self.errors.shape[1] == 6 else None
 
 
 def errors(model: CalibrationModel, measured: Measured, at: FloatArray) -> FloatArray:
@@ -279,14 +275,14 @@ def errors(model: CalibrationModel, measured: Measured, at: FloatArray) -> Float
     Each row contains the position error (m) and, for full poses, the rotation error (rad), along the axes of
     the base frame.
     """
-    return _apart(measured, model.way.poses(measured.values, at))
+    return _residuals(measured, model.way.poses(measured.values, at))
 
 
-def _apart(measured: Measured, T: FloatArray) -> FloatArray:
-    away = measured.p - T[:, :3, 3]
+def _residuals(measured: Measured, T: FloatArray) -> FloatArray:
+    p = measured.p - T[:, :3, 3]
     if measured.R is None:
-        return away
-    return np.hstack([away, log_rotation(measured.R @ T[:, :3, :3].swapaxes(-1, -2))])
+        return p
+    return np.hstack([p, log_rotation(measured.R @ T[:, :3, :3].swapaxes(-1, -2))])
 
 
 def best_fit(
@@ -296,33 +292,33 @@ def best_fit(
 
     If `noise` is None, the noise is estimated from the residuals.
     """
-    weights = noise or Noise(1.0, 1.0 / model.way.size)
+    problem = _LeastSquares(model, measured, list(kept), noise or Noise(1.0, 1.0 / model.way.size))
     for _ in range(1 if noise else _ESTIMATES):
-        at = _minimize(model, measured, kept, weights, at)
-        found = _evaluate(model, measured, kept, weights, at)
+        at = problem.minimum(at)
+        found = problem.fit(at)
         if noise or not found.is_judged:
             break
-        estimated = _estimate_noise(found, model, measured)
-        stays = abs(estimated.metres - weights.metres) <= _STAYS * weights.metres and (
-            not measured.complete or abs(estimated.radians - weights.radians) <= _STAYS * weights.radians
+        old, new = problem.noise, _estimate_noise(found, model, measured)
+        is_constant = abs(new.metres - old.metres) <= _CONSTANT * old.metres and (
+            not measured.complete or abs(new.radians - old.radians) <= _CONSTANT * old.radians
         )
-        weights = estimated
-        if stays:
+        problem = replace(problem, noise=new)
+        if is_constant:
             break
-    found = _evaluate(model, measured, kept, weights, at)
+    found = problem.fit(at)
     if noise is None and not found.is_judged:
         found = replace(found, covariance=np.full_like(found.covariance, np.inf))
     return found
 
 
 def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> Noise:
-    """Estimate the noise from the residuals; it is never below rounding error, because it is a divisor."""
+    """Estimate the noise from the residuals; the noise is a divisor, so it is at least the rounding error."""
     rounding = model.way.rounding(measured.values)
 
     def of(part: slice, least: float, former: float) -> float:
-        left = float(found.left[:, part].sum())
+        redundancy = float(found.redundancies[:, part].sum())
         size = float((found.errors[:, part] ** 2).sum())
-        return max(math.sqrt(size / left), least) if left > _ONE_OR_MORE else former
+        return max(math.sqrt(size / redundancy), least) if redundancy > _ONE_OR_MORE else former
 
     return Noise(
         of(slice(0, 3), rounding, found.noise.metres),
@@ -330,75 +326,69 @@ def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> 
     )
 
 
-def _whitened(
-    model: CalibrationModel, measured: Measured, noise: Noise, at: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the residuals (rows,) divided by the noise, and the poses along the path."""
-    frames = model.way.frames(measured.values, at)
-    return (_apart(measured, frames[:, -1]) / noise.of(measured.complete)).ravel(), frames
+@dataclass(frozen=True, eq=False)
+class _LeastSquares:
+    """The minimization of the residuals, divided by the noise, over the parameters `kept`."""
+
+    model: CalibrationModel
+    measured: Measured
+    kept: list[int]
+    noise: Noise
+
+    def residuals(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the residuals (rows,) divided by the noise, and the poses along the path."""
+        frames = self.model.way.frames(self.measured.values, at)
+        errors = _residuals(self.measured, frames[:, -1])
+        return (errors / self.noise.of(self.measured.complete)).ravel(), frames
+
+    def jacobian(self, at: FloatArray, frames: FloatArray) -> FloatArray:
+        """Return the Jacobian (rows, k) of the fitted parameters, divided by the noise."""
+        scale = self.noise.of(self.measured.complete)
+        _, columns = self.model.way.columns(self.measured.values, at, frames)
+        J = columns[:, : len(scale), self.kept] / scale[:, np.newaxis]
+        return J.reshape(len(self.measured) * len(scale), len(self.kept))
+
+    def minimum(self, at: FloatArray) -> FloatArray:
+        def moved(at: FloatArray, step: FloatArray) -> FloatArray:
+            trial = at.copy()
+            trial[self.kept] += step
+            return trial
+
+        return least_squares(at, self.residuals, self.jacobian, moved)[0]
+
+    def fit(self, at: FloatArray) -> Fit:
+        """Return the fit with the parameters `at`, without a minimization."""
+        r, frames = self.residuals(at)
+        J = self.jacobian(at, frames)
+        k = self.noise.of(self.measured.complete).size
+        units = np.linalg.norm(J, axis=0)
+        units[units == 0.0] = 1.0
+        Q, R = np.linalg.qr(J / units)
+        half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
+        blocks = Q.reshape(len(self.measured), k, len(self.kept))
+        redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)  # the blocks 1 - H_ii
+        own = r.reshape(-1, k)
+        inverse = np.linalg.pinv(redundancy, rcond=_UNOBSERVED, hermitian=True)
+        chi_squares = np.einsum("si,sij,sj->s", own, inverse, own)
+        redundancies = np.clip(np.einsum("sii->si", redundancy), 0.0, 1.0)
+        errors = _residuals(self.measured, frames[:, -1])
+        return Fit(at, errors, self.noise, half @ half.T, redundancies, chi_squares)
 
 
-def _whitened_columns(
-    model: CalibrationModel,
-    measured: Measured,
-    kept: Sequence[int],
-    noise: Noise,
-    at: FloatArray,
-    frames: FloatArray,
-) -> FloatArray:
-    """Return the Jacobian (rows, k) of the fitted parameters, divided by the noise."""
-    scale = noise.of(measured.complete)
-    _, columns = model.way.columns(measured.values, at, frames)
-    J = columns[:, : len(scale), list(kept)] / scale[:, np.newaxis]
-    return J.reshape(len(measured) * len(scale), len(kept))
-
-
-def _minimize(
-    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
-) -> FloatArray:
-    def moved(at: FloatArray, step: FloatArray) -> FloatArray:
-        trial = at.copy()
-        trial[list(kept)] += step
-        return trial
-
-    return least_squares(
-        at,
-        lambda at: _whitened(model, measured, noise, at),
-        lambda at, frames: _whitened_columns(model, measured, kept, noise, at, frames),
-        moved,
-    )[0]
-
-
-def _evaluate(
-    model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise, at: FloatArray
-) -> Fit:
-    r, frames = _whitened(model, measured, noise, at)
-    J = _whitened_columns(model, measured, kept, noise, at, frames)
-    k = noise.of(measured.complete).size
-    units = np.linalg.norm(J, axis=0)
-    units[units == 0.0] = 1.0
-    Q, R = np.linalg.qr(J / units)
-    half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
-    blocks = Q.reshape(len(measured), k, len(kept))
-    judged = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)
-    own = r.reshape(-1, k)
-    odd = np.einsum("si,sij,sj->s", own, np.linalg.pinv(judged, rcond=_FOLLOWED, hermitian=True), own)
-    left = np.clip(np.einsum("sii->si", judged), 0.0, 1.0)
-    return Fit(at, _apart(measured, frames[:, -1]), noise, half @ half.T, left, odd)
-
-
-def odd_poses(
+def outliers(
     model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
 ) -> tuple[tuple[int, ...], Fit]:
+    """Return the indices of the outliers of a fit, and the fit without the outliers."""
     out = list[int]()
     # Without the outliers, there must still be more measured numbers than parameters.
-    # At most a quarter of the poses may be outliers.
-    most = min(int(_MOST_ODD * len(measured)), len(measured) - 1 - -(-len(kept) // found.errors.shape[1]))
+    most = len(measured) - 1 - -(-len(kept) // found.errors.shape[1])
+    most = min(int(_MOST_OUTLIERS * len(measured)), most)
     clean = found
     while len(out) < most:
         inside = np.setdiff1d(np.arange(len(measured)), out)
-        worst = int(np.argmax(clean.odd))
-        if clean.odd[worst] <= quantile(1.0 - WRONGLY / len(measured), clean.errors.shape[1]):
+        worst = int(np.argmax(clean.chi_squares))
+        limit = quantile(1.0 - FALSE_ALARM / len(measured), clean.errors.shape[1])
+        if clean.chi_squares[worst] <= limit:
             break
         out.append(int(inside[worst]))
         chosen = np.ones(len(measured), dtype=bool)
@@ -410,7 +400,7 @@ def odd_poses(
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
     """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
-    Each step resets the least significant parameter to its old value. It also adjusts the other parameters by
+    Each step resets the least significant parameter to its old value, and adjusts the other parameters by
     their covariance with the reset parameter. The elimination ends when all remaining parameters are
     significant. If the measurements determine only a combination of two parameters, one of these two
     parameters remains selected. A `fixed` parameter is always selected. Unknown entries of the covariance are
@@ -424,8 +414,7 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # Rounding may make a small variance 0 or negative, because C contains differences of larger numbers.
-        # A parameter with such a small variance is known very precisely, so its change is significant.
+        # Rounding may make a small variance 0 or negative; the change of such a parameter is significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -446,32 +435,32 @@ def quantile(share: float, freedom: int) -> float:
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: At most `_TURNS` repetitions compute base and target alternately.
-#: They end when the position of the target changes by at most the fraction `_FIXED_END`.
-_TURNS, _FIXED_END = 200, 1e-9
-#: Measured positions may spread at most this number of times more than the robot's tip positions.
-#: With positions in millimetres by mistake, this ratio is about 1000.
-_FARTHER = 100.0
+#: Maximum number of repetitions that compute base and target alternately.
+_REPETITIONS = 200
+#: Relative change of the target's position at which the repetitions end.
+_CONSTANT_TARGET = 1e-9
+#: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
+#: With positions in millimetres by mistake, this quotient is about 1000.
+_LARGEST_SPREAD = 100.0
 
 
-def starting(model: CalibrationModel, measured: Measured) -> FloatArray:
+def start_values(model: CalibrationModel, measured: Measured) -> FloatArray:
     """Return start values (p,): base and tool from the measured poses, other parameters from the model."""
     at = model.way.start.copy()
-    places = {parameter.where for parameter in model.way.parameters if parameter.end}
-    if not places:
+    ends = {parameter.where for parameter in model.way.parameters if parameter.end}
+    if not ends:
         return at
     T = model.way.poses(measured.values)
-    free = "base" in places, "tool" in places
-    B, X = (
-        _from_poses(T, measured.p, measured.R, *free)
-        if measured.R is not None
-        else _from_positions(T, measured.p, *free)
-    )
-    for which, end in (("base", B), ("tool", X)):
-        six = [*end[:3, 3], *euler_of("XYZ", end[:3, :3])]
-        for k, parameter in enumerate(model.way.parameters):
-            if parameter.end and parameter.where == which:
-                at[k] = six[("x", "y", "z", "rx", "ry", "rz").index(parameter.what)]
+    free = "base" in ends, "tool" in ends
+    if measured.R is None:
+        B, X = _from_positions(T, measured.p, *free)
+    else:
+        B, X = _from_poses(T, measured.p, measured.R, *free)
+    poses = {"base": B, "tool": X}
+    six = {end: [*pose[:3, 3], *euler_of("XYZ", pose[:3, :3])] for end, pose in poses.items()}
+    for k, parameter in enumerate(model.way.parameters):
+        if parameter.end:
+            at[k] = six[parameter.where][("x", "y", "z", "rx", "ry", "rz").index(parameter.what)]
     return at
 
 
@@ -482,9 +471,9 @@ def _from_poses(
     if base and tool:
         B[:3, :3], X[:3, :3] = _rotations(T[:, :3, :3], R)
     elif base:
-        B[:3, :3] = _rotation(np.einsum("sij,skj->ik", R, T[:, :3, :3]))
+        B[:3, :3] = _nearest_rotation(np.einsum("sij,skj->ik", R, T[:, :3, :3]))
     else:
-        X[:3, :3] = _rotation(np.einsum("sji,sjk->ik", T[:, :3, :3], R))
+        X[:3, :3] = _nearest_rotation(np.einsum("sji,sjk->ik", T[:, :3, :3], R))
     B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
     return B, X
 
@@ -492,13 +481,13 @@ def _from_poses(
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
     """Compute the base, and the position of the measured target on the tip, from measured positions."""
     B, X = np.eye(4), np.eye(4)
-    for _ in range(_TURNS if base and tool else 1):
+    for _ in range(_REPETITIONS if base and tool else 1):
         if base:
             points = T[:, :3, :3] @ X[:3, 3] + T[:, :3, 3]
-            B[:3, :3] = _rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
+            B[:3, :3] = _nearest_rotation((p - p.mean(axis=0)).T @ (points - points.mean(axis=0)))
         before = X[:3, 3].copy()
         B[:3, 3], X[:3, 3] = _translations(T, p, B[:3, :3], base, tool)
-        if np.linalg.norm(X[:3, 3] - before) <= _FIXED_END * np.linalg.norm(X[:3, 3]):
+        if np.linalg.norm(X[:3, 3] - before) <= _CONSTANT_TARGET * np.linalg.norm(X[:3, 3]):
             break
     return B, X
 
@@ -511,11 +500,10 @@ def _rotations(R: FloatArray, M: FloatArray) -> tuple[FloatArray, FloatArray]:
     null = np.linalg.svd(np.hstack([left, -right]), full_matrices=False)[2][-1]
     B, X_back = null[:9].reshape(3, 3), null[9:].reshape(3, 3)
     sign = np.sign(np.linalg.det(B)) or 1.0
-    return _rotation(sign * B), _rotation(sign * X_back).T
+    return _nearest_rotation(sign * B), _nearest_rotation(sign * X_back).T
 
 
-def _rotation(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a matrix."""
+def _nearest_rotation(M: FloatArray) -> FloatArray:
     U, _, Vt = np.linalg.svd(M)
     if np.linalg.det(U @ Vt) < 0.0:
         U[:, 2] *= -1.0
@@ -527,23 +515,19 @@ def _translations(
 ) -> tuple[FloatArray, FloatArray]:
     """Solve p_Mi = R_B R_i x + R_B p_i + b for the vectors b and x."""
     rest = (p - T[:, :3, 3] @ R_B.T).ravel()
-    parts = []
-    if base:
-        parts.append(np.tile(np.eye(3), (len(p), 1)))
-    if tool:
-        parts.append((R_B @ T[:, :3, :3]).reshape(-1, 3))
-    found = np.asarray(np.linalg.lstsq(np.hstack(parts), rest, rcond=None)[0], np.float64)
-    nothing = np.zeros(3)
-    return found[:3] if base else nothing, found[-3:] if tool else nothing
+    columns = [np.tile(np.eye(3), (len(p), 1))] if base else []
+    columns += [(R_B @ T[:, :3, :3]).reshape(-1, 3)] if tool else []
+    found = np.asarray(np.linalg.lstsq(np.hstack(columns), rest, rcond=None)[0], np.float64)
+    return found[:3] if base else np.zeros(3), found[-3:] if tool else np.zeros(3)
 
 
-def demand_plausible(model: CalibrationModel, measured: Measured) -> None:
-    """Raise InputError if measured positions spread 100 times more than the tip: they are not in metres."""
+def demand_metres(model: CalibrationModel, measured: Measured) -> None:
+    """Raise InputError if measured positions spread 100 times more than the positions of the robot's tip."""
     T = model.way.poses(measured.values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)
     )
-    if ours > 0.0 and theirs > _FARTHER * ours:
+    if ours > 0.0 and theirs > _LARGEST_SPREAD * ours:
         raise InputError(
             "the measured positions are much farther apart than the positions of the robot's tip",
             found=f"{theirs:.4g} m, where the robot's tip moves {ours:.4g} m",

@@ -1,22 +1,22 @@
 """Model a path whose parameters are the URDF's origins or the table's cells, and compute its Jacobian.
 
-A model is a path (`urdfkin.model.path`). A path is a product of constant poses and elementary motions. Each
-joint origin of a URDF is a product of this kind, and so is each row of a Denavit-Hartenberg table. The angle
-or length of an elementary motion is a parameter or a joint's value. A joint can have a gain g, which
-multiplies the joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the angle
-or length of the motion, multiplied by the joint's value.
+A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
+origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
+an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
+joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the angle or length of
+the motion, multiplied by the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
 to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the
-parameter z always shifts the origin along the joint's axis, whatever axis the URDF gives. A change of rz
-changes the zero position of a revolute joint. The other four parameters move the axis. The gain is a seventh
-parameter, which a URDF cannot store. `base` and `tool` have six parameters each. The path begins with the
-motions of `base`, which give the pose of the robot's base in the instrument's frame. The path ends with the
-motions of `tool`, which give the pose of the target in the tip's frame.
+parameter z always shifts the origin along the joint's axis. A change of rz changes the zero position of a
+revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
+store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
+robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
+the tip's frame.
 
-**Table.** The parameters of a row are its cells. If the row's axis is parallel to the next axis within
-`PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as the
-parameters of other rows. A tilt of the axis in any direction needs both alpha and beta.
+**Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
+`PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
+parameters of other rows, and a tilt of the axis in any direction needs both alpha and beta.
 """
 
 from __future__ import annotations
@@ -64,11 +64,11 @@ class Drive(ElementaryMotion):
     """A motion whose angle or length is a parameter or a joint's value.
 
     Attributes:
-        parameter: Index of the parameter that gives the angle or length. For the motion of a joint: index of
-            the joint's gain, or None without a gain.
-        joint: Index of the joint whose value gives the angle or length. None if a parameter gives it.
-        sense: -1 if the path leads from the joint's child to its parent, or if the table's row subtracts the
-            joint's value.
+        parameter: Index of the parameter that is the angle or length. For the motion of a joint: index of the
+            gain, or None without a gain.
+        joint: Index of the joint whose value is the angle or length; None for the motion of a parameter.
+        sense: -1 if the path leads from the joint's child to the joint's parent, or if the table's row
+            subtracts the joint's value; else 1.
     """
 
     parameter: int | None
@@ -96,16 +96,14 @@ class ParametricChain:
 
     @property
     def size(self) -> float:
-        """Sum (m) of all lengths of the model, or 1 if it is 0; this length converts radians to metres."""
-        lengths = [
+        """Sum (m) of all lengths of the model, or 1 if the sum is 0; converts radians to metres."""
+        constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
             if not isinstance(step, ElementaryMotion)
         ]
-        slides = sum(
-            abs(self.start[k]) for k, parameter in enumerate(self.parameters) if parameter.unit == "m"
-        )
-        return sum(lengths) + float(slides) or 1.0
+        fitted = [abs(x) for x, p in zip(self.start, self.parameters, strict=True) if p.unit == "m"]
+        return sum(constant) + float(sum(fitted)) or 1.0
 
     def poses(self, values: FloatArray, at: FloatArray | None = None) -> FloatArray:
         """Return poses (s, 4, 4) of the tip in the base for joint values (s, n) and parameters `at` (p,)."""
@@ -118,9 +116,9 @@ class ParametricChain:
     def columns(
         self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) for the parameters, [linear; angular].
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, [linear; angular].
 
-        `frames` is the result of the method `frames` for the same arguments; None: it is computed.
+        `frames` is the result of the method `frames` for `values` and `at`, if the caller has computed it.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
@@ -150,19 +148,18 @@ class ParametricChain:
         return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
-#: Two axes of a table are treated as parallel if the angle (rad) between them is at most this number.
+#: Largest angle (rad) between two axes of a table that are treated as parallel.
 #: Parallel axes of a real arm deviate by some milliradians.
-#: The distance of their common normal from the arm is about a link's length divided by the angle.
 PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: An origin has six parameters, in the order of multiplication.
-#: Each entry contains the name, whether the motion is a rotation, and the index of the coordinate axis.
+#: Name, whether the motion is a rotation, and index of the coordinate axis, for each parameter of an origin.
+#: The parameters have the order of multiplication.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Parameters with the same effect have an order of preference, for revolute (True) and prismatic joints.
-#: The joint's zero comes first, then motions of its axis, then motions of its frame alone.
+#: Order of preference of parameters with equal effects, for revolute (True) and prismatic joints.
+#: The joint's zero comes first, then motions of the axis, then motions of the frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -192,7 +189,7 @@ class CalibrationModel:
         """Return the pose (4, 4) of the base or tool at parameters (p,), or None if it is not fitted."""
         if not any(parameter.end and parameter.where == which for parameter in self.way.parameters):
             return None
-        return self._push(which, at, end=True)
+        return self._change(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
         """Return the new origins (4, 4) of the URDF's joints that moved, by joint name.
@@ -203,11 +200,11 @@ class CalibrationModel:
         if not isinstance(self.source, KinematicTree):
             return found
         for name in dict.fromkeys(p.where for p in self.way.parameters if not p.end):
-            push = self._push(name, at)
-            if (push != np.eye(4)).any():
+            change = self._change(name, at)
+            if (change != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
                 A = turned(joint)
-                origin = joint.T_parent_joint @ A @ push @ A.T
+                origin = joint.T_parent_joint @ A @ change @ A.T
                 found[name] = origin if joint.lock is None else origin @ inverse(joint.lock.motion)
         return found
 
@@ -222,24 +219,22 @@ class CalibrationModel:
             return replace(row, theta=theta, d=d, a=a, alpha=alpha, beta=beta)
 
         rows = [moved(row) for row in self.source.rows]
-        ends = [self._push(end, at, end=True) for end in ("base", "tool")]
+        ends = [self._change(end, at, end=True) for end in ("base", "tool")]
         T_base, T_tool = ends[0] @ self.source.base, self.source.tool @ ends[1]
         return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
 
-    def _push(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
-        """Return the (4, 4) transform by the six parameters of a joint, of the base or of the tool."""
+    def _change(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
+        """Return the (4, 4) motion by the six parameters of a joint, the base or the tool."""
         parameters = enumerate(self.way.parameters)
         values = {p.what: float(at[k]) for k, p in parameters if (p.where, p.end) == (where, end)}
-        push = np.eye(4)
+        motion = np.eye(4)
         for what, turns, axis in SIX:
             if what in values:
-                push = push @ elementary(axis, turns, values[what])
-        return push
+                motion = motion @ elementary(axis, turns, values[what])
+        return motion
 
 
 class _ModelBuilder:
-    """Builder of a model: it collects the transforms and the parameters, from base to tip."""
-
     def __init__(self, fit: Collection[str]) -> None:
         for name in fit:
             if name not in FITTED:
@@ -257,21 +252,22 @@ class _ModelBuilder:
         return len(self.parameters) - 1
 
     def end(self, which: str) -> None:
-        """Add the six parameters of the base or the tool, if these parameters shall be fitted."""
         if which in self.fit:
-            self.push(which, _ALL, end=True)
+            self.origin(which, _ALL, end=True)
 
-    def push(self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False) -> None:
-        moves = [
+    def origin(
+        self, where: str, only: Collection[str], *, backwards: bool = False, end: bool = False
+    ) -> None:
+        motions = [
             Drive(axis, turns, self.parameter(where, what, "rad" if turns else "m", end=end))
             for what, turns, axis in SIX
             if what in only
         ]
-        self.steps += [replace(move, sense=-1.0) for move in reversed(moves)] if backwards else moves
+        self.steps += [replace(one, sense=-1.0) for one in reversed(motions)] if backwards else motions
 
-    def joint(self, where: str, number: int, *, turns: bool, sense: float) -> None:
+    def joint(self, where: str, number: int, *, turns: bool, sense: float) -> Drive:
         gain = self.parameter(where, "gain", "") if "gains" in self.fit else None
-        self.steps.append(Drive(2, turns, gain, number, sense))
+        return Drive(2, turns, gain, number, sense)
 
     def model(
         self,
@@ -283,10 +279,10 @@ class _ModelBuilder:
         """Return the model; `kept` lists the parameters of each joint in order of preference."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
         # Base and tool come first because they are unknown; the parameters of the joints are nearly known.
-        places = dict.fromkeys((p.where, p.end) for p in self.parameters)
+        owners = sorted(dict.fromkeys((p.where, p.end) for p in self.parameters), key=lambda one: not one[1])
         groups = tuple(
-            tuple(at[*place, what] for what in kept.get(place[0], _KEPT[True]) if (*place, what) in at)
-            for place in sorted(places, key=lambda place: not place[1])
+            tuple(at[*owner, what] for what in kept.get(owner[0], _KEPT[True]) if (*owner, what) in at)
+            for owner in owners
         )
         way = ParametricChain(Path(tuple(self.steps)), tuple(self.parameters), np.array(self.start))
         return CalibrationModel(way, groups, path.coupling, *ends, source)
@@ -300,34 +296,32 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     planar or floating joint on the path raises InputError.
     """
     path: FrameChain = chain(tree, tip, base)
-    maker, number = _ModelBuilder(fit), 0
-    maker.end("base")
+    builder, number = _ModelBuilder(fit), 0
+    builder.end("base")
     steps = steps_between(tree, tip, base)
-    last = max((i for i, (joint, _) in enumerate(steps) if joint.kind.has_axis), default=-1)
-    ending = {len(steps) - 1} if last < len(steps) - 1 else set()
     for i, (joint, backwards) in enumerate(steps):
         A = turned(joint)
-        wanted = _parameters_to_fit(fit, joint, ending=i in ending)
+        only = _parameters_to_fit(fit, joint, is_last=i == len(steps) - 1)
         if backwards:
-            maker.steps.append(A)
+            builder.steps.append(A)
             if joint.kind.has_axis:
-                maker.joint(joint.name, number, turns=joint.kind.turns, sense=-1.0)
-            maker.push(joint.name, wanted, backwards=True)
-            maker.steps.append(inverse(joint.T_parent_joint @ A))
+                builder.steps.append(builder.joint(joint.name, number, turns=joint.kind.turns, sense=-1.0))
+            builder.origin(joint.name, only, backwards=True)
+            builder.steps.append(inverse(joint.T_parent_joint @ A))
         else:
-            maker.steps.append(joint.T_parent_joint @ A)
-            maker.push(joint.name, wanted)
+            builder.steps.append(joint.T_parent_joint @ A)
+            builder.origin(joint.name, only)
             if joint.kind.has_axis:
-                maker.joint(joint.name, number, turns=joint.kind.turns, sense=1.0)
-            maker.steps.append(A.T)
+                builder.steps.append(builder.joint(joint.name, number, turns=joint.kind.turns, sense=1.0))
+            builder.steps.append(A.T)
         number += joint.kind.has_axis
-    maker.end("tool")
+    builder.end("tool")
     kept = {joint.name: _KEPT[joint.kind.turns or not joint.kind.has_axis] for joint, _ in steps}
-    return maker.model(tree, path, (base, tip), kept)
+    return builder.model(tree, path, (base, tip), kept)
 
 
-def _parameters_to_fit(fit: Collection[str], joint: Joint, *, ending: bool) -> Collection[str]:
-    if "origins" in fit and (joint.kind.has_axis or ending):
+def _parameters_to_fit(fit: Collection[str], joint: Joint, *, is_last: bool) -> Collection[str]:
+    if "origins" in fit and (joint.kind.has_axis or is_last):
         return _ALL
     own = "rz" if joint.kind.turns else "z"
     return (own,) if "offsets" in fit and joint.kind.has_axis else ()
@@ -339,27 +333,26 @@ def table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
     The set "origins" contains all cells. The set "offsets" contains the cells to which joint values are
     added.
     """
-    maker = _ModelBuilder(fit)
-    maker.end("base")
-    maker.steps.append(table.base)
+    builder = _ModelBuilder(fit)
+    builder.end("base")
+    builder.steps.append(table.base)
     for i, row in enumerate(table.rows):
         own = "theta" if row.kind.turns else "d"
         cells = dict(zip(("a", "alpha", "d", "theta", "beta"), row.cells, strict=True))
-        alone = abs(math.sin(row.alpha)) > PARALLEL and not row.beta
+        without_beta = abs(math.sin(row.alpha)) > PARALLEL and not row.beta
         motions = list[FloatArray | Drive]()
         for cell, turns, axis in _ROW:
-            fitted = "origins" in fit and not (cell == "beta" and alone)
-            if fitted or ("offsets" in fit and cell == own):
+            is_fitted = "origins" in fit and not (cell == "beta" and without_beta)
+            if is_fitted or ("offsets" in fit and cell == own):
                 unit = "rad" if turns else "m"
-                motions.append(Drive(axis, turns, maker.parameter(row.joint, cell, unit, cells[cell])))
+                motions.append(Drive(axis, turns, builder.parameter(row.joint, cell, unit, cells[cell])))
             else:
                 motions.append(elementary(axis, turns, cells[cell]))
-        gain = maker.parameter(row.joint, "gain", "") if "gains" in fit else None
-        along = [*motions[:2], Drive(2, row.kind.turns, gain, i, float(row.sense))]
-        between = motions[2:]
+        joint = builder.joint(row.joint, i, turns=row.kind.turns, sense=float(row.sense))
+        along, between = [*motions[:2], joint], motions[2:]
         standard = table.convention is DHConvention.STANDARD
-        maker.steps += [*along, *between] if standard else [*between, *along]
-    maker.steps.append(table.tool)
-    maker.end("tool")
+        builder.steps += [*along, *between] if standard else [*between, *along]
+    builder.steps.append(table.tool)
+    builder.end("tool")
     kept = dict.fromkeys((row.joint for row in table.rows), _KEPT_CELLS)
-    return maker.model(table, table, (table.base_frame, table.tip_frame), kept)
+    return builder.model(table, table, (table.base_frame, table.tip_frame), kept)

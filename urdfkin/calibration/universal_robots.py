@@ -3,13 +3,14 @@
 The controller stores Denavit-Hartenberg parameters. Two axes of the arm deviate from parallel axes by about a
 milliradian. The d of one row is therefore hundreds of metres, and the d of the next row compensates it. The
 driver's program `ur_calibration` shifts the link frames along their axes, so that these large offsets
-disappear. The program writes the pose of each joint relative to the previous one: x, y, z, roll, pitch, yaw.
+disappear. The program writes the pose of each joint in the frame of the previous joint: x, y, z, roll, pitch
+and yaw.
 
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
-(Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies these angles into a URDF, where they mean Rz(yaw)
-Ry(pitch) Rx(roll). The two products differ if one angle is a quarter turn and another angle is small. The
-difference is the small angle, which is 1e-5 to 1e-4 rad. The order "driver" agrees with the robot's
-controller. The order "urdf" agrees with the URDF that the ROS description makes from the same file.
+(Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
+Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn and another angle is small (1e-5 to 1e-4 rad), the
+two products differ by the small angle. The order "driver" agrees with the robot's controller. The order
+"urdf" agrees with the URDF that the ROS description makes from the file.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
 
-#: Each link in the calibration file, from base to tip, has a parent joint.
+#: Parent joint of each link in the calibration file, from base to tip.
 LINKS = {
     "shoulder": "shoulder_pan_joint",
     "upper_arm": "shoulder_lift_joint",
@@ -48,14 +49,14 @@ LINKS = {
 #: SciPy's names of the two orders; lowercase letters are fixed axes, uppercase letters moving axes.
 ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
-#: The fit of the origins uses this number of configurations; its check uses as many others.
-_FITTED = 40
-#: The fit of the origins and its check use random configurations with these seeds.
-_FITTED_SEED, _CHECKED_SEED = 2, 3
-#: The fit may have this residual at most, in metres and in radians.
-#: The numbers in the file have nine digits, and their rounding causes residuals of this size.
-_LEFT = 1e-8
-#: Two calibrations are compared on this number of configurations.
+#: Number of random configurations for the fit of the origins, and for its check.
+_CONFIGURATIONS = 40
+#: Seeds of these random configurations.
+_FIT_SEED, _CHECK_SEED = 2, 3
+#: Largest residual of the fit, in metres and in radians.
+#: The numbers in the file have nine digits, and rounding causes residuals of this size.
+_MOST_RESIDUAL = 1e-8
+#: Number of configurations on which two calibrations are compared.
 _COMPARED = 1000
 
 
@@ -91,7 +92,7 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
     six = []
     for name in _SIX:
         # The driver writes 0.00001 as 1e-05, which YAML 1.1 reads as a string.
-        # The message never prints a list: with YAML references, a short file can contain a very long list.
+        # The message prints no list: with YAML references, a short file can contain a very long list.
         value = entry.get(name)
         number = parse_float(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
@@ -114,17 +115,16 @@ def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    In the current ROS description all six joints turn about z. The joint origins are then replaced by the
+    If all six joints turn about z, as in the current ROS description, the joint origins are replaced by the
     origins in the calibration file. In other URDFs, for example of the older ROS description, the joint
-    origins are fitted. The fitted arm then has the same poses of `tool0` in `base` as the calibrated arm. A
-    robot that is not a Universal Robots arm raises InputError; the errors of the file are those of
-    `read_calibration`.
+    origins are fitted, so that `tool0` has the poses of the calibrated arm in `base`. A robot that is not a
+    Universal Robots arm raises InputError; the errors of the file are those of `read_calibration`.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)
     prefix = _prefix(robot)
     calibrated = chain(calibrated_tree(origins), "tool0", "base")
-    if _is_the_descriptions(robot, prefix):
+    if _all_turn_about_z(robot, prefix):
         result = Rewritten(robot, {prefix + joint: T for joint, T in origins.items()})
     else:
         result = _fit_origins(robot, calibrated, f"{prefix}tool0", f"{prefix}base")
@@ -132,7 +132,6 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
 
 def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> Rewritten:
-    """Fit the robot's joint origins to computed poses of the calibrated arm; these poses have no noise."""
     own = robot.chain(tip, base).coupling
     if len(own.names) != len(calibrated.joint_names):
         raise InputError(
@@ -141,17 +140,17 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> R
             found=f"{len(own.names)} and {len(calibrated.joint_names)}",
             remedy="use a URDF of ur_description, which has the frames base and tool0",
         )
-    q = robot.sample(_FITTED, seed=_FITTED_SEED)
+    q = robot.sample(_CONFIGURATIONS, seed=_FIT_SEED)
     values = own.select(robot.tree, q)
     if set(own.names) == set(calibrated.joint_names):
         values = values[:, [own.names.index(name) for name in calibrated.joint_names]]
-    found = fitted_model(robot, q, calibrated.placement(values), tip=tip, base=base, judged=False)
-    left = np.abs(found.fitted.errors).max() if found.fitted is not None else 0.0
-    if left > _LEFT:
+    found = fitted_model(robot, q, calibrated.placement(values), tip=tip, base=base, check=False)
+    residual = np.abs(found.fitted.errors).max() if found.fitted is not None else 0.0
+    if residual > _MOST_RESIDUAL:
         raise InputError(
             "no origins make the robot move like the calibrated arm",
             where=f"{robot.name}, {base} to {tip}",
-            found=f"a residual of {left:.3g} m or rad",
+            found=f"a residual of {residual:.3g} m or rad",
             remedy="compare the URDF with that of an uncalibrated arm of this type: urdfkin same A.urdf"
             " B.urdf",
         )
@@ -171,7 +170,7 @@ def _prefix(robot: Robot) -> str:
     return prefixes[0]
 
 
-def _is_the_descriptions(robot: Robot, prefix: str) -> bool:
+def _all_turn_about_z(robot: Robot, prefix: str) -> bool:
     axes = [robot.tree.joints[robot.tree.joint_index(prefix + joint)].axis for joint in LINKS.values()]
     return all(axis.tolist() == [0.0, 0.0, 1.0] for axis in axes)
 
@@ -179,15 +178,15 @@ def _is_the_descriptions(robot: Robot, prefix: str) -> bool:
 def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> Certificate:
     """Compare poses of the new URDF with poses of the calibration file; Pinocchio checks the new URDF."""
     written = result.loaded
-    q = written.sample(_FITTED, seed=_CHECKED_SEED)
+    q = written.sample(_CONFIGURATIONS, seed=_CHECK_SEED)
     T = written.placement(q, [f"{prefix}base", f"{prefix}tool0"])
     values = q[:, [written.coordinate_names.index(prefix + joint) for joint in LINKS.values()]]
-    away = float(np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - calibrated.placement(values)).max())
-    if away > _LEFT:
+    error = float(np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - calibrated.placement(values)).max())
+    if error > _MOST_RESIDUAL:
         raise InputError(
             "the URDF's frames base and tool0 differ from those of the calibration",
             where=result.robot.name,
-            found=f"the pose of tool0 in base is off by {away:.3g} m or rad",
+            found=f"the pose of tool0 in base is off by {error:.3g} m or rad",
             remedy="use a URDF of ur_description, which has the frames base and tool0",
         )
     return written.certificate()

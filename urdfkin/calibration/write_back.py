@@ -1,7 +1,4 @@
-"""Write new joint origins into the original text of a URDF; all other bytes stay the same.
-
-Names, meshes, comments and formatting are kept. `Rewritten` also reports how far each origin moved.
-"""
+"""Write new joint origins into the original text of a URDF; all other bytes stay the same."""
 
 from __future__ import annotations
 
@@ -28,9 +25,9 @@ from urdfkin.urdf.records import JointRecord, Vector
 from urdfkin.urdf.writer import before, numbers, with_attributes
 from urdfkin.verify.certificate import Certificate
 
-#: Metres and radians are written with this number of decimals, the precision of a double near 1.
+#: Number of decimals of written metres and radians: the precision of a double near 1.
 _DECIMALS = 15
-_SAME = 10.0**-_DECIMALS
+_ROUNDING = 10.0**-_DECIMALS
 
 
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
@@ -41,7 +38,7 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     not exist, raise InputError.
     """
     report = Reporter("<text>", data)
-    urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
+    urdf = read_urdf(report, mimic=False)  # mimic rules do not affect origins
     if urdf is None or report.failed:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
         raise InputError("a URDF with errors is not edited", found=str(errors[0]))
@@ -70,24 +67,24 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
-    """Return three numbers as text; a number that differs only by rounding keeps its old digits."""
+    """Return three numbers as text; a number that differs from `old` only by rounding keeps its digits."""
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
-        word if abs(x - was) <= max(_SAME, ANGLE * EPS * abs(was)) else numbers([round(x, _DECIMALS)])
+        word if abs(x - was) <= max(_ROUNDING, ANGLE * EPS * abs(was)) else numbers([round(x, _DECIMALS)])
         for word, x, was in zip(words, new.tolist(), old, strict=True)
     )
 
 
 def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
-    """Return the roll, pitch and yaw (3,) of a rotation that are nearest to the old angles.
+    """Return the roll, pitch and yaw (3,) of a rotation that are nearest to the angles `old`.
 
     >>> from urdfkin.kinematics.rotation import rotation_from_rpy
     >>> nearest_rpy(rotation_from_rpy([3.1, 3.0, 3.1]), (3.1, 3.0, 3.1)).round(12).tolist()
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    if math.cos(pitch) <= ANGLE * EPS:  # Roll and yaw have the same axis: only their combination is defined.
+    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw have one axis: only their combination is defined
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [
@@ -115,13 +112,13 @@ class Rewritten:
         """The robot of the new text, loaded with the same options as the original."""
         mimic = self.robot.verifier.mimic
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # The first load gave these warnings.
+            warnings.simplefilter("ignore")  # the first load gave these warnings
             lock = dict(self.robot.origin.lock)
             return load(self.text, mimic=mimic, root_joint=self.robot.root_joint, lock=lock)
 
     @cached_property
     def changes(self) -> Changes:
-        """The changes, as listed by `urdfkin.diff`; the list names the frame that each joint moves most."""
+        """The changes, as listed by `urdfkin.diff`."""
         return diff(self.robot, self.loaded)
 
     @cached_property

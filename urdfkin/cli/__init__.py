@@ -23,9 +23,9 @@ from urdfkin.verify.quantities import by_command
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-#: Each command has its module in `urdfkin.cli` and a summary, under a heading of the help page.
-#: The function of the only command in a module is called `command`; otherwise it is called `NAME_command`.
-#: `groups` adds the commands of `verify/quantities.py`, for example `jacobian`, to the heading `_COMPUTE`.
+#: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
+#: A module's only command is the function `command`; several commands are the functions `NAME_command`.
+#: `groups` adds the quantities of `verify/quantities.py`, such as `jacobian`, to the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -89,7 +89,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "warm": ("warm", "Compile all kernels in advance, for container images and CI."),
     },
 }
-#: This module makes a command for each quantity in `verify/quantities.py`.
+#: Name of the module that makes a command for each quantity in `verify/quantities.py`
 _QUANTITY = "quantity"
 
 
@@ -102,61 +102,59 @@ def commands() -> dict[str, tuple[str, str]]:
     return {name: entry for entries in groups().values() for name, entry in entries.items()}
 
 
-#: Users may type these words instead of the command on the right.
-#: The error message suggests the whole value, for example "placement --relative-to FRAME".
-_SYNONYMS = {
-    **dict.fromkeys(("fk", "forward", "forward-kinematics", "pose", "transform", "tf"), "placement"),
-    **dict.fromkeys(("relative-placement", "relative-pose"), "placement --relative-to FRAME"),
-    **dict.fromkeys(("rpy", "quaternion"), "placement --as rpy or --as quaternion"),
-    **dict.fromkeys(("jac", "j", "geometric-jacobian"), "jacobian"),
-    **dict.fromkeys(("jdot", "jacobian-dot", "jacobian-derivative"), "jacobian-rate"),
-    **dict.fromkeys(("twist", "vel"), "velocity"),
-    **dict.fromkeys(("acc", "accel"), "acceleration"),
-    **dict.fromkeys(("breakdown", "acceleration-breakdown", "coriolis"), "acceleration --breakdown"),
-    **dict.fromkeys(
-        ("svd", "manipulability", "condition", "singularity", "singularities"), "singular-values"
-    ),
-    **dict.fromkeys(("dh-table", "dh-parameters", "denavit-hartenberg", "table", "mdh"), "dh"),
-    **dict.fromkeys(("poe", "product-of-exponentials", "twists"), "screws"),
-    **dict.fromkeys(("show", "joints", "links", "frames", "limits", "summary", "tree"), "info"),
-    **dict.fromkeys(("visualize", "visualise", "viewer", "display", "gui"), "view"),
-    **dict.fromkeys(
-        ("compare", "comparison"), "report compare (reports), same (models), diff (versions of a file)"
-    ),
-    **dict.fromkeys(("campaign", "status", "progress"), "report status"),
-    "merge": "report merge",
-    **dict.fromkeys(("lint", "validate-urdf", "check-urdf"), "check"),
-    "test": "validate",
-    **dict.fromkeys(("codegen", "generate"), "export"),
-    **dict.fromkeys(("identify", "fit", "calibration"), "calibrate"),
-    **dict.fromkeys(("equal", "equivalent"), "same"),
-    **dict.fromkeys(("list", "catalogue", "catalog"), "robots"),
-}
-#: For each word about an unsupported subject, the error message contains this advice.
-_ABSENT = {
-    **dict.fromkeys(
-        ("ik", "inverse", "inverse-kinematics", "solve"),
+def _by_word(table: dict[str, str]) -> dict[str, str]:
+    """Return the key of a table for each word in its values."""
+    return {word: key for key, words in table.items() for word in words.split()}
+
+
+#: For each word that is not a command, the command that the error message suggests.
+_SYNONYMS = _by_word(
+    {
+        "placement": "fk forward forward-kinematics pose transform tf",
+        "placement --relative-to FRAME": "relative-placement relative-pose",
+        "placement --as rpy or --as quaternion": "rpy quaternion",
+        "jacobian": "jac j geometric-jacobian",
+        "jacobian-rate": "jdot jacobian-dot jacobian-derivative",
+        "velocity": "twist vel",
+        "acceleration": "acc accel",
+        "acceleration --breakdown": "breakdown acceleration-breakdown coriolis",
+        "singular-values": "svd manipulability condition singularity singularities",
+        "dh": "dh-table dh-parameters denavit-hartenberg table mdh",
+        "screws": "poe product-of-exponentials twists",
+        "info": "show joints links frames limits summary tree",
+        "view": "visualize visualise viewer display gui",
+        "report compare (reports), same (models), diff (versions of a file)": "compare comparison",
+        "report status": "campaign status progress",
+        "report merge": "merge",
+        "check": "lint validate-urdf check-urdf",
+        "validate": "test",
+        "export": "codegen generate",
+        "calibrate": "identify fit calibration",
+        "same": "equal equivalent",
+        "robots": "list catalogue catalog",
+    }
+)
+#: For each word about a subject that urdfkin does not cover, the advice in the error message.
+_ABSENT = _by_word(
+    {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"
-        " and `jacobian` compute the terms of an iterative solver",
-    ),
-    **dict.fromkeys(
-        ("dynamics", "rnea", "inertia", "torque", "mass-matrix"),
-        "urdfkin has no dynamics; use Pinocchio's (`robot.pinocchio_model()` in Python)",
-    ),
-    "collision": "urdfkin has no collision checks; use Pinocchio's",
-}
+        " and `jacobian` compute the terms of an iterative solver": "ik inverse inverse-kinematics solve",
+        "urdfkin has no dynamics; use Pinocchio's (`robot.pinocchio_model()` in Python)":
+            "dynamics rnea inertia torque mass-matrix",
+        "urdfkin has no collision checks; use Pinocchio's": "collision",
+    }
+)  # fmt: skip
 
 
-def _unknown(name: str) -> UrdfkinError:
-    """Return the error for an unknown command; it suggests an existing command with this meaning."""
+def _unknown_command(name: str) -> UrdfkinError:
     word = name.lower().replace("_", "-")
     if word in commands():
         return UnknownNameError("command", name, [word])
     error = UnknownNameError("command", name, commands())
-    if (absent := _ABSENT.get(word)) is not None:
-        error.remedy, error.nearest = absent, ()
-    elif (meant := _SYNONYMS.get(word)) is not None:
-        error.remedy, error.nearest = f"did you mean {meant}?", (meant,)
+    if (advice := _ABSENT.get(word)) is not None:
+        error.remedy, error.nearest = advice, ()
+    elif (command := _SYNONYMS.get(word)) is not None:
+        error.remedy, error.nearest = f"did you mean {command}?", (command,)
     return error
 
 
@@ -167,30 +165,34 @@ class LazyGroup(click.Group):
         return list(commands())
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if (found := commands().get(cmd_name)) is None:
+        if cmd_name not in commands():
             return None
-        module = importlib.import_module(f"urdfkin.cli.{found[0]}")
-        made = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
-        if made is None:
-            made = module.command_of(by_command()[cmd_name]) if found[0] == _QUANTITY else module.command
-        return cast("click.Command", made)
+        module_name, _ = commands()[cmd_name]
+        module = importlib.import_module(f"urdfkin.cli.{module_name}")
+        command = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
+        if command is None:
+            is_quantity = module_name == _QUANTITY
+            command = module.command_of(by_command()[cmd_name]) if is_quantity else module.command
+        return cast("click.Command", command)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command; the error for an unknown name lists the nearest names."""
         if args and args[0] not in commands() and not args[0].startswith("-"):
             if ctx.resilient_parsing:  # shell completion
                 return None, None, args
-            raise _unknown(args[0])
+            raise _unknown_command(args[0])
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
         """Return the commands and options that begin with `incomplete`, without importing a command."""
         from click.shell_completion import CompletionItem
 
-        found = [(name, summary) for name, (_, summary) in commands().items() if name.startswith(incomplete)]
-        names = [CompletionItem(name, help=summary) for name, summary in found]
+        names = [
+            CompletionItem(name, help=summary)
+            for name, (_, summary) in commands().items()
+            if name.startswith(incomplete)
+        ]
         return names + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -207,12 +209,17 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
-    pinocchio()  # This call raises an error if Pinocchio is not installed.
+    pinocchio()  # raises an error if Pinocchio is not installed
     ctx.exit()
 
 
 @click.group(
-    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+    cls=LazyGroup,
+    context_settings={
+        "help_option_names": ["-h", "--help"],
+        "max_content_width": 100,
+        "show_default": True,
+    },
 )
 @click.option(
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version,
@@ -221,19 +228,18 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
 def cli() -> None:
     """Textbook kinematics from any URDF, every number checked against Pinocchio.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. `urdfkin COMMAND --help` shows a
-    command's options and examples.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. `urdfkin COMMAND --help`
+    shows the options of a command, and an example.
     """
 
 
 def main() -> None:
     streams.prepare()
     guard()
-    # For small matrices, one thread of OpenBLAS is fastest.
-    # OpenBLAS reads the number of threads when NumPy imports it.
+    # OpenBLAS is fastest with one thread for small matrices; NumPy's import reads this number.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if os.environ.get("_URDFKIN_COMPLETE"):  # Shell completion prints no error.
+    if os.environ.get("_URDFKIN_COMPLETE"):  # an error message would disturb shell completion
         sys.stderr = io.StringIO()
-    # The last line of the output already states that the result was not verified, and why.
+    # This warning repeats the last line of the output.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

@@ -1,4 +1,4 @@
-"""`urdfkin calibrate`: fit a robot's parameters to measured poses, and write them into its own file."""
+"""`urdfkin calibrate`: fit a robot's parameters to measured poses, and write the calibrated file."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from urdfkin.cli.options import (
+    FILE,
     convention_of_input_option,
     conversion_of,
     load_robot,
+    path_options,
     reject_unused_options,
     robot_argument,
 )
@@ -21,15 +23,15 @@ from urdfkin.cli.output import (
     Answer,
     check_line,
     check_writable,
-    compiling,
     exit_code,
     format_option,
-    write_file,
+    report_compilation,
 )
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import json_text
+from urdfkin.system.files import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,33 +41,26 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.robot import Robot
 
-_FILE = click.Path(path_type=Path)
 _FORMS = (*TEXTS, "json")
 
 
 @click.command(epilog="Example: urdfkin calibrate ur5 --tip tool0 --fit base,tool,origins")
 @robot_argument
 @click.option(
-    "--poses", type=_FILE, help="File of measured poses, CSV or .npz; docs/calibration.md describes it."
+    "--poses", type=FILE, help="File of measured poses, CSV or .npz; docs/calibration.md describes it."
 )
 @convention_of_input_option
-@click.option("--ur", type=_FILE, help="Factory calibration of a Universal Robots arm (YAML).")
+@click.option("--ur", type=FILE, help="Factory calibration of a Universal Robots arm (YAML).")
 @click.option(
     "--order",
     type=click.Choice(["driver", "urdf"]),
     default="driver",
-    show_default=True,
     help="With --ur: order of the roll, pitch and yaw rotations in the file.",
 )
-@click.option("--tip", metavar="NAME", help="Link or joint at the tip of the path. Default: the robot's tip.")
-@click.option(
-    "--base", metavar="NAME", help="Link or joint at the base of the path. Default: the robot's base."
-)
+@path_options
 @click.option(
     "--fit",
-    "fit",
     default="origins",
-    show_default=True,
     metavar="SETS",
     help="Parameters to fit, separated by commas: `base`, `tool`, `offsets`, `origins`, `gains`.",
 )
@@ -77,27 +72,30 @@ _FORMS = (*TEXTS, "json")
 @click.option(
     "--noise",
     metavar="M,RAD",
-    help="Standard deviations of measured positions (m) and orientations (rad). Default: estimated.",
+    help="Standard deviations of measured positions (m) and orientations (rad).",
+    show_default="estimated from the poses",
 )
 @click.option(
     "--unit",
     type=click.Choice(["m", "mm"]),
     default="m",
-    show_default=True,
     help="Unit of measured positions.",
 )
-@click.option("--drop-odd", is_flag=True, help="Exclude outlier poses.")
+@click.option("--drop-odd", is_flag=True, help="Exclude outlier poses from the fit.")
 @click.option("--radians", is_flag=True, help="Read joint angles as radians, even if they look like degrees.")
 @click.option(
     "--all",
     "every",
     is_flag=True,
-    help="Write all fitted parameters. Default: only those that changed by more than 2 sigma.",
+    help="Write all fitted parameters, not only those that changed by more than 2 sigma.",
 )
 @click.option("--force", is_flag=True, help="Write the calibration even if urdfkin finds it implausible.")
-@format_option(*_FORMS, help_="Output format.")
+@format_option(*_FORMS, help_="Output format of the report.")
 @click.option(
-    "--output", "-o", type=_FILE, help="File for the calibrated URDF, or for the calibrated table (TOML)."
+    "--output",
+    "-o",
+    type=FILE,
+    help="Write the calibrated URDF or table (TOML) to this file.",
 )
 @click.pass_context
 def command(
@@ -110,16 +108,16 @@ def command(
     output: Path | None,
     **_: Any,
 ) -> None:
-    """Fit the parameters of ROBOT to measured poses, and write them back into its own file.
+    """Fit the parameters of ROBOT to measured poses, and write the calibrated robot to a new file.
 
-    In the written URDF, only the fitted numbers are changed. Pinocchio checks this URDF at the measured
-    configurations. ROBOT may also be the file of a Denavit-Hartenberg table; the numbers of the table are
-    then fitted. Without --poses and --ur, the command lists which parameters are identifiable in principle.
+    The new URDF differs from that of ROBOT only in the fitted numbers. Pinocchio checks the new URDF at the
+    measured configurations. ROBOT may also be the file of a Denavit-Hartenberg table, whose numbers are then
+    fitted. Without --poses and --ur, the command lists which parameters are identifiable in principle.
 
-    The command refuses a calibration that is not plausible, and prints the likeliest cause. Examples of
-    causes: joint angles are in degrees, the sign of a joint is wrong, or each pose stands in the line of
-    another configuration. With --force, the command writes the calibration nevertheless. If the joint values
-    look like degrees, --radians is also needed.
+    The command refuses a calibration that is not plausible, and prints the likeliest cause. For example,
+    joint angles are in degrees, the sign of a joint is wrong, or each pose is in the line of another
+    configuration. With --force, the command writes the calibration nevertheless. If the joint values look
+    like degrees, --radians is also needed.
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
@@ -127,35 +125,35 @@ def command(
     from urdfkin.report.diff import lines_of
 
     check_writable(output)
-    given = [name for name in ("poses", "ur") if context.params[name] is not None]
-    if len(given) > 1:
-        raise InputError(
-            "--poses and --ur cannot be used together", found=", ".join(f"--{name}" for name in given)
-        )
-    _reject_unused(context, given)
+    sources = [name for name in ("poses", "ur") if context.params[name] is not None]
+    if len(sources) > 1:
+        raise InputError("--poses and --ur cannot be used together", remedy="leave out one of them")
+    _reject_unused(context, sources)
     loaded = load_robot(robot)
-    with compiling():
-        found = None if ur is not None else _run(context, loaded)
-        written = (
-            _factory_calibration(loaded, ur, order) if ur is not None else found.written if found else None
-        )
+    found, written = None, None
+    with report_compilation():
+        if ur is not None:
+            written = _factory_calibration(loaded, ur, order)
+        else:
+            found = _fit(context, loaded)
+            written = found.written
     data = {} if found is None else as_data(found)
     data |= {"origins": {joint: T.tolist() for joint, T in written.origins.items()}} if written else {}
-    sheet = TextDocument("") if found is None else document(found)
-    parts = list(sheet.parts)
+    report = TextDocument("") if found is None else document(found)
+    parts = list(report.parts)
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
-        whole = TextDocument(sheet.title, parts)
-        # The JSON output does not contain the line `check`.
-        Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).put(format_, _FORMS)
+        whole = TextDocument(report.title, parts)
+        # JSON that is already text is written without the line `check`.
+        Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 
     if written is None or (found is not None and found.fitted is None):
         answer()
     if found is not None and found.plausibility.objections:
-        refused = found.plausibility.is_in_degrees or not context.params["force"]
-        say(f"urdfkin: {'error' if refused else 'warning'}: {_refusal(found)}", err=True)
-        if refused:
+        is_refused = found.plausibility.is_in_degrees or not context.params["force"]
+        say(f"urdfkin: {'error' if is_refused else 'warning'}: {_implausible(found)}", err=True)
+        if is_refused:
             answer(code=3)
     if written.origins:
         parts.append(moved_table(written))
@@ -170,7 +168,7 @@ def command(
     answer(check_line(certificate), exit_code(certificate))
 
 
-def _refusal(found: Calibration) -> ImplausibleError:
+def _implausible(found: Calibration) -> ImplausibleError:
     from urdfkin.calibration.calibrate import ImplausibleError
 
     if found.plausibility.is_in_degrees:
@@ -178,21 +176,20 @@ def _refusal(found: Calibration) -> ImplausibleError:
     return ImplausibleError(found, "to write this calibration anyway, add --force")
 
 
-def _reject_unused(context: click.Context, given: list[str]) -> None:
+def _reject_unused(context: click.Context, sources: list[str]) -> None:
     measured = ("convention", "noise", "drop_odd", "unit", "radians", "every", "force")
-    if given != ["poses"]:
-        reject_unused_options(context, measured, "without --poses")
-    if given != ["ur"]:
-        reject_unused_options(context, ("order",), "without --ur")
-    if given:
-        reject_unused_options(context, ("positions",), f"with --{given[0]}")
-    else:
-        reject_unused_options(context, ("output",), "without --poses and --ur")
-    if given == ["ur"]:
-        reject_unused_options(context, ("fit", "tip", "base"), "with --ur")
+    for unused, where, because in (
+        (measured, sources != ["poses"], "without --poses"),
+        (("order",), sources != ["ur"], "without --ur"),
+        (("positions",), sources == ["poses"], "with --poses"),
+        (("positions", "fit", "tip", "base"), sources == ["ur"], "with --ur"),
+        (("output",), not sources, "without --poses and --ur"),
+    ):
+        if where:
+            reject_unused_options(context, unused, because)
 
 
-def _run(context: click.Context, robot: Robot) -> Calibration:
+def _fit(context: click.Context, robot: Robot) -> Calibration:
     from urdfkin.calibration.calibrate import fitted_model, read_poses
     from urdfkin.dh.parse_table import is_table_file, read_table_or_screws
     from urdfkin.dh.table import DHTable
@@ -205,22 +202,22 @@ def _run(context: click.Context, robot: Robot) -> Calibration:
     path = robot.chain(tip, base)
     names: Sequence[str] = path.joint_names if source is robot else source.joint_names
     conversion = conversion_of(robot, options["convention"])
-    coordinates, rest = robot.coordinate_names if source is robot else names, None
+    coordinates, neutral = robot.coordinate_names if source is robot else names, None
     if conversion is not None:
         if source is not robot:
-            raise InputError("--convention needs a robot, not a table", remedy="leave it out")
-        coordinates, rest = conversion.coordinate_names, conversion.to(robot.neutral())
+            raise InputError("--convention does nothing for a table", remedy="leave out this option")
+        coordinates, neutral = conversion.coordinate_names, conversion.to(robot.neutral())
         names = [coordinates[i] for name in names for i in conversion.q_and_v_indices[name][0]]
     units = column_units(robot, "q", conversion)
     q, T = (
-        read_poses(options["poses"], coordinates, names, options["unit"], units, rest)
+        read_poses(options["poses"], coordinates, names, options["unit"], units, neutral)
         if options["poses"]
         else (None, None)
     )
     if conversion is not None and q is not None:
         q = conversion.from_(q)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # The table was loaded before, with the same warnings.
+        warnings.simplefilter("ignore")  # the table was loaded before, with the same warnings
         return fitted_model(
             source,
             q,
@@ -246,13 +243,13 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
-    """Apply a factory calibration; print the difference that the two values of --order make."""
+    """Apply a factory calibration; print the difference between the two values of --order."""
     from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots
     from urdfkin.comparison.result import angle, length
 
     metres, radians = distance(*(read_calibration(path, one) for one in ORDERS))
     say(
-        f"using --order {order}; with the other order, the pose of the tool differs by up to"
+        f"using --order {order}; with the other value of --order, the pose of the tool differs by up to"
         f" {length(metres)} and {angle(radians)} (docs/calibration.md)",
         err=True,
     )

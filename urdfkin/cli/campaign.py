@@ -1,8 +1,9 @@
-"""`urdfkin report status` and `merge`: show the progress of a validation, and combine several stores."""
+"""Show the progress of a validation; define the commands `urdfkin report status` and `report merge`."""
 
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from urdfkin.cli.options import FOLDER
 from urdfkin.cli.output import console
 from urdfkin.cli.streams import say
 from urdfkin.errors.escape import printable
@@ -22,15 +24,14 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Seconds between two progress lines
+#: Seconds between two lines of text, and between two lines of JSON
 _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Estimate of the speed of a validation, in chunks of samples per second, and of the remaining time.
+    """Estimates the speed of a validation, in chunks of samples per second, and the remaining time.
 
-    The time until the first chunk of samples is finished is excluded, because urdfkin may compile kernels in
-    that time.
+    The time before the first chunk is finished does not count, because urdfkin may compile kernels then.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
@@ -64,15 +65,13 @@ def progress(*, as_json: bool) -> Iterator[Progress]:
 
 def line(state: CampaignProgress, pace: Pace) -> str:
     earlier = f" ({state.chunks_kept:,} from an earlier run)" if state.chunks_kept else ""
-    return (
-        f"{state.robots_done:,} of {state.robots:,} robots, {state.chunks_done:,} of"
-        f" {state.chunks:,} chunks{earlier}; {_speed(state, pace)}"
-        f"{_failures(state)}; {state.label}"
-    )
+    robots = f"{state.robots_done:,} of {state.robots:,} robots"
+    chunks = f"{state.chunks_done:,} of {state.chunks:,} chunks{earlier}"
+    return f"{robots}, {chunks}; {_speed(state, pace)}{_failures(state)}; {state.label}"
 
 
 def duration(seconds: float) -> str:
-    """Format a duration.
+    """Format a duration in seconds.
 
     >>> duration(7), duration(100), duration(9000), duration(200_000)
     ('7 s', '1 min 40 s', '2 h 30 min', '2 d 7 h')
@@ -99,21 +98,22 @@ def _failures(state: CampaignProgress) -> str:
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
     """Show the progress every `seconds` seconds; as JSON, also show the first and the last state."""
-    shown, last = time.monotonic(), None
-    first = seconds == _JSON
+    as_json = seconds == _JSON
+    last_time = -math.inf if as_json else time.monotonic()
+    hidden: CampaignProgress | None = None
 
     def tell(state: CampaignProgress) -> None:
-        nonlocal shown, last, first
-        last = state
-        if first or time.monotonic() - shown >= seconds:
-            shown, last, first = time.monotonic(), None, False
+        nonlocal last_time, hidden
+        hidden = state
+        if time.monotonic() - last_time >= seconds:
+            last_time, hidden = time.monotonic(), None
             show(state)
 
     try:
         yield tell
     finally:
-        if last is not None and seconds == _JSON:
-            show(last)
+        if hidden is not None and as_json:
+            show(hidden)
 
 
 def _json(state: CampaignProgress, pace: Pace) -> None:
@@ -135,19 +135,18 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         task = bar.add_task("", total=None, words="")
 
         def tell(state: CampaignProgress) -> None:
-            pace_ = _speed(state, pace)
-            words = f"{state.robots_done}/{state.robots} robots, {pace_}{_failures(state)},"
+            speed = _speed(state, pace)
+            words = f"{state.robots_done}/{state.robots} robots, {speed}{_failures(state)},"
             done, label = state.chunks_done, printable(state.label)
             bar.update(task, completed=done, total=state.chunks, description=label, words=words)
 
         yield tell
 
 
-#: `status` lists at most `_NAMED` failed robots.
-#: It estimates the time for a chunk of samples from up to `_READ` finished chunks.
-_NAMED, _READ = 20, 200
-
-_FOLDER = click.Path(path_type=Path, file_okay=False)
+#: Maximum number of failed robots that `status` lists
+_MOST_FAILED = 20
+#: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
+_MOST_CHUNKS = 200
 
 
 @click.command(
@@ -155,38 +154,40 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
     short_help="Show the progress of a validation with --store.",
     epilog="Example: urdfkin report status nightly",
 )
-@click.argument("folder", metavar="DIR", type=_FOLDER)
+@click.argument("folder", metavar="DIR", type=FOLDER)
 @click.pass_context
 def status(context: click.Context, folder: Path) -> None:
     """Show the finished and failed robots, and an estimate of the remaining time.
 
-    The command reads only few of the files in DIR, so it is fast and does not disturb a running validation.
-    `urdfkin report DIR` reads and checks all files. Exit 0: complete. 3: something is missing or failed.
+    DIR is the folder of `urdfkin validate --store DIR`. The command reads only few of its files, so it is
+    fast and does not disturb a running validation. `urdfkin report DIR` reads and checks all files.
+
+    Exit 0: complete. 3: a robot is missing or failed.
     """
     from urdfkin.validation.store import Store
 
-    store = Store.reading(folder, _warn)
+    store = Store.reading(folder, warn)
     manifest, counts = store.manifest, store.counts()
     size = len(manifest.cut)
     failed = [robot for robot, (_, has_failed) in counts.items() if has_failed]
-    there = sum(done for done, _ in counts.values())
-    missing = sum(size - done for done, has_failed in counts.values() if not has_failed)
+    finished = sum(done for done, _ in counts.values())
+    missing = _missing_chunks(store, counts)
     over = sum(done == size or has_failed for done, has_failed in counts.values())
-    of = f"{manifest.samples:,} samples of each robot, seed {manifest.seed}"
-    say(f"{folder}: {of}, started {manifest.started}")
+    samples = f"{manifest.samples:,} samples of each robot, seed {manifest.seed}"
+    say(f"{folder}: {samples}, started {manifest.started}")
     say(f"robots: {over:,} of {len(counts):,} done, {len(failed):,} of them failed")
-    say(f"chunks: {there:,} done, {missing:,} missing")
+    say(f"chunks: {finished:,} done, {missing:,} missing")
     _print_accuracy_progress(store, counts)
-    for robot in failed[:_NAMED]:
-        say(f"  failed: {manifest.robots[robot][0].words}{_why(store, robot)}")
-    if len(failed) > _NAMED:
-        say(f"  and {len(failed) - _NAMED:,} more")
-    if missing and (seconds := _seconds(store, counts)) is not None:
+    for robot in failed[:_MOST_FAILED]:
+        say(f"  failed: {manifest.robots[robot][0].words}{_reason(store, robot)}")
+    if len(failed) > _MOST_FAILED:
+        say(f"  and {len(failed) - _MOST_FAILED:,} more")
+    if missing and (seconds := _seconds_of_chunk(store, counts)) is not None:
         say(
             f"remaining: {duration(missing * seconds)} on one processor, {seconds:.2g} s per chunk;"
             " divide the time by the number of processors"
         )
-    if (holder := store.at_work()) is not None:
+    if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")
     elif missing:
         say("no process is running; to resume, repeat the same `urdfkin validate ... --store` command")
@@ -195,8 +196,13 @@ def status(context: click.Context, folder: Path) -> None:
     context.exit(3 if missing or failed else 0)
 
 
+def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
+    size = len(store.manifest.cut)
+    return sum(size - done for done, has_failed in counts.values() if not has_failed)
+
+
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    if not store.has_judge:
+    if not store.has_study:
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted
@@ -206,26 +212,23 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
         say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')} done")
 
 
-def _why(store: Store, robot: int) -> str:
+def _reason(store: Store, robot: int) -> str:
     from urdfkin.validation.answer import Failure
 
-    for index in range(len(store.manifest.cut)):
-        found = store.answer(robot, index)
-        if isinstance(found, Failure):
-            return f": {found.reason}"
-    return ""
+    answers = (store.answer(robot, index) for index in range(len(store.manifest.cut)))
+    return next((f": {answer.reason}" for answer in answers if isinstance(answer, Failure)), "")
 
 
-def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
-    """Return the mean time for a chunk of samples in seconds, from up to `_READ` finished chunks."""
+def _seconds_of_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
+    """Return the mean computing time of a chunk in seconds; None if no chunk is finished."""
     from urdfkin.validation.chunk import ChunkResult
 
-    known = [robot for robot, (done, _) in counts.items() if done]
-    found = []
-    for robot in known[:: max(1, len(known) // _READ)][:_READ]:
+    begun = [robot for robot, (done, _) in counts.items() if done]
+    seconds = []
+    for robot in begun[:: max(1, len(begun) // _MOST_CHUNKS)][:_MOST_CHUNKS]:
         answers = (store.answer(robot, index) for index in reversed(range(len(store.manifest.cut))))
-        found += [next(a.seconds for a in answers if isinstance(a, ChunkResult))]
-    return sum(found) / len(found) if found else None
+        seconds += [next(answer.seconds for answer in answers if isinstance(answer, ChunkResult))]
+    return sum(seconds) / len(seconds) if seconds else None
 
 
 @click.command(
@@ -233,31 +236,31 @@ def _seconds(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
     short_help="Merge the result stores of several machines.",
     epilog="Example: urdfkin report merge whole shard-1 shard-2 shard-3 shard-4",
 )
-@click.argument("folder", metavar="DIR", type=_FOLDER)
-@click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=_FOLDER)
+@click.argument("folder", metavar="DIR", type=FOLDER)
+@click.argument("stores", metavar="STORE...", nargs=-1, required=True, type=FOLDER)
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
-    """Merge other stores of the same validation into DIR, for example the stores of several machines.
+    """Copy the results of several stores of the same validation into the folder DIR.
 
-    Results of the accuracy study are copied too. Each file is read and checked; damaged files are reported
-    and skipped. DIR is made if it does not exist.
+    A STORE is a folder of `urdfkin validate --store`, for example one from each machine. Results of the
+    accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped. DIR
+    is made if it does not exist.
     """
     from urdfkin.validation.accuracy_store import AccuracyResult
-    from urdfkin.validation.store import Store, opened
+    from urdfkin.validation.store import Store, open_store
 
-    others = [Store.reading(store, _warn) for store in stores]
-    with opened(folder, others[0].manifest, _warn) as whole:
+    others = [Store.reading(store, warn) for store in stores]
+    with open_store(folder, others[0].manifest, warn) as whole:
         for other in others[1:]:
-            whole.demand_same(other.manifest, other.folder)
+            whole.check_same(other.manifest, other.folder)
         for other in others:
-            say(f"{other.folder}: {whole.take(other):,} chunks copied")
-        if any(other.has_judge for other in others):
+            say(f"{other.folder}: {whole.copy_missing(other):,} chunks copied")
+        if any(other.has_study for other in others):
             AccuracyResult.merge(whole, others)
         counts = whole.counts()
-        size = len(whole.manifest.cut)
-        missing = sum(size - done for done, failed in counts.values() if not failed)
+        missing = _missing_chunks(whole, counts)
         _print_accuracy_progress(whole, counts)
     say(f"{folder}: complete" if not missing else f"{folder}: {missing:,} chunks missing")
 
 
-def _warn(message: str) -> None:
+def warn(message: str) -> None:
     say(f"urdfkin: warning: {message}", err=True)

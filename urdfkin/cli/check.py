@@ -1,4 +1,4 @@
-"""`urdfkin check`: check URDF files, print the findings in several formats, and apply automatic fixes."""
+"""`urdfkin check`: check robot files, print the findings, and apply automatic fixes."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ import click
 
 from urdfkin.cli.completion import complete_code, complete_file
 from urdfkin.cli.options import (
-    Whole,
-    how_to_load,
+    FILE,
+    WholeNumber,
+    combine,
+    load_options,
     mimic_option,
     reject_unused_options,
     root_joint_option,
     source_options,
-    together,
 )
-from urdfkin.cli.output import hand_out
+from urdfkin.cli.output import counted, write_output
 from urdfkin.cli.streams import command_lines, harmless, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
@@ -35,7 +36,8 @@ from urdfkin.system.lazy_import import installed_version
 from urdfkin.urdf.findings import Excerpts, UrdfError, UrdfWarning
 from urdfkin.urdf.lint import Finding, Limits, Severity
 from urdfkin.urdf.lint.autofix import mend, patch
-from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, statistics, summary
+from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
+from urdfkin.urdf.lint.formats import statistics as statistics_lines
 from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, page
 from urdfkin.urdf.lint.runner import Examined, examine, file_of
 from urdfkin.urdf.lint.settings import (
@@ -62,24 +64,25 @@ class CheckOutcome:
 
     Attributes:
         findings: Findings to print.
-        silenced: Pairs of a finding that a comment in the file suppresses, and the reason in this comment.
-        excerpts: For each finding, the line of the file, and a second line with a caret under the fault.
-        unreadable: The errors of the files that could not be read.
+        silenced: Findings that a comment in the file suppresses, each with the reason in the comment.
+        excerpts: For each finding, the faulty line of the file, and a line with carets below the fault.
+        errors: Errors of the files that could not be read.
         unchanged: Number of files that --changed-since skips because they have not changed.
-        known: Number of findings that the baseline file lists and the check suppresses. Second, the number of
-            entries in the baseline file that the check no longer finds.
+        known: Number of findings that the baseline file suppresses.
+        gone: Number of entries of the baseline file that no longer have a finding.
         to_fix: Number of findings that --fix would fix.
-        patches: The patches of --diff.
-        unsafe: Number of further findings that --unsafe-fixes would fix.
+        patches: Patches that --diff prints.
+        unsafe: Number of findings that only --unsafe-fixes would fix.
     """
 
     files: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
     silenced: list[tuple[Finding, str]] = field(default_factory=list)
     excerpts: list[str | None] = field(default_factory=list)
-    unreadable: list[UrdfkinError] = field(default_factory=list)
+    errors: list[UrdfkinError] = field(default_factory=list)
     unchanged: int = 0
-    known: tuple[int, int] = (0, 0)
+    known: int = 0
+    gone: int = 0
     to_fix: int = 0
     patches: list[str] = field(default_factory=list)
     unsafe: int = 0
@@ -102,12 +105,14 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
         if findings:
             command_lines(as_github(findings))
     elif statistics:
-        _print_statistics(outcome)
+        for line in statistics_lines(outcome.findings):
+            say(line)
+        _print_summary(outcome)
     elif outcome.files or outcome.unchanged:
-        _print_terminal(outcome, excerpts=style == "terminal")
+        _print_findings(outcome, excerpts=style == "terminal")
 
 
-def _print_terminal(outcome: CheckOutcome, *, excerpts: bool) -> None:
+def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
     for finding, excerpt in zip(outcome.findings, outcome.excerpts, strict=True):
         place, rest = str(finding).split(f": {finding.code} ", 1)
         colour = {"fg": _COLOURS[finding.severity], "bold": True}
@@ -118,11 +123,12 @@ def _print_terminal(outcome: CheckOutcome, *, excerpts: bool) -> None:
             say_styled((line, {}))
             say_styled((caret, colour))
     _print_summary(outcome)
-    if any(finding.fix and finding.fix.is_safe for finding in outcome.findings):
+    fixes = [finding.fix for finding in outcome.findings if finding.fix]
+    unsafe = sum(not fix.is_safe for fix in fixes)
+    if len(fixes) > unsafe:
         say("[*] --fix fixes these findings; --diff prints the changes")
-    if unsafe := sum(bool(finding.fix and not finding.fix.is_safe) for finding in outcome.findings):
-        many = "s" * (unsafe != 1)
-        also = f"--unsafe-fixes also fixes {unsafe} finding{many}"
+    if unsafe:
+        also = f"--unsafe-fixes also fixes {counted(unsafe, 'finding')}"
         say(f"{also}, but rotates joints by more than a rounding error")
     worst = next((f.code for f in outcome.findings if f.severity is Severity.ERROR), None)
     if worst is not None:
@@ -130,50 +136,41 @@ def _print_terminal(outcome: CheckOutcome, *, excerpts: bool) -> None:
 
 
 def _print_summary(outcome: CheckOutcome) -> None:
-    asides = [
-        f"silenced by comments: {len(outcome.silenced)}" if outcome.silenced else "",
-        f"unchanged files: {outcome.unchanged}" if outcome.unchanged else "",
-        f"already known: {outcome.known[0]}" if outcome.known[0] else "",
-        f"in the baseline but already fixed: {outcome.known[1]}; write the baseline again"
-        if outcome.known[1]
-        else "",
+    counts = [
+        (len(outcome.silenced), "silenced by comments: {}"),
+        (outcome.unchanged, "unchanged files: {}"),
+        (outcome.known, "already known: {}"),
+        (outcome.gone, "in the baseline but already fixed: {}; write the baseline again"),
     ]
-    aside = ", ".join(filter(None, asides))
-    say(summary(outcome.findings, len(outcome.files)) + (f" ({aside})" if aside else ""))
+    details = ", ".join(text.format(count) for count, text in counts if count)
+    say(summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
 
 
-def _print_statistics(outcome: CheckOutcome) -> None:
-    for line in statistics(outcome.findings):
-        say(line)
-    _print_summary(outcome)
-
-
-def say_fixed(file: str, fixed: Sequence[Finding]) -> None:
+def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
     for code in sorted({finding.code for finding in fixed}):
-        these = [finding for finding in fixed if finding.code == code]
-        turns = max(finding.fix.turns for finding in these if finding.fix)
-        lines = sorted({finding.line for finding in these})
+        same_code = [finding for finding in fixed if finding.code == code]
+        turns = max(finding.fix.turns for finding in same_code if finding.fix)
+        lines = sorted({finding.line for finding in same_code})
         more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
         where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
-        moved = f"; each joint rotated by at most {turns:.1e} rad" if turns else "; the robot is unchanged"
-        say(f"{file}: fixed {code} {RULES[code].slug}, {where}{moved}", err=True)
+        effect = f"; each joint rotated by at most {turns:.1e} rad" if turns else "; the robot is unchanged"
+        say(f"{file}: fixed {code} {RULES[code].slug}, {where}{effect}", err=True)
 
 
 _SETTINGS = "urdfkin.settings"
-#: These settings in pyproject.toml are the defaults of the options with the same names.
+#: Settings in pyproject.toml that are the defaults of the options with the same names
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
-_FILE = click.Path(path_type=Path, dir_okay=False)
 
 
-def _take_settings(context: click.Context, _: click.Parameter, file: Path | None) -> None:
-    """Read the settings of the repository or of `file`; they are the defaults of the options."""
+def _read_settings(context: click.Context, _: click.Parameter, file: Path | None) -> None:
+    """Make the settings of the repository, or those of `file`, the defaults of the options."""
     isolated = "--isolated" in context.meta
     settings = Settings() if isolated else find_settings(Path()) if file is None else read_settings(file)
     values = dict(settings.values)
-    given: dict[str, Any] = {name: values[name] for name in _OPTIONS if name in values}
+    defaults: dict[str, Any] = {name: values[name] for name in _OPTIONS if name in values}
     if "baseline" in values:
-        given["baseline"] = str(settings.root / values["baseline"])
-    context.default_map = given
+        defaults["baseline"] = str(settings.root / values["baseline"])
+    context.default_map = defaults
     context.meta[_SETTINGS] = settings
 
 
@@ -182,53 +179,52 @@ def _isolate(context: click.Context, _: click.Parameter, isolated: bool) -> None
         context.meta["--isolated"] = True
 
 
-choice_options = together(
+choice_options = combine(
     click.option(
         "--select",
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Report only findings with this code (URDF502), name or family (URDF5); repeatable.",
+        help="Report only findings with this code (URDF502), name (axis-not-unit) or family (URDF5);"
+        " repeatable, or separated by commas.",
     ),
     click.option(
         "--ignore",
         multiple=True,
         metavar="CODE",
         shell_complete=complete_code,
-        help="Leave out findings with this code; repeatable, or several codes separated by commas.",
+        help="Leave out findings with this code, name or family; repeatable, or separated by commas.",
     ),
     click.option("--strict/--no-strict", default=False, help="Report warnings as errors."),
-    click.option(
-        "--notes/--no-notes", default=True, help="Report findings of severity note.  [default: notes]"
-    ),
+    click.option("--notes/--no-notes", default=True, help='Also report findings of severity "note".'),
     click.option(
         "--exclude",
         multiple=True,
         metavar="GLOB",
-        help="Leave out files and folders that match this pattern.",
+        help="Leave out files and folders that match this pattern; repeatable.",
     ),
-    click.option("--baseline", type=_FILE, help="Leave out the findings listed in this baseline file."),
+    click.option("--baseline", type=FILE, help="Leave out the findings listed in this baseline file."),
     click.option(
-        "--write-baseline", type=_FILE, help="Write all findings to this file as a baseline and exit with 0."
+        "--write-baseline", type=FILE, help="Write all findings to this file as a baseline and exit with 0."
     ),
     click.option(
         "--changed-since",
         metavar="VERSION",
-        help="Report only findings that are new since a branch, tag or commit.",
+        help="Report only findings that are new since a branch, tag or commit of git.",
     ),
 )
-settings_options = together(
+settings_options = combine(
     click.option(
         "--isolated", is_flag=True, is_eager=True, expose_value=False, callback=_isolate,
         help="Ignore the settings in pyproject.toml.",
     ),
     click.option(
-        "--config", type=_FILE, is_eager=True, expose_value=False, callback=_take_settings,
-        help="File with a table [tool.urdfkin] of settings.  [default: nearest pyproject.toml]",
+        "--config", type=FILE, is_eager=True, expose_value=False, callback=_read_settings,
+        help="File with a table [tool.urdfkin] of settings.", show_default="the nearest pyproject.toml",
     ),
 )  # fmt: skip
 #: Help texts of --max-bytes, --max-depth, ...
-_MOST = {
+_LIMITS = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
     "elements": "Largest number of elements in a file.",
@@ -237,14 +233,13 @@ _MOST = {
     "number": "Largest number of characters in a number.",
     "markup": "Largest size of a tag, comment or processing instruction in bytes.",
 }
-limit_options = together(
+limit_options = combine(
     *(
         click.option(
             f"--max-{limit.name}",
-            type=Whole(1),
+            type=WholeNumber(1),
             default=limit.default,
-            show_default=True,
-            help=_MOST[limit.name],
+            help=_LIMITS[limit.name],
         )
         for limit in fields(Limits)
     )
@@ -254,24 +249,30 @@ limit_options = together(
 @click.command("check")
 @click.argument("files", nargs=-1, metavar="[FILE|FOLDER|GLOB]...", shell_complete=complete_file)
 @click.option(
-    "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal", show_default=True,
+    "--format", "--output-format", "style", type=click.Choice(STYLES), default="terminal",
     help="Output format.",
 )  # fmt: skip
-@click.option("--output", "-o", type=_FILE, help="Write the findings, or the patch of --diff, to this file.")
-@click.option("--fix", is_flag=True, help="Apply the automatic fixes to the files.")
 @click.option(
-    "--unsafe-fixes", is_flag=True, help="Also apply fixes that rotate a joint by more than a rounding error."
+    "--output",
+    "-o",
+    type=FILE,
+    help="Write the findings, or the patch of --diff, to this file.",
+    show_default="standard output",
 )
-@click.option("--diff", is_flag=True, help="Print the changes of --fix as a patch, without applying them.")
-@click.option("--statistics", is_flag=True, help="Print the number of findings of each code.")
+@click.option("--fix", is_flag=True, help="Make the automatic fixes in the files.")
+@click.option(
+    "--unsafe-fixes", is_flag=True, help="Also make fixes that rotate a joint by more than a rounding error."
+)
+@click.option("--diff", is_flag=True, help="Print a patch of the changes that --fix would make.")
+@click.option("--statistics", is_flag=True, help="Print only the number of findings of each code.")
 @choice_options
 @click.option(
     "--each",
     is_flag=True,
-    help="Print each finding on its own line. Default: one line for many findings of one kind.",
+    help="Print each finding on its own line, instead of one line for many findings of one kind.",
 )
-@mimic_option("Check with mimic joints coupled (--mimic) or as free joints (--no-mimic).  [default: mimic]")
-@root_joint_option("Also check that no name of the robot collides with this root joint.")
+@mimic_option("Check mimic joints as coupled joints, or as free joints.", "mimic")
+@root_joint_option("Also check that this root joint can be added: no joint or link has its name.")
 @source_options
 @settings_options
 @limit_options
@@ -279,11 +280,11 @@ limit_options = together(
 def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
-    A FILE is the path of a URDF, USD or MJCF file, a name from `urdfkin robots`, or - for standard input. A
-    FOLDER means all *.urdf files in it. Without FILE and FOLDER, the current folder is checked. A .xacro file
-    is expanded in a restricted process that can only compute and read the files of its package
+    A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard
+    input. A FOLDER means all *.urdf files in it. Without FILE and FOLDER, the current folder is checked. A
+    .xacro file is expanded in a restricted process that can only compute and read the files of its package
     (docs/xacro.md). --changed-since origin/main reports the new findings of a pull request. Settings are in
-    [tool.urdfkin] of pyproject.toml (docs/check.md).
+    the table [tool.urdfkin] of pyproject.toml (docs/check.md).
 
     Exit 0: no error. 1: an error, or changes with --diff. 2: an unreadable file or a wrong option.
 
@@ -303,27 +304,27 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
         reject_unused_options(context, ("output", "style", "statistics"), "with --write-baseline")
     if options["statistics"] and options["style"] not in ("terminal", "concise"):
         reject_unused_options(context, ("statistics",), f"with --format {options['style']}")
-    run = _run(context.meta[_SETTINGS], options)
+    run = _new_run(context.meta[_SETTINGS], options)
     for word in files or ["."]:
-        run.take(word, options["exclude"])
-    if (known := run.choice.baseline) is not None:
-        run.outcome.known = known.met, known.gone(run.outcome.files)
+        run.check_all(word, options["exclude"])
+    outcome = run.outcome
+    if (baseline := run.choice.baseline) is not None:
+        outcome.known, outcome.gone = baseline.met, baseline.gone(outcome.files)
     if options["write_baseline"] is not None:
-        _write_baseline(run, options["write_baseline"])
+        _write_baseline(outcome, options["write_baseline"])
     if options["diff"]:
-        found, among = run.outcome.to_fix, len(run.outcome.files)
-        many = "s" * (found != 1), "s" * (among != 1)
-        hand_out("".join(run.outcome.patches), options["output"])
-        more = f" ({run.outcome.unsafe} more with --unsafe-fixes)" if run.outcome.unsafe else ""
-        say(f"{found} finding{many[0]} to fix in {among} file{many[1]}{more}", err=True)
+        write_output("".join(outcome.patches), options["output"])
+        more = f" ({outcome.unsafe} more with --unsafe-fixes)" if outcome.unsafe else ""
+        files_ = counted(len(outcome.files), "file")
+        say(f"{counted(outcome.to_fix, 'finding')} to fix in {files_}{more}", err=True)
     elif options["write_baseline"] is None:
-        _put_outcome(run.outcome, options["style"], options["output"], statistics=options["statistics"])
-    for failure in run.outcome.unreadable:
-        say(f"urdfkin: error: {failure}", err=True)
+        _write_outcome(outcome, options["style"], options["output"], statistics=options["statistics"])
+    for error in outcome.errors:
+        say(f"urdfkin: error: {error}", err=True)
     sys.exit(run.exit_code())
 
 
-def _put_outcome(outcome: CheckOutcome, style: str, path: Path | None, *, statistics: bool) -> None:
+def _write_outcome(outcome: CheckOutcome, style: str, path: Path | None, *, statistics: bool) -> None:
     if path is None:
         print_outcome(outcome, style, statistics=statistics)
         return
@@ -333,42 +334,36 @@ def _put_outcome(outcome: CheckOutcome, style: str, path: Path | None, *, statis
     write_file(path, text.getvalue().encode())
 
 
-def _run(settings: Settings, options: dict[str, Any]) -> CheckRun:
+def _new_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
     writing = options["write_baseline"] is not None
-    known = None if writing or options["baseline"] is None else read_baseline(options["baseline"])
+    baseline = None if writing or options["baseline"] is None else read_baseline(options["baseline"])
     since = options["changed_since"]
-    how = how_to_load()
+    how = load_options()
     look = partial(
         examine,
         limits=Limits(**{limit.name: options[f"max_{limit.name}"] for limit in fields(Limits)}),
         mimic=how["mimic"],
         root_joint=how["root_joint"],
     )
+    codes_ = (_read_codes(options, "select") or frozenset(RULES | OF_OTHERS)) - _read_codes(options, "ignore")
     return CheckRun(
         look=look,
-        choice=Choice(_chosen(options), options["notes"], settings, known),
-        strict=options["strict"],
+        choice=Choice(codes_, options["notes"], settings, baseline),
+        strict=options["strict"] and not writing,  # a baseline stores the original severities
         fold=options["style"] in ("terminal", "concise", "github") and not (options["each"] or writing),
         fix=options["fix"],
         diff=options["diff"],
         unsafe=options["unsafe_fixes"],
         version=None if since is None else version_before(since, Path()),
-        accepting=writing,
+        accepts_all=writing,
     )
 
 
-def _chosen(options: dict[str, Any]) -> frozenset[str]:
-    words = {
-        name: [part for word in options[name] for part in word.replace(",", " ").split()]
-        for name in ("select", "ignore")
-    }
-    found = {}
-    for name, parts in words.items():
-        try:
-            found[name] = codes(parts)
-        except UnknownNameError as error:
-            raise click.UsageError(f"--{name}: {error}") from error
-    return (found["select"] if words["select"] else frozenset(RULES | OF_OTHERS)) - found["ignore"]
+def _read_codes(options: dict[str, Any], name: str) -> frozenset[str]:
+    try:
+        return codes([part for word in options[name] for part in word.replace(",", " ").split()])
+    except UnknownNameError as error:
+        raise click.UsageError(f"--{name}: {error}") from error
 
 
 @dataclass(slots=True)
@@ -380,10 +375,10 @@ class CheckRun:
         choice: Selects the findings to report.
         strict: Whether warnings become errors.
         fold: Whether to merge findings with the same code into one line of output.
-        diff: Whether to collect the changes that the fixes would make, as patches.
-        unsafe: Whether the user gave --unsafe-fixes.
+        diff: Whether to collect the changes of --fix as patches, without applying them.
+        unsafe: Whether to apply unsafe fixes too.
         version: The version that --changed-since names, or None.
-        accepting: Whether the user gave --write-baseline, so that all findings are accepted.
+        accepts_all: Whether no finding is a failure, because --write-baseline accepts all findings.
     """
 
     look: partial[Examined]
@@ -394,34 +389,34 @@ class CheckRun:
     diff: bool
     unsafe: bool
     version: Version | None
-    accepting: bool
+    accepts_all: bool
     outcome: CheckOutcome = field(default_factory=CheckOutcome)
-    _taken: set[str] = field(default_factory=set)
+    _seen: set[str] = field(default_factory=set)
     _changed: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
-    def take(self, word: str, exclude: Sequence[str]) -> None:
-        """Check each file that an argument matches, but no file twice."""
+    def check_all(self, word: str, exclude: Sequence[str]) -> None:
+        """Check each file that an argument of the command matches, but no file twice."""
         settings = self.choice.settings
         try:
             files = collected(word, settings, settings.values.get("include", INCLUDE), exclude)
         except SourceError as error:
-            self.outcome.unreadable.append(error)
+            self.outcome.errors.append(error)
             return
         for file in files:
-            if file not in self._taken:
-                self._taken.add(file)
+            if file not in self._seen:
+                self._seen.add(file)
                 try:
-                    if file not in (word, f"./{word}"):  # The file was found in a folder.
+                    if file not in (word, f"./{word}"):  # the file was found in a folder
                         demand_regular(Path(file))
                     self._check(file)
                 except UrdfkinError as error:
-                    self.outcome.unreadable.append(error)
+                    self.outcome.errors.append(error)
 
     def _check(self, file: str) -> None:
-        if _is_other(file):
-            self._check_other(file)
+        if _is_usd_or_mjcf(file):
+            self._check_usd_or_mjcf(file)
             return
-        text = read_source(file, self.look.keywords["limits"].bytes, how_to_load()["xacro_args"])
+        text = read_source(file, self.look.keywords["limits"].bytes, load_options()["xacro_args"])
         before = None
         if self.version is not None:
             before = known_before(text, self.version, self.look)
@@ -434,46 +429,42 @@ class CheckRun:
         findings = [self._with_severity(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
-    def _check_other(self, file: str) -> None:
-        """Check a USD or MJCF file; if `load` rejects the robot, add the findings of its error.
+    def _check_usd_or_mjcf(self, file: str) -> None:
+        """Load a USD or MJCF file, and add the findings of the robot or of the error.
 
-        With --changed-since, an unchanged file is skipped, and all findings of a changed file are reported.
+        With --changed-since, an unchanged file is skipped; of a changed file, all findings are reported.
         """
-        if self.version is not None and self._is_unchanged(
-            file, USD if is_usd(file) else _MJCF, self.version
-        ):
+        suffixes = USD if is_usd(file) else _MJCF
+        if self.version is not None and self._is_unchanged(file, suffixes, self.version):
             self.outcome.unchanged += 1
             return
         from urdfkin.robot.loading import load
 
-        how = how_to_load()
+        how = load_options()
+        usd = {name: how[name] for name in ("variant", "articulation") if name in how and is_usd(file)}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
             try:
-                usd = {
-                    name: how[name] for name in ("variant", "articulation") if name in how and is_usd(file)
-                }
                 robot = load(file, verify=False, **usd)
-                found = tuple(one for one in robot.findings if one.code in OF_OTHERS)
+                found = tuple(finding for finding in robot.findings if finding.code in OF_OTHERS)
             except UrdfError as error:
                 found = error.findings
         text = Text(b"", file, file)
-        wanted = self.choice.of(text)
-        findings = tuple(self._with_severity(finding) for finding in found if wanted(finding))
+        is_chosen = self.choice.of(text)
+        findings = tuple(self._with_severity(finding) for finding in found if is_chosen(finding))
         has_lines = any(one.width and one.file == file for one in findings)
         data = read_bytes(Path(file)).removeprefix(codecs.BOM_UTF8) if has_lines else b""
         self.outcome.add(file, Examined(text, data, None, findings, ()))
 
-    def _is_unchanged(self, file: str, parts: tuple[str, ...], version: Version) -> bool:
-        """Return whether a file, and every file that it may refer to, is the same as in an older version.
+    def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
+        """Return whether a file, and all files that it may refer to, are the same as in an older version.
 
-        The files to which the file refers are not known here. If any file with a suffix in `parts` has
-        changed in the repository, the method therefore returns False. It also returns False if the file
-        mentions a deleted file.
+        A file may refer to each file of the repository with a suffix in `suffixes`, and to a deleted file
+        that it mentions.
         """
-        if parts not in self._changed:
-            self._changed[parts] = version.changed(parts)
-        if self._changed[parts]:
+        if suffixes not in self._changed:
+            self._changed[suffixes] = version.changed(suffixes)
+        if self._changed[suffixes]:
             return False
         data = read_bytes(Path(file))
         return version.holds(data) and not any(os.fsencode(name) in data for name in version.gone)
@@ -496,46 +487,49 @@ class CheckRun:
             return text
         if mended.fixed:
             write_file(path, mended.text.data)
-            say_fixed(file, mended.fixed)
+            _say_fixed(file, mended.fixed)
         return mended.text
 
-    def _safe(self, chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
+    def _safe(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
         """Return a filter that also rejects findings with an unsafe fix, unless --unsafe-fixes is given."""
-        return lambda finding: chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
+        return lambda finding: (
+            is_chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
+        )
 
     def _with_severity(self, finding: Finding) -> Finding:
-        # A baseline file stores each finding's original severity.
-        raised = self.strict and not self.accepting and finding.severity is Severity.WARNING
-        return replace(finding, severity=Severity.ERROR) if raised else finding
+        is_raised = self.strict and finding.severity is Severity.WARNING
+        return replace(finding, severity=Severity.ERROR) if is_raised else finding
 
     def exit_code(self) -> int:
         """Return 2 if a file could not be read, 1 for an error or a change of --diff, 0 otherwise."""
-        failed = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
-        bad = self.outcome.to_fix > 0 if self.diff else failed and not self.accepting
-        return 2 if self.outcome.unreadable else int(bad)
+        if self.outcome.errors:
+            return 2
+        if self.diff:
+            return int(self.outcome.to_fix > 0)
+        has_error = any(finding.severity is Severity.ERROR for finding in self.outcome.findings)
+        return int(has_error and not self.accepts_all)
 
 
-#: Suffixes of MJCF files and includes
+#: Suffixes of MJCF files and of the files that they include
 _MJCF = (".xml", ".mjcf")
 
 
-def _is_other(file: str) -> bool:
+def _is_usd_or_mjcf(file: str) -> bool:
     if is_usd(file):
         return True
     if Path(file).suffix.lower() not in _MJCF:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # The next import loads NumPy.
+            return False  # avoids the next import, which loads NumPy
     from urdfkin.urdf.mjcf import is_mjcf
 
     return is_mjcf(file)
 
 
-def _write_baseline(run: CheckRun, path: Path) -> None:
-    outcome = run.outcome
-    if outcome.unreadable:
+def _write_baseline(outcome: CheckOutcome, path: Path) -> None:
+    if outcome.errors:
         return
     write_file(path, baseline_text(outcome.findings, outcome.files, path).encode())
-    many = sum(finding.count for finding in outcome.findings)
-    say(f"wrote {path}: {many} finding{'s' * (many != 1)} in the baseline", err=True)
+    count = sum(finding.count for finding in outcome.findings)
+    say(f"wrote {path}: {counted(count, 'finding')} in the baseline", err=True)

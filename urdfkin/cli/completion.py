@@ -1,4 +1,4 @@
-"""Shell completion of commands, options, robots, files, frames, tables, codes and equations.
+"""Complete commands, options, robots, files, frames, tables, codes and equations in a shell.
 
 Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
 Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name in a
@@ -22,18 +22,17 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: Completion offers a name without quotes, blanks, and characters that a shell expands.
-#: A name with a colon does not match, because bash separates words at colons.
+#: A name without quotes, blanks, and characters that a shell expands.
+#: Colons are excluded too, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: A larger file (bytes) is not read for its names.
-_MOST = 10_000_000
-#: The `name` of these XML elements is a frame.
-#: They are children of the root element in a URDF, and at any depth in an MJCF file.
+#: Maximum size (bytes) of a robot file whose frames are completed
+_MOST_BYTES = 10_000_000
+#: XML elements whose attribute `name` is a frame: children of a URDF's root, any elements of an MJCF file
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
 def complete_robot(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    return [CompletionItem(incomplete, type="file"), *_offered(catalogue(), incomplete)]
+    return [CompletionItem(incomplete, type="file"), *_items(catalogue(), incomplete)]
 
 
 def complete_file(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
@@ -41,32 +40,31 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    """Return the names of the links and joints of the robot that the user has typed as ROBOT."""
     # While the user types the value of an option, click does not yet know the command's arguments.
     robot = context.params.get("robot") or next(iter(context.args), "")
-    return _offered(_frames(robot), incomplete)
+    return _items(_frames(robot), incomplete)
 
 
 def complete_table(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
     from urdfkin.system.resources import robots_dir
 
     shipped = sorted(path.stem for path in (robots_dir() / "dh").glob("*.toml"))
-    return [CompletionItem(incomplete, type="file"), *_offered(shipped, incomplete)]
+    return [CompletionItem(incomplete, type="file"), *_items(shipped, incomplete)]
 
 
 def complete_code(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
     from urdfkin.urdf.lint.pages import RULES
 
-    return _offered((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
+    return _items((name for rule in RULES.values() for name in (rule.id, rule.slug)), incomplete)
 
 
 def complete_topic(context: click.Context, parameter: click.Parameter, incomplete: str) -> Items:
     from urdfkin.kinematics.registry import equations
 
-    return [*complete_code(context, parameter, incomplete), *_offered(equations(), incomplete)]
+    return [*complete_code(context, parameter, incomplete), *_items(equations(), incomplete)]
 
 
-def _offered(names: Iterable[str], incomplete: str) -> Items:
+def _items(names: Iterable[str], incomplete: str) -> Items:
     return [
         CompletionItem(name)
         for name in names
@@ -83,7 +81,7 @@ def _frames(word: str) -> Iterator[str]:
     if is_xacro(word) or not (word in catalogue() or Path(word).expanduser().is_file()):
         return
     try:
-        text = read_source(word, _MOST)
+        text = read_source(word, _MOST_BYTES)
         root = read_document(Reporter(text.label, text.data))
     except (UrdfkinError, OSError):
         return
@@ -94,20 +92,15 @@ def _frames(word: str) -> Iterator[str]:
     yield from dict.fromkeys(names)
 
 
-SHELLS = ("bash", "zsh", "fish")
-#: If the completion script sets this environment variable, click prints completions.
-VARIABLE = "_URDFKIN_COMPLETE"
-
-
 @click.command()
-@click.argument("shell", type=click.Choice(SHELLS))
+@click.argument("shell", type=click.Choice(("bash", "zsh", "fish")))
 @click.pass_context
 def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> None:
     """Print the completion script for a shell.
 
-    The script completes commands, options and their choices, robots and files, the frames of the given robot,
-    shipped tables, codes and equations. Frames are read from a URDF file; a .xacro file is not expanded. Add
-    the line for your shell to its startup file:
+    The script completes commands, options and their choices, robots and files, the frames of the robot on the
+    command line, reference tables, codes and equations. Frames are read from a URDF or MJCF file; a .xacro
+    file is not expanded. To activate the script, add the line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"
@@ -119,4 +112,5 @@ def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> No
       urdfkin completion bash
     """  # noqa: D301 - a backspace tells click not to wrap the paragraph
     script = get_completion_class(shell)
-    say_file(script(context.find_root().command, {}, "urdfkin", VARIABLE).source())
+    # The script sets this environment variable, so that click prints completions.
+    say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())

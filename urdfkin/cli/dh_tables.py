@@ -1,8 +1,9 @@
-"""Compute the tables of `urdfkin dh` after its options have been read."""
+"""Make the tables of `urdfkin dh`, and its comparison of a robot with a table."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -40,24 +41,25 @@ from urdfkin.verify.verifier import TABLE_SAMPLES
 
 #: Formats for several tables
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: In these formats, the check's result is printed below the table; otherwise it goes to stderr.
+#: Formats in which the result of the check is printed below the table; in other formats it goes to stderr
 _PRINTED = ("terminal", "markdown")
-#: Formats for people
+#: Formats of a printed table
 _TEXTS = (*_PRINTED, "html", "latex")
-#: Digits of base and tool in formats that round numbers are --digits, or the given number.
+#: Number of digits of base and tool in formats that round numbers; None: the number of --digits
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
-    """The command's options; `choices` are other arguments of `Robot.dh`.
+class DHRequest:
+    """The options of `urdfkin dh`.
 
-    `written` is the file of the table, if ROBOT is a table that the command writes unchanged. If `written` is
-    None, the command derives a table from the robot.
+    Attributes:
+        unchanged: File of the table ROBOT, if the command writes the same table; None: derive a table.
+        choices: Options that are arguments of `Robot.dh`.
     """
 
     robot: Robot
-    written: str | None
+    unchanged: str | None
     choices: dict[str, Any]
     base: str | None
     tip: str | None
@@ -85,136 +87,127 @@ class Work:
         )
 
 
-def run(work: Work) -> Answer:
-    chosen = [
-        name for name, on in (("--all", work.all_), ("--tree", work.tree), ("--compare", work.compare)) if on
-    ]
+def run(request: DHRequest) -> Answer:
+    modes = {"--all": request.all_, "--tree": request.tree, "--compare": request.compare}
+    chosen = [name for name, value in modes.items() if value]
     if len(chosen) > 1:
         raise InputError(
             f"{' and '.join(chosen)} cannot be used together", remedy="use only one of these options"
         )
-    if work.compare is not None:
-        return _compare(work, work.compare)
-    if work.tree:
-        return _tree(work)
-    return _tables(work)
+    if request.compare is not None:
+        return _compare(request, request.compare)
+    return _write_tree(request) if request.tree else _write_tables(request)
+
+
+def _require_format(request: DHRequest, option: str, formats: Sequence[str]) -> None:
+    if request.format_ not in formats:
+        raise InputError(
+            f"{option} does not support the format {request.format_!r}",
+            remedy=f"use --format {', '.join(formats)}",
+        )
 
 
 # -- tables --------------------------------------------------------------------------------------------
 
 
-def _tables(work: Work) -> Answer:
-    tree = work.robot.tree
-    tips = [tree.links[leaf] for leaf in tree.leaves()] if work.all_ else [work.tip]
-    if len(tips) > 1 and work.format_ not in _FORMATS_OF_SEVERAL:
-        raise InputError(
-            f"--all does not support the format {work.format_!r}",
-            remedy=f"use --format {', '.join(_FORMATS_OF_SEVERAL)}",
-        )
-    verifier = work.robot.verifier
-    tables = [_make_table(work, tip, work.snap) for tip in tips]
-    made = [(table, verifier.table(table) if verifier.policy else None) for table in tables]
-    if work.format_ == "json":
-        documents = [_document(table, check) for table, check in made]
-        text = json.dumps(documents if work.all_ else documents[0], indent=2) + "\n"
+def _write_tables(request: DHRequest) -> Answer:
+    tree, verifier, format_ = request.robot.tree, request.robot.verifier, request.format_
+    tips = [tree.links[leaf] for leaf in tree.leaves()] if request.all_ else [request.tip]
+    if len(tips) > 1:
+        _require_format(request, "--all", _FORMATS_OF_SEVERAL)
+    tables = [_make_table(request, tip, request.snap) for tip in tips]
+    checks = [verifier.table(table) if verifier.policy else None for table in tables]
+    results = list(zip(tables, checks, strict=True))
+    if format_ == "json":
+        documents = [{**to_mapping(table), "checked": check_of_path(check)[0]} for table, check in results]
+        text = json.dumps(documents if request.all_ else documents[0], indent=2) + "\n"
     else:
-        text = "\n".join(_format_table(work, table, check) for table, check in made)
-    if work.format_ not in (*_PRINTED, "json"):
-        for table, check in made:
-            for line in _notes(work, table, check).split("\n"):
+        text = "\n".join(_format_table(request, table, check) for table, check in results)
+    if format_ not in (*_PRINTED, "json"):
+        for table, check in results:
+            for line in _lines_below(request, table, check):
                 say(line, err=True)
-    return _answer(work, text, 0 if all(check is not None and check.within for _, check in made) else 3)
+    code = 0 if all(check is not None and check.within for check in checks) else 3
+    return _answer(request, text, code)
 
 
-def _make_table(work: Work, tip: str | None, snap: float) -> DHTable:
-    robot, base = work.robot, work.base
-    if work.written is not None:
-        table = read_table_or_screws(at_home(work.written))
+def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
+    robot, base = request.robot, request.base
+    if request.unchanged is not None:
+        table = read_table_or_screws(at_home(request.unchanged))
         # `Robot.dh` derives a table from screws in the same way as from a URDF.
         if isinstance(table, DHTable):
-            return to_convention(table, work.convention or table.convention)
+            return to_convention(table, request.convention or table.convention)
     like = None
-    if work.like is not None:
-        like = read_table(reference_path(work.like))
-        tip, base = (
-            tip or _frame_of_robot(work, like.tip_frame),
-            base or _frame_of_robot(work, like.base_frame),
-        )
-    if base is None and work.all_:
+    if request.like is not None:
+        like = read_table(reference_path(request.like))
+        tip = tip or _frame_of_robot(request, like.tip_frame)
+        base = base or _frame_of_robot(request, like.base_frame)
+    if base is None and request.all_:
         base = robot.tree.links[1 if robot.tree.links[0] == "universe" else 0]
-    convention = work.convention or (like.convention if like else "standard")
-    return robot.dh(tip, base, convention, snap=snap, like=like, verify=False, **work.choices)
+    convention = request.convention or (like.convention if like else "standard")
+    return robot.dh(tip, base, convention, snap=snap, like=like, verify=False, **request.choices)
 
 
-def _format_table(work: Work, table: DHTable, check: TableCheck | None) -> str:
-    if work.format_ == "urdf":
+def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) -> str:
+    if request.format_ == "urdf":
         return to_urdf(table)
-    if work.format_ == "svg":
+    if request.format_ == "svg":
         from urdfkin.view.dh_drawing import drawing
 
         return drawing(table)
-    text = export(table, work.format_, work.units, verify=bool(work.robot.verifier.policy))
-    return f"{text}\n{_notes(work, table, check)}\n" if work.format_ in _PRINTED else text
+    text = export(table, request.format_, request.units, verify=bool(request.robot.verifier.policy))
+    if request.format_ in _PRINTED:
+        return "\n".join([text, *_lines_below(request, table, check), ""])
+    return text
 
 
-def _notes(work: Work, table: DHTable, check: TableCheck | None) -> str:
-    """Return the lines under a table: the check, the error of the printed digits, and hints."""
-    lines = [check_of_path(check)[0]]
-    if work.format_ in _ROUNDED:
-        lines.append(str(printed(table, work.units, _ROUNDED[work.format_])))
-    if work.written is None and (
-        hint := snap_hint(table, lambda snap: _make_table(work, table.tip_frame, snap))
+def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
+    """Yield the lines below a table: the check, the error of the printed digits, and hints."""
+    yield check_of_path(check)[0]
+    if request.format_ in _ROUNDED:
+        yield from str(printed(table, request.units, _ROUNDED[request.format_])).split("\n")
+    if request.unchanged is None and (
+        hint := snap_hint(table, lambda snap: _make_table(request, table.tip_frame, snap))
     ):
-        lines.append(f"hint: {hint}")
-    if work.like is None and work.format_ in _PRINTED:
-        lines += [f"hint: {line}" for line in published(work.robot.origin.source)]
-    return "\n".join(lines)
-
-
-def _document(table: DHTable, check: TableCheck | None) -> dict[str, Any]:
-    return {**to_mapping(table), "checked": check_of_path(check)[0]}
+        yield f"hint: {hint}"
+    if request.like is None and request.format_ in _PRINTED:
+        yield from (f"hint: {line}" for line in published(request.robot.origin.source))
 
 
 # -- the whole tree ------------------------------------------------------------------------------------
 
 
-def _tree(work: Work) -> Answer:
-    parameters = tree_parameters(work.robot.tree)
-    if work.format_ == "json":
+def _write_tree(request: DHRequest) -> Answer:
+    robot, format_ = request.robot, request.format_
+    _require_format(request, "--tree", (*_TEXTS, "csv", "json"))
+    parameters = tree_parameters(robot.tree)
+    if format_ == "json":
         text = json.dumps(as_mapping(parameters), indent=2, allow_nan=False) + "\n"
-    elif work.format_ == "csv":
+    elif format_ == "csv":
         text = as_csv(parameters)
-    elif work.format_ in _TEXTS:
-        text = tree_document(parameters, work.units).written(work.format_)
     else:
-        raise InputError(
-            f"--tree does not support the format {work.format_!r}",
-            remedy=f"use {', '.join(_TEXTS)}, csv or json",
-        )
-    check = work.robot.verifier.tree_parameters(parameters) if work.robot.verifier.policy else None
-    if work.format_ in _PRINTED:
-        text += f"\n{check or check_of_path(None)[0]}\n"
-        q = draw(work.robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
-        text += f"{printed_tree(parameters, work.units, q)}\n"
+        text = tree_document(parameters, request.units).written(format_)
+    check = robot.verifier.tree_parameters(parameters) if robot.verifier.policy else None
+    check_line = str(check or check_of_path(None)[0])
+    if format_ in _PRINTED:
+        q = draw(robot.tree, TABLE_SAMPLES, np.random.default_rng(1), with_special=True).q
+        text += f"\n{check_line}\n{printed_tree(parameters, request.units, q)}\n"
     else:
-        say(str(check or check_of_path(None)[0]), err=True)
-    return _answer(work, text, 0 if check is not None else 3)
+        say(check_line, err=True)
+    return _answer(request, text, 0 if check is not None else 3)
 
 
 # -- a comparison --------------------------------------------------------------------------------------
 
 
-def _compare(work: Work, name: str) -> Answer:
-    if work.format_ not in (*_TEXTS, "json"):
-        raise InputError(
-            f"--compare does not support the format {work.format_!r}",
-            remedy=f"use {', '.join(_TEXTS)} or json",
-        )
+def _compare(request: DHRequest, name: str) -> Answer:
+    _require_format(request, "--compare", (*_TEXTS, "json"))
     path = reference_path(name)
     data = read_mapping(path)
-    tip = work.tip or _frame_of_robot(work, data.get("tip_frame"))
-    base = work.base or _frame_of_robot(work, data.get("base_frame"))
-    chain, tolerance = work.robot.chain(tip, base), work.tolerance / 1e3
+    tip = request.tip or _frame_of_robot(request, data.get("tip_frame"))
+    base = request.base or _frame_of_robot(request, data.get("base_frame"))
+    chain, tolerance = request.robot.chain(tip, base), request.tolerance / 1e3
     notes: list[str] = []
     if "convention" not in data:
         convention = convention_that_fits(chain, data, tolerance, str(path))
@@ -225,27 +218,27 @@ def _compare(work: Work, name: str) -> Answer:
     try:
         reference = table_of(data, str(path))
     except InputError as error:
-        if slip := diagnose(chain, data, tolerance):
-            error.remedy = f"{error.remedy}; {slip}" if error.remedy else str(slip)
+        if mistake := diagnose(chain, data, tolerance):
+            error.remedy = f"{error.remedy}; {mistake}" if error.remedy else str(mistake)
         raise
-    found = compare(chain, reference, tolerance, fit=work.fit, digits=last_digits(data))
-    slip = None if found.agrees or found.mistakes else diagnose(chain, data, tolerance, found.metres)
-    if work.format_ == "json":
-        text = json.dumps(_comparison(found, reference, slip), indent=2, allow_nan=False) + "\n"
+    found = compare(chain, reference, tolerance, fit=request.fit, digits=last_digits(data))
+    mistake = None if found.agrees or found.mistakes else diagnose(chain, data, tolerance, found.metres)
+    if request.format_ == "json":
+        text = json.dumps(_comparison(found, reference, mistake), indent=2, allow_nan=False) + "\n"
     else:
-        document = comparison_document(found, work.units)
-        hints = ["", f"hint: {slip}"] if slip else []
+        document = comparison_document(found, request.units)
+        hints = ["", f"hint: {mistake}"] if mistake else []
         parts = [*notes, Strong(document.title), *document.parts, *hints]
-        text = TextDocument("", parts).written(work.format_)
-    return _answer(work, text, 0 if found.passes else 1)
+        text = TextDocument("", parts).written(request.format_)
+    return _answer(request, text, 0 if found.passes else 1)
 
 
-def _frame_of_robot(work: Work, name: object) -> str | None:
-    return name if isinstance(name, str) and name in work.robot.frame_names else None
+def _frame_of_robot(request: DHRequest, name: object) -> str | None:
+    return name if isinstance(name, str) and name in request.robot.frame_names else None
 
 
 def _comparison(
-    found: TableComparison, reference: DHTable, slip: BetterInterpretation | None
+    found: TableComparison, reference: DHTable, mistake: BetterInterpretation | None
 ) -> dict[str, Any]:
     return {
         "passes": found.passes,
@@ -267,7 +260,7 @@ def _comparison(
         "not_compared": [{"row": row + 1, "cell": cell} for row, cell in found.hidden],
         "differences": [_difference(one) for one in found.differences],
         "likely_mistakes": [_mistake(one) for one in found.mistakes],
-        "would_fit_read_as": slip and slip.as_mapping(),
+        "would_fit_read_as": mistake and mistake.as_mapping(),
         "without_fitting": [_difference(one) for one in found.instead],
         "fitted": to_mapping(found.reference),
     }
@@ -296,5 +289,5 @@ def _mistake(one: Mistake) -> dict[str, Any]:
     }
 
 
-def _answer(work: Work, text: str, code: int) -> Answer:
-    return Answer(lambda: TextDocument(""), {work.format_: lambda: text}, code=code)
+def _answer(request: DHRequest, text: str, code: int) -> Answer:
+    return Answer(lambda: TextDocument(""), {request.format_: lambda: text}, code=code)

@@ -1,7 +1,7 @@
-"""Exit codes of the commands, error messages, and a clean stop on SIGTERM and SIGHUP.
+"""Run a command: exit codes, error messages, and a clean stop on SIGTERM and SIGHUP.
 
 SIGTERM and SIGHUP stop a command like an interrupt: finished results are saved. Exit code 1 always means a
-disagreement. Python also exits with 1 after an uncaught exception, so urdfkin catches such exceptions and
+disagreement. Python also exits with 1 after an uncaught exception, so urdfkin catches all exceptions and then
 exits with 70.
 """
 
@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
+from typing import Any
 
 import click
 
@@ -20,7 +21,7 @@ from urdfkin.cli import streams
 from urdfkin.cli.streams import say
 from urdfkin.errors import UrdfkinError
 
-#: A scheduler, `kill` or a shutdown sends SIGTERM, and a closing terminal sends SIGHUP.
+#: Signals of a scheduler, of `kill` and of a shutdown (SIGTERM), and of a closing terminal (SIGHUP)
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
@@ -31,46 +32,44 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, otherwise: int) -> int:
-        """Return 128 + the number of the signal, as shells do; 1 (a disagreement) has priority."""
+        """Return 128 + the number of the signal, as shells do, unless the exit code is 1 (a disagreement)."""
         return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
 
 
 @contextmanager
 def stoppable() -> Iterator[Stop]:
-    """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved.
-
-    After `nohup urdfkin ...`, SIGHUP is ignored.
-    """
+    """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
     stop = Stop()
+    # After `nohup urdfkin ...`, the handler of SIGHUP is not the default one, and SIGHUP is ignored.
+    numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
+
+    def handle(handler: Any) -> None:
+        for number in numbers:
+            signal.signal(number, handler)
 
     def interrupt(number: int, _: FrameType | None) -> None:
         stop.signal = number
-        for each in mine:
-            signal.signal(each, signal.SIG_IGN)
+        handle(signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    mine = [each for each in _SIGNALS if signal.getsignal(each) is signal.SIG_DFL]
-    for each in mine:
-        signal.signal(each, interrupt)
+    handle(interrupt)
     try:
         yield stop
     finally:
         if stop.signal is None:
-            for each in mine:
-                signal.signal(each, signal.SIG_DFL)
+            handle(signal.SIG_DFL)
 
 
 #: Exit code EX_SOFTWARE of sysexits.h
 CRASH = 70
-#: Exit code 128 + SIGINT
-_INTERRUPTED = 130
+_INTERRUPTED = 128 + signal.SIGINT
 
 
 def run(command: click.Command, name: str) -> int:
     """Run a command and return its exit code.
 
-    0: done, and verified where possible. 1: a disagreement. 2: bad input or usage. 3: computed, but not
-    checked by Pinocchio. 70: a defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
+    0: success. 1: a disagreement. 2: bad input or usage. 3: computed, but not checked by Pinocchio. 70: a
+    defect of urdfkin. 130: interrupted. 128 + n: stopped by signal n.
     """
     try:
         # In standalone mode, click would exit with 1 after an interrupt.
@@ -79,30 +78,30 @@ def run(command: click.Command, name: str) -> int:
         finally:
             streams.finish()
     except click.ClickException as error:
-        return _refuse_usage(error)
+        return _report_usage_error(error)
     except click.Abort:
         click.echo("urdfkin: interrupted", err=True)
         return _INTERRUPTED
     except UrdfkinError as error:
-        return refuse(error)
+        return report_error(error)
     except Exception as error:
-        return crash(error)
+        return report_crash(error)
     return code if isinstance(code, int) else 0
 
 
-def refuse(error: UrdfkinError) -> int:
+def report_error(error: UrdfkinError) -> int:
     click.echo(f"urdfkin: error: {error}", err=True)
     return 1 if error.is_disagreement else 2
 
 
-def _refuse_usage(error: click.ClickException) -> int:
+def _report_usage_error(error: click.ClickException) -> int:
     context = getattr(error, "ctx", None)
     page = f"; see: {context.command_path} --help" if context is not None else ""
     say(f"urdfkin: error: {error.format_message().rstrip('.')}{page}", err=True)
     return error.exit_code
 
 
-def crash(error: Exception) -> int:
+def report_crash(error: Exception) -> int:
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
         # For example, pre-commit installs urdfkin with --no-deps.
         remedy = "install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE"

@@ -1,4 +1,4 @@
-"""`urdfkin explain`: print the page of a finding's code, an equation, or a question of docs/questions.md."""
+"""`urdfkin explain`: print the page about a finding, an equation, or a question of docs/questions.md."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return each section by the anchor of its heading; links are replaced by their texts."""
+    """Return each section of docs/questions.md, without links, by the anchor of its heading."""
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
 def answer_to(topic: str) -> str | None:
-    """Return the section with an anchor, or the only section whose anchor contains all words; else None."""
+    """Return the section with the anchor `topic`, or the only section whose anchor contains all its words."""
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
 
 
 def as_text(answer: str) -> str:
-    """Format a section for a terminal; the code's set-up comes last."""
+    """Format a section for a terminal; the code that each example needs first is printed last."""
     pieces = _BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
@@ -45,12 +45,12 @@ def as_text(answer: str) -> str:
 
 
 def anchor(heading: str) -> str:
-    """Return the anchor of a heading in a web address."""
+    """Return the last part of a heading's web address, for example "locked-joints"."""
     return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")
 
 
 def _sections() -> list[str]:
-    """Split the page at its headings; the first part is the setup of every example."""
+    """Split docs/questions.md at its headings; the first section has the code that each example needs."""
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 
@@ -63,10 +63,10 @@ def _indent(code: str) -> str:
 def command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
-    CODE is a finding's code or its short name. The page has the reason, a bad and a good example, and the
-    behaviour of other programs. EQUATION is a number in the textbook chapter. The page has the equation, the
-    function that computes it, and its check. QUESTION is a question's name, or a word of it. Without an
-    argument, all codes and questions are listed.
+    CODE is a finding's code or its short name. Its page has the reason, a bad and a good example, and the
+    behaviour of other programs. EQUATION is a number in the textbook's chapter. Its page has the equation,
+    the function that computes it, and the check of this function. QUESTION is the name of a question, or a
+    word of the name. Without an argument, the command lists all codes and questions.
 
     \b
     Example:
@@ -75,23 +75,23 @@ def command(topic: str | None) -> None:
       urdfkin explain 7.130
       urdfkin explain reference-frames
     """  # noqa: D301 - a backspace tells click not to wrap the paragraph
+    rules = (*RULES.values(), *OF_OTHERS.values())
     if topic is None:
-        for rule in (*RULES.values(), *OF_OTHERS.values()):
+        for rule in rules:
             click.echo(f"{rule.id}  {rule.severity.value:7}  {rule.slug:26}  {page(rule.id).title}")
         click.echo(f"questions: {', '.join(answers())}")
     elif (equation := explain_equation(topic)) is not None:
         click.echo(equation)
-    elif (match := _rule(topic)) is not None:
+    elif (match := _find_rule(topic)) is not None:
         click.echo(explain(match))
     elif (answer := answer_to(topic)) is not None:
         click.echo(as_text(answer))
     else:
-        rules = (*RULES.values(), *OF_OTHERS.values())
-        known = [name for one in rules for name in (one.id, one.slug)]
-        raise UnknownNameError("code, equation or question", topic, [*known, *answers()])
+        names = [name for rule in rules for name in (rule.id, rule.slug)]
+        raise UnknownNameError("code, equation or question", topic, [*names, *answers()])
 
 
-def _rule(topic: str) -> Rule | None:
+def _find_rule(topic: str) -> Rule | None:
     try:
         return find_rule(topic)
     except UnknownNameError:

@@ -1,4 +1,4 @@
-"""`urdfkin export`: write a frame's kinematics as code, with test vectors and their bounds."""
+"""`urdfkin export`: write a frame's kinematics as code, with test vectors."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import click
 
 from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.options import (
+    FILE,
     frame_option,
     load_robot,
     reference_option,
@@ -15,7 +16,7 @@ from urdfkin.cli.options import (
     robot_options,
     verify_option,
 )
-from urdfkin.cli.output import check_line, exit_code, hand_out
+from urdfkin.cli.output import check_line, exit_code, output_option, write_output
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
@@ -30,30 +31,28 @@ from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
     "quantities",
     multiple=True,
     metavar="NAMES",
-    help="Quantities: placement, velocity, jacobian, jacobian_rate, hessian, acceleration."
-    f" Default: {','.join(QUANTITIES)}.",
+    help="Quantities to export, separated by commas; repeatable: placement, velocity, jacobian,"
+    " jacobian_rate, hessian, acceleration.",
+    show_default=",".join(QUANTITIES),
 )
 @reference_option
-@click.option("--to", type=click.Choice(tuple(LANGUAGES)), default="c", show_default=True, help="Language.")
+@click.option("--to", type=click.Choice(tuple(LANGUAGES)), default="c", help="Language of the code.")
 @click.option(
     "--form",
     type=click.Choice(tuple(FORMS)),
     default="tree",
-    show_default=True,
-    help="Compute with the joints of the URDF (tree), a Denavit-Hartenberg table, or screws.",
+    help="Description of the robot on which the code is based: the joints of the URDF (tree), a"
+    " Denavit-Hartenberg table (dh), or screws.",
 )
 @click.option(
     "--name",
     metavar="WORD",
-    help="Prefix of the function names. Default: the names of the robot and the frame, joined.",
+    help="Prefix of the function names.",
+    show_default="the names of the robot and of the frame",
 )
-@click.option(
-    "--check", "file", type=click.Path(path_type=Path), help="Run the test vectors of this exported file."
-)
+@click.option("--check", "file", type=FILE, help="Run the test vectors of this exported file.")
 @verify_option
-@click.option(
-    "--output", "-o", type=click.Path(path_type=Path), help="Write to a file instead of standard output."
-)
+@output_option
 @click.pass_context
 def command(
     context: click.Context,
@@ -72,10 +71,10 @@ def command(
     """Write a frame's kinematics as code without loops, for one robot, with test vectors in the file.
 
     The robot's constants are part of the code, and each joint's sine and cosine are computed once. The
-    expressions are compared with Pinocchio before they are written. The file states how closely the
-    expressions agree with Pinocchio. The file also contains test vectors with true values at fifty digits.
-    --check compiles or imports a file and runs its test vectors. You can also run the test vectors without
-    urdfkin. ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input.
+    expressions are compared with Pinocchio before they are written; the file states how closely they agree.
+    The file also contains test vectors with true values at fifty digits. --check compiles or imports a file
+    and runs its test vectors. You can also run the test vectors without urdfkin. ROBOT is a path, a name that
+    `urdfkin robots` lists, or - for standard input.
 
     Exit 0: verified. 1: Pinocchio or a test vector disagrees. 2: bad input, or the file does not run here.
     3: not verified, or changed after it was written.
@@ -92,10 +91,10 @@ def command(
 
     assert robot is not None
     loaded = load_robot(robot, verify=verify)
-    wanted = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
+    names = [word.strip() for words in quantities for word in words.split(",")] or list(QUANTITIES)
     frame = frame or loaded.tip_frame
-    code = code_in(code_of_robot(loaded, frame, wanted, reference, form, name=name, verify=verify), to)
-    hand_out(write(code, to), None if output == Path("-") else output)
+    code = code_in(code_of_robot(loaded, frame, names, reference, form, name=name, verify=verify), to)
+    write_output(write(code, to), output)
     proof = code.proof
     say(check_line(proof.certificate), err=True)
     if proof.constants and proof.certificate.verified:

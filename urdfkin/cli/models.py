@@ -5,30 +5,32 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.options import (
-    NumberFrom,
-    Whole,
+    FILE,
+    NumberInRange,
+    WholeNumber,
     load_several,
+    markdown_option,
     reject_unused_options,
     schema_option,
     source_options,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, compiling, write_file
+from urdfkin.cli.output import TEXTS, Answer, check_writable, report_compilation, writes_answer
 from urdfkin.cli.streams import say
 from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import csv_value, json_text
+from urdfkin.system.files import write_file
 
 if TYPE_CHECKING:
     from urdfkin.comparison.result import SameQuestion
     from urdfkin.robot import Robot
 
-_PATH = click.Path(path_type=Path, dir_okay=False)
-#: These options of `urdfkin same` need exactly two robots.
+#: Options of `urdfkin same` that need exactly two robots
 _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "all_")
 
 
@@ -50,34 +52,40 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 )
 @click.option(
     "--within",
-    type=NumberFrom(0.0),
+    type=NumberInRange(0.0),
     help="Exit 0 only if urdfkin proves that no frame of B is farther than this (m and rad) from the same"
     " frame of A.",
 )
 @click.option(
     "--boxes",
-    type=Whole(0),
-    help="Largest number of boxes of joint space in memory for bounds (default 131072; 0: no bounds).",
+    type=WholeNumber(0),
+    help="Maximum number of boxes in joint space for the computation of bounds; 0: no bounds.",
+    show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
 @click.option(
-    "--certificate", type=_PATH, help="Write the result as a JSON certificate, which --recheck verifies."
+    "--certificate",
+    type=FILE,
+    help="Also write the result to this file as a JSON certificate, which --recheck verifies.",
 )
 @click.option(
     "--write-map",
-    type=_PATH,
-    help="Write the names, order, signs and zero positions of the joints of B as TOML, for --convention.",
+    type=FILE,
+    help="Also write the names, order, signs and zero positions of B's joints to this TOML file, for"
+    " --convention.",
 )
 @click.option(
-    "--recheck", type=_PATH, help="Verify this certificate for A and B instead of comparing them again."
+    "--recheck", type=FILE, help="Verify this certificate for A and B instead of comparing them again."
 )
-@click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
+@markdown_option
 @click.option(
-    "--html", type=_PATH, help="Write an HTML page with a picture of both robots at the worst configuration."
+    "--html",
+    type=FILE,
+    help="Also write an HTML page to this file, with a picture of both robots at the worst configuration.",
 )
 @schema_option("urdfkin.comparison.certificate:SAME", "a certificate")
 @source_options
-@answering(*TEXTS, "json")
+@writes_answer(*TEXTS, "json")
 def same_command(
     a: str | None,
     b: str | None,
@@ -94,18 +102,20 @@ def same_command(
 
     A and B are robots as in other commands, or Denavit-Hartenberg tables. A and B are the same robot if the
     screws of all joints and the zero-configuration poses of all links agree. Fixed links, names and the order
-    of joints may differ. A and B are equivalent if they agree after a change of B. Examples of such changes
-    are another base pose, or another zero position of a joint. If A and B differ, the command prints two
-    bounds on the largest distance of each frame of B from the same frame of A. The distance reaches the lower
-    bound in a configuration that the command prints. It is proven that no configuration within the joint
-    limits exceeds the upper bound. The numbers of a USD file have single precision. Two models are the same
-    up to single precision if every joint differs only by the rounding of its own numbers.
+    of joints may differ. A and B are equivalent if they agree after a change of B, for example of its base
+    pose or of the zero position of a joint.
+
+    If A and B differ, the command prints two bounds on the largest distance of each frame of B from the same
+    frame of A. The distance reaches the lower bound in a configuration that the command prints. No
+    configuration within the joint limits exceeds the upper bound: this is proven. A USD file has numbers in
+    single precision. Two models are the same up to single precision if each joint differs only by the
+    rounding of the numbers in its definition.
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
     --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
-    compared as written. Exit 0: all frames stay within the given distance. 1: a frame does not.
+    compared without a change of B. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
-    from urdfkin.comparison.bounds import MOST
+    from urdfkin.comparison.bounds import MOST_BOXES
     from urdfkin.comparison.certificate import certificate
     from urdfkin.comparison.result import SameQuestion
     from urdfkin.comparison.verdict import parse_map, same
@@ -115,17 +125,16 @@ def same_command(
     if a is None or b is None:
         raise click.UsageError("name two robots to compare: urdfkin same A B")
     check_writable(*paths.values())
+    question, most_boxes = SameQuestion(within, strict), MOST_BOXES if boxes is None else boxes
     if more:
         reject_unused_options(click.get_current_context(), _OF_TWO, "with more than two robots")
-        return _all_pairs((a, b, *more), SameQuestion(within, strict), MOST if boxes is None else boxes)
+        return _all_pairs((a, b, *more), question, most_boxes)
     first, second = load_several(a, b)
     robots = first, second
-    with compiling():
+    with report_compilation():
         if recheck is not None:
             return _recheck(robots, recheck)
-        how_many = MOST if boxes is None else boxes
-        found = same(*robots, map=parse_map(pairs), boxes=how_many, within=within)
-    question = SameQuestion(within, strict)
+        found = same(*robots, map=parse_map(pairs), boxes=most_boxes, within=within)
     words = [word for pair in pairs for word in ("--map", pair)]
     words += ["--boxes", str(boxes)] if boxes is not None else []
     forms: dict[str, Callable[[], str]] = {
@@ -148,20 +157,20 @@ def _all_pairs(sources: tuple[str, ...], question: SameQuestion, boxes: int) -> 
     from urdfkin.report.same import command_of, pairs_document, pairs_markdown
 
     robots = load_several(*sources)
-    with compiling():
-        twos = list(combinations(robots, 2))
-        found = [same(*two, boxes=boxes, within=question.within) for two in twos]
-    data = {
-        "json": lambda: {
-            "holds": all(one.holds(question) for one in found),
-            "pairs": [
-                certificate(one, command_of(two, question, [])) for one, two in zip(found, twos, strict=True)
-            ],
-        },
-        "markdown": lambda: pairs_markdown(found, question),
-    }
-    code = int(not all(one.holds(question) for one in found))
-    return Answer(lambda: pairs_document(found, question), data, code=code)
+    pairs = list(combinations(robots, 2))
+    with report_compilation():
+        found = [same(*pair, boxes=boxes, within=question.within) for pair in pairs]
+    holds = all(result.holds(question) for result in found)
+
+    def as_json() -> dict[str, Any]:
+        certificates = [
+            certificate(result, command_of(pair, question, []))
+            for result, pair in zip(found, pairs, strict=True)
+        ]
+        return {"holds": holds, "pairs": certificates}
+
+    data = {"json": as_json, "markdown": lambda: pairs_markdown(found, question)}
+    return Answer(lambda: pairs_document(found, question), data, code=int(not holds))
 
 
 def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
@@ -171,31 +180,28 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
     errors = recheck(certificate, *robots)
     for line in errors:
         say(line, err=True)
-    first = [f"; first difference: {words_of(one)}" for one in certificate["differences"][:1]]
+    first = [f"; first difference: {words_of(difference)}" for difference in certificate["differences"][:1]]
     holds = f"the certificate holds: {certificate['verdict']}{''.join(first)}"
     words = "the certificate does not hold" if errors else holds
-    return Answer(
-        lambda: TextDocument("", [words]), code=int(bool(errors) or certificate["verdict"] == "differs")
-    )
+    code = int(bool(errors) or certificate["verdict"] == "differs")
+    return Answer(lambda: TextDocument("", [words]), code=code)
 
 
 @click.command("diff", epilog="Example: urdfkin diff arm.urdf my.urdf --markdown comment.md")
 @click.argument("a", metavar="OLD", shell_complete=complete_robot)
 @click.argument("b", metavar="NEW", shell_complete=complete_robot)
 @click.argument("more", metavar="[C]...", nargs=-1, shell_complete=complete_robot)
-@click.option(
-    "--effects/--no-effects", default=True, help="Compute how far each change can move the frames (default)."
-)
-@click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment.")
+@click.option("--effects/--no-effects", default=True, help="Compute how far each change can move the frames.")
+@markdown_option
 @source_options
-@answering()
+@writes_answer()
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
-    For each changed joint, the command prints how far the changes of this joint move the frame that moves
-    most. This distance is the maximum over all configurations within limits, for equal joint coordinates of
-    OLD and NEW. The last line of the output states how far all changes together move the frames. Between
-    URDF, MJCF and USD, the changes are the differences that `same` finds. With C, all pairs are compared.
+    For each changed joint, the command prints how far this joint's changes move the frame that moves most.
+    This distance is the maximum over all configurations within limits, with the same joint coordinates in OLD
+    and NEW. The last line of the output states how far all changes together move the frames. Between URDF,
+    MJCF and USD, the changes are the differences that `urdfkin same` finds. With C, all pairs are compared.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """
@@ -213,8 +219,8 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     check_writable(markdown)
     robots = load_several(a, b, *more)
-    with compiling():
-        found = [diff(*two, effects=effects) for two in combinations(robots, 2)]
+    with report_compilation():
+        found = [diff(*pair, effects=effects) for pair in combinations(robots, 2)]
 
     def as_markdown() -> str:
         return pairs_markdown(found) if more else markdown_of(found[0])
@@ -222,9 +228,9 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
     if markdown is not None:
         write_file(markdown, as_markdown().encode())
     heads = ("A", "B", *HEADS) if more else HEADS
-    rows = [(*one.sources, *row) if more else row for one in found for row in rows_of(one)]
+    rows = [(*result.sources, *row) if more else row for result in found for row in rows_of(result)]
     data = {
-        "json": lambda: {"pairs": [as_data(one) for one in found]} if more else as_data(found[0]),
+        "json": lambda: {"pairs": list(map(as_data, found))} if more else as_data(found[0]),
         "csv": lambda: [heads, *(map(csv_value, row) for row in rows)],
         "markdown": as_markdown,
     }

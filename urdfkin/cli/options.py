@@ -1,8 +1,7 @@
-"""Arguments and options that commands share, and the rules for all options.
+"""Arguments and options that several commands have, and the rules for all options.
 
 - Numbers are decimal digits in ASCII. Click's own types also accept `1_000`, Arabic digits, `nan` and `inf`.
-- The suffix of a file or --format selects the output format. If the suffix and --format contradict each
-  other, urdfkin reports an error.
+- The suffix of a file or --format selects the output format. A suffix that contradicts --format is an error.
 - An option without an effect is an error, for example --seed without a random value.
 """
 
@@ -33,9 +32,12 @@ if TYPE_CHECKING:
     from urdfkin.robot.trajectory import Trajectory
     from urdfkin.verify.oracles import OracleName
 
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
 
-class Whole(click.IntRange):
-    """The type of a whole number in a range."""
+
+class WholeNumber(click.IntRange):
+    """A whole number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, str) and parse_int(value) is None:
@@ -44,51 +46,44 @@ class Whole(click.IntRange):
 
 
 class FiniteNumber(click.types.FloatParamType):
-    """The type of a finite number."""
+    """A finite number."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return super().convert(_finite(self, value, param, ctx), param, ctx)
+        if isinstance(value, str) and parse_float(value) is None:
+            hint = remedy(value)
+            self.fail(f"{value!r} is not a finite number{f': {hint}' if hint else ''}.", param, ctx)
+        return super().convert(value, param, ctx)
 
 
-class NumberFrom(click.FloatRange):
-    """The type of a finite number in a range."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return super().convert(_finite(self, value, param, ctx), param, ctx)
-
-
-def _finite(kind: Any, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-    if isinstance(value, str) and parse_float(value) is None:
-        hint = remedy(value)
-        kind.fail(f"{value!r} is not a finite number{f': {hint}' if hint else ''}.", param, ctx)
-    return value
+class NumberInRange(FiniteNumber, click.FloatRange):
+    """A finite number in a range."""
 
 
 def format_from_suffix(
-    context: click.Context, output: Path | None, endings: Mapping[str, Sequence[str]], plain: str
+    context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], without_suffix: str
 ) -> str:
-    """Return the output format of the running command.
+    """Return the output format of the running command, from --format and the suffix of the output file.
 
-    `endings` are the formats of each suffix, for example `{".py": ("numpy", "sympy")}`; the first format is
-    the default. `plain` is the format if the file's name has no suffix. InputError is raised if --format
-    contradicts the suffix, or if the suffix has no format.
+    `formats` lists the formats of each suffix, for example `{".py": ("numpy", "sympy")}`; the first one is
+    the default. `without_suffix` is the format of a file whose name has no suffix. InputError is raised if
+    --format contradicts the suffix, or if no format has the suffix.
     """
     format_: str = context.params["format_"]
     if output is None:
         return format_
-    chosen = context.get_parameter_source("format_") is click.core.ParameterSource.COMMANDLINE
-    ending = output.suffix.lower()
-    if ending not in endings:
-        if not chosen and ending:
+    chosen = is_given(context, "format_")
+    suffix = output.suffix.lower()
+    if suffix not in formats:
+        if not chosen and suffix:
             raise InputError(
                 "no output format has this suffix",
                 where=shortened(output),
-                remedy=f"use {', '.join(endings)}, or add --format",
+                remedy=f"use {', '.join(formats)}, or add --format",
             )
-        return format_ if chosen else plain
+        return format_ if chosen else without_suffix
     if not chosen:
-        return endings[ending][0]
-    if format_ not in endings[ending]:
+        return formats[suffix][0]
+    if format_ not in formats[suffix]:
         raise InputError(
             f"--format {format_} contradicts the file's suffix",
             where=str(output),
@@ -97,18 +92,18 @@ def format_from_suffix(
     return format_
 
 
-def typed(context: click.Context, name: str) -> bool:
-    """Return whether a parameter of the running command was given on the command line."""
+def is_given(context: click.Context, name: str) -> bool:
+    """Return whether the user wrote a parameter on the command line."""
     return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
-def reject_unused_options(context: click.Context, idle: Collection[str], because: str) -> None:
-    """Raise InputError if one of the parameters `idle`, which have no effect, was given on the command line.
+def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
+    """Raise InputError if the user wrote an option that has no effect.
 
-    With the reason "with --opw", the error message is "--format does nothing with --opw".
+    With the reason "with --opw", the message is "--format does nothing with --opw".
     """
     for parameter in context.command.params:
-        if parameter.name in idle and typed(context, parameter.name):
+        if parameter.name in unused and is_given(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
             raise InputError(f"{name} does nothing {because}", remedy="leave out this option")
 
@@ -116,11 +111,11 @@ def reject_unused_options(context: click.Context, idle: Collection[str], because
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 REFERENCES = tuple(reference.name.lower() for reference in Reference)
-#: `random` draws this number of samples; `random:N` draws N samples.
+#: Number of samples that the value `random` draws; `random:N` draws N samples.
 _RANDOM_SAMPLES = 1
 
 
-def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
+def combine(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
     def decorate(function: _F) -> _F:
         for decorator in reversed(decorators):
             function = decorator(function)
@@ -129,27 +124,27 @@ def together(*decorators: Callable[[_F], _F]) -> Callable[[_F], _F]:
     return decorate
 
 
-_HOW = "urdfkin.how_to_load"
+_LOAD_OPTIONS = "urdfkin.load_options"
 
 
-def _storing(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
-    """Return a callback that stores an option for `how_to_load`, by default only if the option was given."""
+def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
+    """Return a callback that stores an option for `load_options`, always or only if the option is given."""
 
     def store(context: click.Context, _: click.Parameter, value: Any) -> None:
         if always or value not in (None, ()):
-            context.meta.setdefault(_HOW, {})[name] = value if read is None else read(value)
+            context.meta.setdefault(_LOAD_OPTIONS, {})[name] = value if read is None else read(value)
 
     return store
 
 
-def _pairs(mark: str, form: str, *, demand_value: bool) -> Callable[[Sequence[str]], dict[str, str]]:
+def _read_pairs(separator: str, form: str, *, needs_value: bool) -> Callable[[Sequence[str]], dict[str, str]]:
     """Return a function that splits words such as SET=NAME, and rejects words of another form."""
 
     def read(words: Sequence[str]) -> dict[str, str]:
         pairs = {}
         for word in words:
-            name, found, value = word.partition(mark)
-            if not found or not name or (demand_value and not value):
+            name, found, value = word.partition(separator)
+            if not found or not name or (needs_value and not value):
                 raise click.BadParameter(f"{word!r} is not {form}")
             pairs[name] = value
         return pairs
@@ -157,89 +152,94 @@ def _pairs(mark: str, form: str, *, demand_value: bool) -> Callable[[Sequence[st
     return read
 
 
-def how_to_load() -> dict[str, Any]:
+def load_options() -> dict[str, Any]:
     """Return the options of the running command that are arguments of `load`, for example `mimic`."""
-    return dict(click.get_current_context().meta.get(_HOW, {}))
+    return dict(click.get_current_context().meta.get(_LOAD_OPTIONS, {}))
 
 
-xacro_option = click.option(
-    "--xacro-arg",
-    multiple=True,
-    metavar="NAME:=VALUE",
-    expose_value=False,
-    callback=_storing("xacro_args", _pairs(":=", "NAME:=VALUE", demand_value=False), always=True),
-    help="Argument of a .xacro file; repeatable. xacro runs in a restricted process.",
-)
-
-
-usd_options = together(
+source_options = combine(
+    click.option(
+        "--xacro-arg",
+        multiple=True,
+        metavar="NAME:=VALUE",
+        expose_value=False,
+        callback=_store_as("xacro_args", _read_pairs(":=", "NAME:=VALUE", needs_value=False), always=True),
+        help="Argument of a .xacro file; repeatable. The file is expanded in a restricted process.",
+    ),
     click.option(
         "--variant",
         multiple=True,
         metavar="SET=NAME",
         expose_value=False,
-        callback=_storing("variant", _pairs("=", "SET=NAME", demand_value=True)),
-        help="Select a variant of a USD stage; repeatable.",
+        callback=_store_as("variant", _read_pairs("=", "SET=NAME", needs_value=True)),
+        help="Select a variant of a USD file; repeatable.",
     ),
     click.option(
         "--articulation",
         metavar="PATH",
         expose_value=False,
-        callback=_storing("articulation"),
-        help="Path of the articulation to load, if a USD stage has several.",
+        callback=_store_as("articulation"),
+        help="Path of the robot (articulation) to load from a USD file that has several.",
     ),
 )
-#: These options concern the robot's file.
-source_options = together(xacro_option, usd_options)
 
 
-def mimic_option(help_: str) -> Callable[[_F], _F]:
-    store = _storing("mimic", always=True)
-    return click.option("--mimic/--no-mimic", default=None, expose_value=False, callback=store, help=help_)
+def mimic_option(help_: str, default: str) -> Callable[[_F], _F]:
+    return click.option(
+        "--mimic/--no-mimic",
+        default=None,
+        show_default=default,
+        expose_value=False,
+        callback=_store_as("mimic", always=True),
+        help=help_,
+    )
 
 
 def root_joint_option(help_: str) -> Callable[[_F], _F]:
-    joints, store = click.Choice(["floating", "planar"]), _storing("root_joint", always=True)
+    joints, store = click.Choice(["floating", "planar"]), _store_as("root_joint", always=True)
     return click.option("--root-joint", type=joints, expose_value=False, callback=store, help=help_)
 
 
-lock_options = together(
+robot_options = combine(
+    mimic_option(
+        "Couple each mimic joint to the joint that it mimics, as in the URDF.",
+        "mimic, except for a few robots of the catalogue",
+    ),
+    root_joint_option("Add a moving joint between the world and the root link."),
+    source_options,
     click.option(
         "--lock",
         multiple=True,
         metavar="NAME=VALUE",
         expose_value=False,
-        callback=_storing("lock", ", ".join),
+        callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the value of the first --lock may be a pose, such as ready.",
+        " With --joints, the first --lock may be a pose, such as ready.",
     ),
     click.option(
         "--joints",
         metavar="NAMES",
         expose_value=False,
-        callback=_storing("joints", lambda words: [name.strip() for name in words.split(",")]),
-        help="Joints that remain, separated by commas. All others are fixed at 0, or at the value of --lock.",
+        callback=_store_as("joints", lambda words: [name.strip() for name in words.split(",")]),
+        help="Keep only these joints, separated by commas. All others are fixed at 0, or at their --lock"
+        " value.",
     ),
 )
-robot_options = together(
-    mimic_option("Couple mimic joints to the mimicked joints, as in the URDF (default)."),
-    root_joint_option("Add a moving joint between the world and the root link."),
-    source_options,
-    lock_options,
-)
-robot_argument = together(
+robot_argument = combine(
     click.argument("robot", metavar="ROBOT", shell_complete=complete_robot), robot_options
 )
 
 
-def frame_name(option: str, help_: str) -> Callable[[_F], _F]:
-    return click.option(option, metavar="NAME", help=help_, shell_complete=complete_frame)
+def frame_name_option(option: str, help_: str, default: str) -> Callable[[_F], _F]:
+    return click.option(
+        option, metavar="NAME", help=help_, shell_complete=complete_frame, show_default=default
+    )
 
 
-frame_option = frame_name("--frame", "Link or joint to compute. Default: the robot's tip.")
-path_options = together(
-    frame_name("--base", "Link or joint where the path begins. Default: the robot's base frame."),
-    frame_name("--tip", "Link or joint where the path ends. Default: the robot's tip."),
+frame_option = frame_name_option("--frame", "Link or joint whose frame is computed.", "the robot's tip")
+path_options = combine(
+    frame_name_option("--base", "Link or joint where the path begins.", "the robot's base"),
+    frame_name_option("--tip", "Link or joint where the path ends.", "the robot's tip"),
 )
 
 
@@ -257,59 +257,56 @@ reference_option = click.option(
     "--reference",
     type=_ReferenceName(REFERENCES, case_sensitive=False),
     default="local_world_aligned",
-    show_default=True,
     help="Reference frame of the result, as in Pinocchio.",
 )
-verify_option = click.option(
-    "--verify/--no-verify", default=True, help="Check each result with Pinocchio (default)."
+verify_option = click.option("--verify/--no-verify", default=True, help="Check each result with Pinocchio.")
+
+
+def oracle_option(help_: str = "Library that checks each result.") -> Callable[[_F], _F]:
+    return click.option("--oracle", type=click.Choice(tuple(ORACLES)), default="pinocchio", help=help_)
+
+
+seed_option = click.option("--seed", type=WholeNumber(0), default=0, help="Seed of the random values.")
+
+
+def samples_option(default: int, help_: str, least: int = 0, most: int | None = None) -> Callable[[_F], _F]:
+    return click.option("--samples", type=WholeNumber(least, most), default=default, help=help_)
+
+
+def _values_option(name: str, help_: str) -> Callable[[_F], _F]:
+    return click.option(name, metavar="VALUES", default="neutral", help=help_)
+
+
+q_option = _values_option(
+    "--q",
+    "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready', a"
+    " pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'.",
 )
-oracle_option = click.option(
-    "--oracle",
-    type=click.Choice(tuple(ORACLES)),
-    default="pinocchio",
-    help="Library that checks the results: Pinocchio (default) or MuJoCo.",
+v_option = _values_option("--v", "Joint velocities, written like --q; 'neutral' is zero.")
+a_option = _values_option("--a", "Joint accelerations, written like --q; 'neutral' is zero.")
+digits_option = click.option(
+    "--digits", type=WholeNumber(3, 17), default=10, help="Number of significant digits in printed tables."
 )
-seed_option = click.option(
-    "--seed", type=Whole(0), default=0, show_default=True, help="Seed of the value `random`."
-)
-_VALUES = (
-    "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready',"
-    " a pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'."
-)
-q_option = click.option("--q", metavar="VALUES", default="neutral", show_default=True, help=_VALUES)
-v_option = click.option(
-    "--v", metavar="VALUES", default="neutral", help="Joint velocities, written like --q; `neutral` is zero."
-)
-a_option = click.option(
-    "--a",
-    metavar="VALUES",
-    default="neutral",
-    help="Joint accelerations, written like --q; `neutral` is zero.",
+markdown_option = click.option(
+    "--markdown", type=FILE, help="Also write the result to this file as Markdown for a pull request comment."
 )
 
-convention_option = click.option(
-    "--convention",
-    metavar="NAME|FILE",
-    help="Convention of --q, --v, --a, --trajectory and of the result: the name of a tool (`urdfkin order`"
-    " lists them), or a TOML file.",
-)
-#: This --convention is for commands that convert only the joint values that they read.
-convention_of_input_option = click.option(
-    "--convention",
-    metavar="NAME|FILE",
-    help="Convention of the joint values that are read: the name of a tool (`urdfkin order` lists them), or"
-    " a TOML file.",
-)
+
+def _convention_option(values: str) -> Callable[[_F], _F]:
+    help_ = f"Convention of {values}: a tool that `urdfkin order` lists, or a TOML file."
+    return click.option("--convention", metavar="NAME|FILE", help=help_, show_default="urdfkin")
+
+
+convention_option = _convention_option("--q, --v, --a, --trajectory and the result")
+convention_of_input_option = _convention_option("the joint values that are read")
 
 
 def trajectory_option(help_: str) -> Callable[[_F], _F]:
     files = (
-        "CSV with the columns t, NAME, v:NAME and a:NAME for each joint, with units as in 'elbow [deg]';"
-        " or .npz with the arrays t, q, v and a"
+        "A CSV file has the columns t, NAME, v:NAME and a:NAME for each joint, with units such as"
+        " 'elbow [deg]'. An .npz file has the arrays t, q, v and a."
     )
-    return click.option(
-        "--trajectory", type=click.Path(path_type=Path), metavar="FILE", help=f"{help_} File: {files}."
-    )
+    return click.option("--trajectory", type=FILE, help=f"{help_} {files}")
 
 
 def schema_option(layout: str, what: str) -> Callable[[_F], _F]:
@@ -330,31 +327,31 @@ def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
 
 
 def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
-    """Read a trajectory with joint velocities and accelerations, and write remarks about it to stderr."""
+    """Read a trajectory with joint velocities and accelerations, and write its warnings to stderr."""
     from urdfkin.robot.trajectory import read_trajectory
 
     motion = read_trajectory(robot, path, convention=convention)
-    tell_notes(motion)
-    tell_limits(robot, motion.q)
+    warn_of_motion(motion)
+    warn_of_limits(robot, motion.q)
     return motion
 
 
-def tell_notes(motion: Trajectory) -> None:
-    """Write remarks about a trajectory to stderr, for example how v and a were computed."""
+def warn_of_motion(motion: Trajectory) -> None:
+    """Write warnings about a trajectory to stderr, and how v and a were computed."""
     for note in motion.notes:
         say(f"warning: {note}", err=True)
     if motion.rates != "as given":
         say(f"rates {motion.derivation()}", err=True)
 
 
-def tell_limits(robot: Robot, q: FloatArray) -> None:
+def warn_of_limits(robot: Robot, q: FloatArray) -> None:
     """Write a warning to stderr for each joint outside its limits."""
     for line in robot.limit_violations(q):
         say(f"warning: {line}", err=True)
 
 
-def said_of(robot: Robot) -> dict[str, Any]:
-    """Return the robot's locked joints, for the JSON output."""
+def locked_joints(robot: Robot) -> dict[str, Any]:
+    """Return the locked joints as an entry of the JSON output; empty if no joint is locked."""
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -366,13 +363,13 @@ class Inputs:
         q: (n, n_q) configurations, rad or m.
         v: (n, n_v) joint velocities.
         a: (n, n_v) joint accelerations.
-        t: (n,) times of a trajectory in s, or None.
-        base: Motion of the root link, from the file of --trajectory or from the --base options. None: not
-            given.
-        said: Other settings that affect the result, for example `{"relative_to": "base"}`. The title of a
-            table and the JSON output list these settings.
-        conversion: The conversion that --convention requests; None for urdfkin's own convention.
-        along: Whether the samples come from --trajectory. CSV output then has one line for each sample.
+        t: (n,) times of a trajectory in s; None without times.
+        base: Motion of the root link, from --trajectory or from the --base options; None if the root link is
+            fixed.
+        settings: Other settings that affect the result, for example `{"relative_to": "base"}`. The titles of
+            tables and the JSON output list them.
+        conversion: Conversion to the convention of --convention; None for urdfkin's own convention.
+        is_trajectory: Whether the samples come from --trajectory; CSV output then has one row for each.
     """
 
     robot: Robot
@@ -382,9 +379,9 @@ class Inputs:
     a: FloatArray
     t: FloatArray | None = None
     base: BaseMotion | None = None
-    said: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
     conversion: Conversion | None = None
-    along: bool = False
+    is_trajectory: bool = False
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -399,11 +396,10 @@ class Inputs:
         if self.conversion is None:
             return self
         q, v, a = self.conversion.to(self.q, self.v, self.a)
-        return replace(self, q=q, v=v, a=a).saying(convention=self.conversion.convention.name)
+        return replace(self, q=q, v=v, a=a).with_settings(convention=self.conversion.convention.name)
 
-    def saying(self, **more: Any) -> Inputs:
-        """Return a copy with more settings in `said`."""
-        return replace(self, said={**self.said, **more})
+    def with_settings(self, **more: Any) -> Inputs:
+        return replace(self, settings={**self.settings, **more})
 
 
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
@@ -413,7 +409,7 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        robot = load(source, **how_to_load() | how, verify=verify, oracle=oracle)
+        robot = load(source, **load_options() | how, verify=verify, oracle=oracle)
     for warning in caught:
         of_the_file = issubclass(warning.category, UrdfWarning)
         say(f"{'' if of_the_file else 'urdfkin: warning: '}{warning.message}", err=True)
@@ -430,8 +426,8 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
     if sources.count("-") > 1:
         raise click.UsageError("only one of the robots can come from standard input")
 
-    def others(source: str) -> dict[str, Any]:
-        """Return arguments with which `load` ignores the options for file formats of the other robots."""
+    def without_options_of_others(source: str) -> dict[str, Any]:
+        """Return arguments of `load` that remove the options for the file formats of the other robots."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -439,7 +435,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
             none |= {"variant": {}, "articulation": None}
         return none
 
-    return tuple(load_robot(source, **others(source)) for source in sources)
+    return tuple(load_robot(source, **without_options_of_others(source)) for source in sources)
 
 
 def read_inputs(
@@ -453,62 +449,59 @@ def read_inputs(
     option: str = "--q",
     conversion: Conversion | None = None,
 ) -> Inputs:
-    """Read the values of q, v and a from the command line.
+    """Read q, v and a as the user wrote them; a single sample is repeated for each sample of a batch.
 
-    If --q, --v and --a name several samples, their numbers of samples must be equal; a single sample is
-    repeated. If `conversion` is given, it converts the values to urdfkin's convention. Error messages name
-    `option` as the source of q.
-
-    Raises:
-        InputError: A number is invalid, or there are too few or too many numbers. The numbers of samples
-            differ. Or --seed has no effect.
-        SourceError: a file that cannot be read.
+    `conversion` converts the values to urdfkin's convention. Error messages name `option` as the source of q.
     """
     import numpy as np
 
     if not any(text.startswith("random") for text in (q, v, a)):
         reject_unused_options(click.get_current_context(), ("seed",), "without a random --q, --v or --a")
     rng = np.random.default_rng(seed)
-    given = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))
-    rows = [_values(robot, letter, text, where, rng, conversion) for letter, text, where in given]
-    lengths = {len(part) for part in rows if len(part) != 1}
-    if len(lengths) > 1:
-        raise InputError(
-            "batches of --q, --v and --a have different lengths",
-            found=", ".join(str(len(part)) for part in rows),
-        )
-    n = lengths.pop() if lengths else 1
-    q_, v_, a_ = (np.ascontiguousarray(np.broadcast_to(part, (n, part.shape[1]))) for part in rows)
+    texts = (("q", q, option), ("v", v, "--v"), ("a", a, "--a"))
+    rows = [_read_values(robot, letter, text, where, rng, conversion) for letter, text, where in texts]
+    q_, v_, a_ = _repeat_single("batches of --q, --v and --a have different lengths", rows)
     if conversion is not None:
         q_, v_, a_ = conversion.from_(q_, v_, a_)
-    tell_limits(robot, q_)
-    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, said=said_of(robot), conversion=conversion)
+    warn_of_limits(robot, q_)
+    settings = locked_joints(robot)
+    return Inputs(robot, frame or robot.tip_frame, q_, v_, a_, settings=settings, conversion=conversion)
 
 
-def _values(
+def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
+    """Repeat arrays of one sample, so that all arrays have as many rows; else raise InputError."""
+    import numpy as np
+
+    n = max(map(len, batches))
+    if any(len(batch) not in (1, n) for batch in batches):
+        raise InputError(problem, found=", ".join(str(len(batch)) for batch in batches))
+    return [np.ascontiguousarray(np.broadcast_to(batch, (n, *batch.shape[1:]))) for batch in batches]
+
+
+def _read_values(
     robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
 ) -> FloatArray:
     """Return the values of --q, --v or --a as an array with one row for each sample."""
-    from urdfkin.model.configuration import places, sample
+    from urdfkin.model.configuration import coordinate_layout, sample
     from urdfkin.robot.trajectory import column_units
 
-    known = conversion or robot
-    names = known.coordinate_names if letter == "q" else known.rate_names
+    named = conversion or robot
+    names = named.coordinate_names if letter == "q" else named.rate_names
     word, _, count = text.partition(":")
     if word == "random":
-        n = _count(where, count) if count else _RANDOM_SAMPLES
+        n = _read_count(where, count) if count else _RANDOM_SAMPLES
         if letter != "q":
-            found: FloatArray = rng.standard_normal((n, len(names)))
-            return found
+            rates: FloatArray = rng.standard_normal((n, len(names)))
+            return rates
         drawn = sample(robot.tree, n, rng)
         return conversion.to(drawn) if conversion else drawn
     if text.startswith("@"):
         return read_batch(Path(text[1:]), where, (names,), column_units(robot, letter, conversion))[0]
-    layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
+    layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     return layout.read(text, where)[None]
 
 
-def _count(where: str, text: str) -> int:
+def _read_count(where: str, text: str) -> int:
     count = parse_int(text)
     if count is None or count < 1:
         raise InputError("N in random:N must be a whole number, at least 1", where=where, found=repr(text))
@@ -518,31 +511,31 @@ def _count(where: str, text: str) -> int:
 def read_batch(
     path: Path, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
 ) -> tuple[FloatArray, Sequence[str]]:
-    """Read a CSV file with one sample a line, as an array with one row for each sample.
+    """Read a CSV file with one sample in each line, as an array with one row for each sample.
 
+    Each layout is a list of column names; the layout whose length equals the number of columns is returned.
     If the first line names the columns, they may be in any order. The name of a column in `units` may contain
-    a unit, for example "elbow [deg]". The second result is the list of column names from `layouts` whose
-    length is the number of columns in the file.
+    a unit, for example "elbow [deg]".
     """
     import numpy as np
 
     from urdfkin.robot.trajectory import read_columns, width_of
 
-    text = _standard_input() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
+    text = _read_stdin() if str(path) == "-" else read_text(path, MOST_DATA, pipes=True)
     width = width_of(text, str(path)) if len(layouts) > 1 else None
     names = next((names for names in layouts if len(names) == width), layouts[0])
     columns = read_columns(text, str(path), option, names, units=units)
-    found = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
-    if not len(found):
+    rows = np.stack([columns[name] for name in names], axis=-1) if names else np.empty((0, 0))
+    if not len(rows):
         raise InputError(
             "no samples",
             where=str(path),
             remedy="write one line for each sample, with numbers separated by commas",
         )
-    return np.ascontiguousarray(found), names
+    return np.ascontiguousarray(rows), names
 
 
-def _standard_input() -> str:
+def _read_stdin() -> str:
     try:
         return read_standard_input(MOST_DATA).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -556,7 +549,7 @@ _RPY = (*_POSITION, "roll", "pitch", "yaw")
 _QUATERNION = (*_POSITION, "qx", "qy", "qz", "qw")
 _RATES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
-_OPTIONS = {
+_BASE_OPTIONS = {
     "q": click.option(
         "--base-placement",
         metavar="VALUES",
@@ -578,45 +571,31 @@ _OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options for the base's motion, for a quantity of q, v and a; `with_base` reads them."""
-    return together(*(_OPTIONS[letter] for letter in inputs))
+    """Make the options for the motion of the root link that a quantity of the inputs q, v and a needs."""
+    return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
 
 
 def with_base(
     x: Inputs, placement: str | None = None, velocity: str | None = None, acceleration: str | None = None
 ) -> Inputs:
-    """Return the inputs with the motion of the base, if any was given; one motion may apply to all samples.
-
-    Raises:
-        InputError: A number is invalid, or there are too few or too many numbers. A quaternion is not of
-            length 1. Or the numbers of samples differ.
-        SourceError: a file that cannot be read.
-    """
-    import numpy as np
-
+    """Add the motion of the root link, if the user gave one; a single motion applies to all samples."""
     from urdfkin.model.base_motion import BaseMotion
 
     if placement is None and velocity is None and acceleration is None:
         return x
     still = "0,0,0,0,0,0"
-    T = _placements(*_rows(placement or still, "--base-placement", (_RPY, _QUATERNION)))
-    v, _ = _rows(velocity or still, "--base-velocity", (_RATES,))
-    a, _ = _rows(acceleration or still, "--base-acceleration", (_RATES,))
-    parts = [x.q, x.v, x.a, T, v, a]
-    n = max(map(len, parts))
-    if any(len(part) not in (1, n) for part in parts):
-        raise InputError(
-            "the batches of q, v, a and the base motion have different lengths",
-            found=", ".join(str(len(part)) for part in parts),
-        )
-    q, v_, a_, *base = (np.ascontiguousarray(np.broadcast_to(part, (n, *part.shape[1:]))) for part in parts)
-    inputs = replace(x, q=q, v=v_, a=a_, base=BaseMotion(*base))
+    T = _placements(*_read_rows(placement or still, "--base-placement", (_RPY, _QUATERNION)))
+    v, _ = _read_rows(velocity or still, "--base-velocity", (_RATES,))
+    a, _ = _read_rows(acceleration or still, "--base-acceleration", (_RATES,))
+    problem = "the batches of q, v, a and the base motion have different lengths"
+    q, v_, a_, *base = _repeat_single(problem, [x.q, x.v, x.a, T, v, a])
     names = "base_placement", "base_velocity", "base_acceleration"
-    return inputs.saying(**{name: part.tolist() for name, part in zip(names, base, strict=True)})
+    settings = {name: array.tolist() for name, array in zip(names, base, strict=True)}
+    return replace(x, q=q, v=v_, a=a_, base=BaseMotion(*base)).with_settings(**settings)
 
 
-def _rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """Return the numbers, one row for each sample, and the list of names from `layouts` that fits them."""
+def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
+    """Return numbers, with one row for each sample, and the layout that fits them (see `read_batch`)."""
     import numpy as np
 
     from urdfkin.robot.trajectory import numbers
@@ -634,6 +613,6 @@ def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:
     from urdfkin.kinematics.rotation import rotation_from_rpy, rotation_of
 
     T: FloatArray = np.tile(np.eye(4), (len(rows), 1, 1))
-    turn = rotation_of if names is _QUATERNION else rotation_from_rpy
-    T[:, :3, :3], T[:, :3, 3] = turn(rows[:, 3:]), rows[:, :3]
+    rotation = rotation_of if names is _QUATERNION else rotation_from_rpy
+    T[:, :3, :3], T[:, :3, 3] = rotation(rows[:, 3:]), rows[:, :3]
     return T

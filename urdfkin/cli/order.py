@@ -1,4 +1,4 @@
-"""`urdfkin order`: the joints of a robot in the order of each tool, and code that converts one to another."""
+"""`urdfkin order`: print the joint order of each tool, and code that converts one convention to another."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.options import load_robot, robot_argument
-from urdfkin.cli.output import Answer, answering
+from urdfkin.cli.output import Answer, writes_answer
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell
 
@@ -23,15 +23,17 @@ _NO_ORDER = (
 
 @click.command("order", epilog="Example: urdfkin order a1 --from isaaclab --to mujoco")
 @robot_argument
-@click.option("--from", "start", metavar="NAME|FILE", help="Convention to convert from. Default: urdfkin.")
-@click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to. Default: urdfkin.")
-@answering()
+@click.option(
+    "--from", "start", metavar="NAME|FILE", help="Convention to convert from.", show_default="urdfkin"
+)
+@click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to.", show_default="urdfkin")
+@writes_answer()
 def command(robot: str, start: str | None, end: str | None) -> Answer:
     """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
 
-    For each joint and tool, the table contains the joint's index in q. If the index in v differs, the table
-    contains both indices, as in 7/6. Tools with the same indices share a column. With --from or --to, the
-    command prints NumPy code that reorders q and v. NAME is a tool from the table; FILE is a TOML file with
+    For each joint and tool, the table contains the joint's index in q, or both indices if the index in v
+    differs: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With --from or --to, the
+    command prints NumPy code that converts q and v. NAME is a tool from the table; FILE is a TOML file with
     your own order, signs, units and motor zeros (docs/conventions.md).
     """
     loaded = load_robot(robot, verify=False)
@@ -69,8 +71,8 @@ def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
     """Return each joint's index in q; "7/6" if its index in v differs; "-" if it has no coordinate."""
     indices = conversion.q_and_v_indices
 
-    def span(at: list[int]) -> str:
-        return str(at[0]) if len(at) == 1 else f"{at[0]}-{at[-1]}"
+    def span(found: list[int]) -> str:
+        return str(found[0]) if len(found) == 1 else f"{found[0]}-{found[-1]}"
 
     def cell(name: str) -> str:
         if name not in indices:
@@ -82,17 +84,17 @@ def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
 
 
 def _as_json(conversion: Conversion) -> dict[str, Any]:
-    how = conversion.convention
+    convention = conversion.convention
     return {
-        "title": how.title,
+        "title": convention.title,
         "joints": list(conversion.joint_names),
         "q": list(conversion.coordinate_names),
         "v": list(conversion.rate_names),
-        "quaternion": how.quaternion,
-        "six_vectors": how.six,
-        "evidence": how.evidence,
-        "sources": list(how.sources),
-        "note": how.note,
+        "quaternion": convention.quaternion,
+        "six_vectors": convention.six,
+        "evidence": convention.evidence,
+        "sources": list(convention.sources),
+        "note": convention.note,
     }
 
 
@@ -108,11 +110,11 @@ def _code(start: Conversion, end: Conversion) -> Answer:
             if one is not None:
                 yield one.code(f"{letter}_to", f"{letter}_from")
                 continue
-            given = "q_from" if letter == "q" else "q_from, v_from"
-            made = "q_to" if letter == "q" else "q_to, v_to"
-            star = "" if letter == "q" else "*"
+            old, new, star = (
+                ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
+            )
             yield f"# {letter}: the conversion does more than reorder entries; use urdfkin:"
-            yield f"{made} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({given}))"
+            yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"
         if note := end.convention.note:

@@ -1,7 +1,4 @@
-"""Print the result of a command as a table, or write it in another format.
-
-A file is written completely or not at all.
-"""
+"""Print the result of a command as a table, or write it in another format, completely or not at all."""
 
 from __future__ import annotations
 
@@ -18,15 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.options import format_from_suffix, together
+from urdfkin.cli.options import FILE, combine, format_from_suffix
 from urdfkin.cli.streams import say, say_file
 from urdfkin.errors import SourceError
 from urdfkin.errors.display import TextDocument
 from urdfkin.errors.escape import csv_text, json_text
 from urdfkin.errors.numbers import parse_int
 from urdfkin.system.files import write_file
-
-__all__ = ["write_file"]
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,31 +35,31 @@ _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
 }  # fmt: skip
-#: A table has at most this number of characters in a line.
-#: All cells of a column have the same width, so one very long name could fill the memory.
-_WIDEST = 10_000
+#: Maximum number of characters in a line of a table.
+#: Without this limit, one very long name could fill the memory: all cells of a column have the same width.
+_MAX_WIDTH = 10_000
 
 output_option = click.option(
     "--output",
     "-o",
-    type=click.Path(path_type=Path),
+    type=FILE,
     callback=lambda _context, _parameter, path: None if path == Path("-") else path,
-    help="File for the output instead of standard output; its suffix selects the format.",
+    help="Write the output to this file; its suffix selects the format.",
+    show_default="standard output",
 )
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of a command; its methods write it as a table, JSON, CSV or another format.
+    """The result of a command.
 
     Attributes:
         document: Function that returns the result as text and tables, for the formats in `TEXTS`.
-        data: Functions that return the result for other formats, by name of the format. The function returns
-            a mapping for JSON, rows for CSV, an array for npy, and text for any other format. If `data` has a
-            function for a format in `TEXTS`, `document` is not used for it.
-        check: The last line of the output, for example "verified by Pinocchio: ...". The line is empty if the
-            command checks nothing.
-        code: The exit code of the command.
+        data: For each other format, a function that returns the result: a mapping for JSON, rows for CSV, an
+            array for npy, text for any other format. A format in `TEXTS` may also have a function here, which
+            then replaces `document`.
+        check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
+        code: Exit code of the command.
         fitted: Function that returns text and tables that fit the width of a terminal. None: use `document`.
     """
 
@@ -81,30 +76,27 @@ class Answer:
         if self.check:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
-    def write(self, form: str) -> tuple[bytes | str, bool]:
-        """Return the result in a format, and whether the text contains the line `check`."""
+    def convert(self, form: str) -> tuple[bytes | str, bool]:
+        """Return two things: the result in the format `form`, and whether this text contains `check`."""
         if form in self.data:
-            found = self.data[form]()
-            stated = form == "json" and isinstance(found, Mapping)
-            if stated and self.check:
-                found = {**found, "verified": self.code == 0, "check": self.check}
-            return found if isinstance(found, str) else _WRITERS[form](found), stated
+            data = self.data[form]()
+            has_check = form == "json" and isinstance(data, Mapping)
+            if has_check and self.check:
+                data = {**data, "verified": self.code == 0, "check": self.check}
+            return data if isinstance(data, str) else _CONVERTERS[form](data), has_check
         document = self.document()
         if self.check:
             document = replace(document, parts=[*document.parts, self.check])
         return document.written(form), True
 
-    def put(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
-        """Print the result with colours if `form` is the command's default format, `forms[0]`.
-
-        For another format or an output file, write the result without colours.
-        """
+    def write(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
+        """Write the result; print it with colours if `form` is the command's default format, `forms[0]`."""
         if form == forms[0] and output is None and form not in self.data:
             self.show(console())
             return
-        written, stated = self.write(form)
-        hand_out(written, output)
-        if self.check and not stated:
+        text, has_check = self.convert(form)
+        write_output(text, output)
+        if self.check and not has_check:
             say(self.check, err=True)
 
 
@@ -116,32 +108,32 @@ def _npy(array: Any) -> bytes:
     return stream.getvalue()
 
 
-_WRITERS: dict[str, Callable[[Any], bytes | str]] = {
+_CONVERTERS: dict[str, Callable[[Any], bytes | str]] = {
     "json": lambda data: json_text(data) + "\n", "csv": csv_text, "npy": _npy,
 }  # fmt: skip
 
 
-def answering(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
-    """Return a decorator for a function that returns an `Answer`.
+def writes_answer(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
+    """Return a decorator that makes a command from a function that returns an `Answer`.
 
-    The decorated function has the options --format and --output. It writes the answer, and ends the command
-    with the answer's exit code. `names` are the output formats of the command; by default the formats in
-    `TEXTS`, JSON and CSV. `suffixes` are the formats of each suffix; by default those of `_SUFFIXES`.
+    The command has the options --format and --output. It writes the answer, and ends with the answer's exit
+    code. `names` are the formats of --format; by default the formats in `TEXTS`, JSON and CSV. `suffixes`
+    lists the formats of each suffix; by default those of `_SUFFIXES`.
     """
     forms = names or (*TEXTS, "json", "csv")
-    endings = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
-    plain = "csv" if "csv" in forms and "table" in forms else forms[0]
+    formats = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
+    without_suffix = "csv" if "csv" in forms and "table" in forms else forms[0]
 
     def decorate(function: Callable[..., Answer]) -> Any:
         def command(context: click.Context, /, format_: str, output: Path | None, **values: Any) -> None:
-            context.params["format_"] = form = format_from_suffix(context, output, endings, plain)
+            context.params["format_"] = form = format_from_suffix(context, output, formats, without_suffix)
             check_writable(output)
             answer = function(**values)
-            answer.put(form, forms, output)
+            answer.write(form, forms, output)
             context.exit(answer.code)
 
         wrapped = click.pass_context(update_wrapper(command, function))
-        return together(format_option(*forms), output_option)(wrapped)
+        return combine(format_option(*forms), output_option)(wrapped)
 
     return decorate
 
@@ -149,48 +141,39 @@ def answering(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None
 def format_option(
     *names: str, help_: str = "Output format; the suffix of --output also selects it."
 ) -> Callable[[Any], Any]:
-    """Make the option --format; the first format is the default."""
-    return click.option(
-        "--format", "format_", type=click.Choice(names), default=names[0], show_default=True, help=help_
-    )
+    return click.option("--format", "format_", type=click.Choice(names), default=names[0], help=help_)
 
 
 @contextmanager
-def compiling() -> Iterator[None]:
-    """Print a line when a kernel is compiled, and then the time; each kernel is compiled only once."""
-    from urdfkin.compiled.kept import listen_to_compile_events
+def report_compilation() -> Iterator[None]:
+    """While the context is open, print a line when the compilation of a kernel begins and when it ends."""
+    from urdfkin.compiled.kernel_cache import listen_to_compile_events
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
 
-    def tell(name: str, seconds: float | None) -> None:
+    def report(name: str, seconds: float | None) -> None:
         if seconds is None:
             hint = hints.pop() if hints else ""
             say(f"urdfkin: compiling {name} for this machine{hint} ...", err=True)
         else:
             say(f"urdfkin: compiled {name} in {seconds:.1f} s", err=True)
 
-    with listen_to_compile_events(tell):
+    with listen_to_compile_events(report):
         yield
 
 
 def console(*, err: bool = False) -> Console:
-    """Return a console with the width of the terminal.
-
-    If the output goes to a pipe, the variable COLUMNS sets the width. Without COLUMNS, no line is wrapped.
-    """
+    """Return a console with the width of the terminal or, for a pipe, of the environment variable COLUMNS."""
     from urdfkin.cli.terminal import Terminal
 
     stream = sys.stderr if err else sys.stdout
-    return Terminal(stream, width=None if stream.isatty() else _columns())
+    columns = parse_int(os.environ.get("COLUMNS", "")) or 0
+    width = min(columns, _MAX_WIDTH) if columns > 0 else _MAX_WIDTH
+    return Terminal(stream, width=None if stream.isatty() else width)
 
 
-def _columns() -> int:
-    wanted = parse_int(os.environ.get("COLUMNS", "")) or 0
-    return min(wanted, _WIDEST) if wanted > 0 else _WIDEST
-
-
-def hand_out(data: bytes | str, output: Path | None) -> None:
-    """Write data to a file, or unchanged to standard output."""
+def write_output(data: bytes | str, output: Path | None) -> None:
+    """Write data to a file, or to standard output if `output` is None."""
     if output is not None:
         write_file(output, data.encode() if isinstance(data, str) else data)
     elif isinstance(data, str):
@@ -201,15 +184,10 @@ def hand_out(data: bytes | str, output: Path | None) -> None:
 
 
 def check_writable(*paths: Path | None) -> None:
-    """Raise SourceError if a file cannot be written; call this before the computation begins.
-
-    The permission may be missing, or the folder may not exist.
-    """
-    for path in paths:
-        if path is None:
-            continue
+    """Raise SourceError before a long computation if an output file cannot be written."""
+    for path in filter(None, paths):
         try:
-            if path.exists() and not path.is_file():  # A device needs no temporary file.
+            if path.exists() and not path.is_file():  # a device is written without a temporary file
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass
@@ -218,14 +196,19 @@ def check_writable(*paths: Path | None) -> None:
             raise SourceError("cannot be written", where=str(path), found=found) from error
 
 
+def counted(n: int, noun: str) -> str:
+    """Return a number with its noun: "1 file", "2 files"."""
+    return f"{n} {noun}{'s' * (n != 1)}"
+
+
 def check_line(certificate: Certificate) -> str:
-    """Return a line with the checked results and the worst disagreement, or with "NOT VERIFIED"."""
+    """Return the last line of the output: the number of checked results, or "NOT VERIFIED"."""
     by = certificate.oracle
     if certificate.not_verified:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
     parts = [
-        f"{line.checked} {line.quantity} result{'s' if line.checked != 1 else ''}, "
-        f"worst disagreement {line.worst:.2g} eps*scale ({line.share:.1%} of the bound)"
+        f"{counted(line.checked, f'{line.quantity} result')}, worst disagreement {line.worst:.2g} eps*scale"
+        f" ({line.share:.1%} of the bound)"
         for line in certificate.lines
     ]
     return f"verified by {by}: {'; '.join(parts)}"
@@ -236,10 +219,7 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last line and the exit code of `urdfkin chain`, `screws`, `structure` or `dh`.
-
-    `check` is the result of Pinocchio's check, for example a `TableCheck`; None if nothing was checked.
-    """
+    """Return the last line of the output, and the exit code, for a `TableCheck` or a similar result."""
     from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"

@@ -1,10 +1,10 @@
-"""Commands about a path between two frames: `urdfkin chain`, `screws` and `structure`."""
+"""Define the commands about a path between two frames: `urdfkin chain`, `screws` and `structure`."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +12,9 @@ import click
 
 from urdfkin.cli.options import (
     FiniteNumber,
-    Whole,
     convention_of_input_option,
     conversion_of,
+    digits_option,
     load_robot,
     path_options,
     q_option,
@@ -22,10 +22,9 @@ from urdfkin.cli.options import (
     reject_unused_options,
     robot_argument,
     seed_option,
-    together,
     verify_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_of_path
+from urdfkin.cli.output import TEXTS, Answer, check_of_path, writes_answer
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
@@ -35,39 +34,24 @@ if TYPE_CHECKING:
     from urdfkin.model.tree import FloatArray
 
 
-def _path_command(
-    name: str, example: str, *options: Any, answers: Any
-) -> Callable[[Callable[..., Answer]], click.Command]:
-    """Return a decorator that makes a command with the options --base and --tip of a path.
-
-    `answers` is a decorator that `answering` returns; it adds --format and --output.
-    """
-
-    def decorate(function: Callable[..., Answer]) -> click.Command:
-        own = together(robot_argument, path_options, *options, verify_option, answers)
-        return click.command(name, epilog=f"Example: {example}")(own(function))
-
-    return decorate
-
-
-@_path_command(
-    "chain",
-    "urdfkin chain panda --base panda_link0 --tip panda_hand",
-    q_option,
-    convention_of_input_option,
-    seed_option,
-    answers=answering(),
-)
+@click.command("chain", epilog="Example: urdfkin chain panda --base panda_link0 --tip panda_hand")
+@robot_argument
+@path_options
+@q_option
+@convention_of_input_option
+@seed_option
+@verify_option
+@writes_answer()
 def chain_command(
     robot: str, base: str | None, tip: str | None, q: str, convention: str | None, seed: int, verify: bool
 ) -> Answer:
     """List the joints on the path between two frames (section 7.5), with their axes in one configuration.
 
-    For each joint, the table has the joint's axis z, its origin O and the vector d to the origin of the next
-    joint. All vectors are in the axes of the base, and O and d are in metres. The last vector d leads to the
-    tip. If the path passes a joint from its child link to its parent link, the joint is marked "backwards".
-    The axis of such a joint is reversed, so that the joint's coordinate has the same sign as in the URDF. The
-    table has no fixed joints: their offsets are added to d. --q is the configuration of the whole robot.
+    For each joint, the table has the axis z, the origin O, and the vector d to the origin of the next joint.
+    All vectors are in the axes of the base; O and d are in metres. The last vector d leads to the tip. If the
+    path passes a joint from its child link to its parent link, the joint is marked "backwards", and its axis
+    is reversed, so that its coordinate has the same sign as in the URDF. Fixed joints are not listed: their
+    offsets are added to d. --q is the configuration of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -75,17 +59,16 @@ def chain_command(
 
     loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
-    given = read_inputs(loaded, path.tip, seed, q, conversion=conversion_of(loaded, convention))
-    at = given.q
-    if len(at) != 1:
-        raise InputError("the chain needs exactly one configuration", where="--q", found=str(len(at)))
-    own = path.coupling.select(loaded.tree, at)[0]
-    origins = path.origins(own)
-    joints = list(zip(path.joints, path.axes(own), origins, path.interorigin(own), strict=False))
+    inputs = read_inputs(loaded, path.tip, seed, q, conversion=conversion_of(loaded, convention))
+    if len(inputs.q) != 1:
+        raise InputError("the chain needs exactly one configuration", where="--q", found=str(len(inputs.q)))
+    path_q = path.coupling.select(loaded.tree, inputs.q)[0]
+    origins = path.origins(path_q)
+    joints = list(zip(path.joints, path.axes(path_q), origins, path.interorigin(path_q), strict=False))
 
     def document() -> TextDocument:
         names = ", ".join(path.joint_names) or "none: no joint moves"
-        rows = [(joint.name, _kind_of_joint(joint), *map(_vector, three)) for joint, *three in joints]
+        rows = [(joint.name, _kind_of_joint(joint), *map(_vector, vectors)) for joint, *vectors in joints]
         rows.append((path.tip, "tip", "", _vector(origins[-1]), ""))
         heads = ("joint", "kind", "axis z", "origin O [m]", "d to the next origin [m]")
         title = f"{path.robot}: {path.base} to {path.tip}, coordinates {names}"
@@ -98,10 +81,10 @@ def chain_command(
             "source": loaded.source,
             "base": path.base,
             "tip": path.tip,
-            "q": given.converted().q[0].tolist(),
+            "q": inputs.converted().q[0].tolist(),
             **({} if convention is None else {"convention": convention}),
             "coordinates": list(path.joint_names),
-            "path_q": own.tolist(),
+            "path_q": path_q.tolist(),
             "joints": [
                 {
                     "name": joint.name,
@@ -114,16 +97,16 @@ def chain_command(
                 }
                 for joint, z, origin, d in joints
             ],
-            "placement": path.placement(own).tolist(),
+            "placement": path.placement(path_q).tolist(),
         }
 
     def rows() -> Iterator[list[object]]:
         yield ["i", "joint", "kind", "backwards", *(f"{name}{axis}" for name in "zOd" for axis in "xyz")]
-        for i, (joint, *three) in enumerate(joints, 1):
-            numbers = [repr(x) for vector in three for x in vector.tolist()]
+        for i, (joint, *vectors) in enumerate(joints, 1):
+            numbers = [repr(x) for vector in vectors for x in vector.tolist()]
             yield [i, csv_cell(joint.name), joint.kind.value, int(joint.backwards), *numbers]
 
-    check = check_chain(loaded.verifier, path, at) if verify else None
+    check = check_chain(loaded.verifier, path, inputs.q) if verify else None
     return Answer(document, {"json": data, "csv": rows}, *check_of_path(check))
 
 
@@ -143,14 +126,12 @@ _SUFFIXES = {
 }  # fmt: skip
 
 
-@_path_command(
-    "screws",
-    "urdfkin screws ur5 --tip tool0",
-    click.option(
-        "--digits", type=Whole(3, 17), default=10, show_default=True, help="Number of significant digits."
-    ),
-    answers=answering(*SCREW_FORMATS, suffixes=_SUFFIXES),
-)
+@click.command("screws", epilog="Example: urdfkin screws ur5 --tip tool0")
+@robot_argument
+@path_options
+@digits_option
+@verify_option
+@writes_answer(*SCREW_FORMATS, suffixes=_SUFFIXES)
 def screws_command(robot: str, base: str | None, tip: str | None, digits: int, verify: bool) -> Answer:
     """Derive the product of exponentials of a path in the notation of Lynch and Park.
 
@@ -173,26 +154,26 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     return Answer(partial(screws_document, screws, digits), data, *check_of_path(check))
 
 
-@_path_command(
-    "structure",
-    "urdfkin structure ur5 --tip tool0",
-    click.option(
-        "--opw",
-        type=FiniteNumber(),
-        metavar="MM",
-        help="Print the parameters of an OPW solver as YAML. Fail if the tip deviates by more than MM (mm and"
-        " mrad).",
-    ),
-    answers=answering(*TEXTS, "json"),
+@click.command("structure", epilog="Example: urdfkin structure ur5 --tip tool0")
+@robot_argument
+@path_options
+@click.option(
+    "--opw",
+    type=FiniteNumber(),
+    metavar="MM",
+    help="Instead, print the parameters of an OPW solver as YAML. Fail if the tip deviates by more than MM"
+    " millimetres or MM milliradians.",
 )
+@verify_option
+@writes_answer(*TEXTS, "json")
 def structure_command(
     robot: str, base: str | None, tip: str | None, opw: float | None, verify: bool
 ) -> Answer:
     """Find parallel and intersecting axes of an arm, its class (such as SCARA), and solvers for it.
 
-    A property, such as parallel axes, is reported if the deviation is at most 0.02 rad or 5 mm. The deviation
-    is printed, because the axes of a calibrated arm are never exactly parallel. The screws are compared with
-    Pinocchio. JSON is in metres and radians.
+    A property such as parallel axes is reported if the deviation is at most 0.02 rad or 5 mm, because the
+    axes of a calibrated arm are never exactly parallel. The deviation is printed. Pinocchio checks the screws
+    of the arm's joints. JSON is in metres and radians.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -208,7 +189,7 @@ def structure_command(
         check = check_screws(loaded.verifier, screws) if verify else None
         found = structure(screws)
         data = {"json": lambda: plain(found)}
-        return Answer(lambda: _document(found), data, *check_of_path(check))
+        return Answer(lambda: _structure_document(found), data, *check_of_path(check))
     path = loaded.chain(tip, base)
     parameters = opw_of(path, opw / 1e3)
     check = check_opw(loaded.verifier, path, parameters) if verify else None
@@ -216,7 +197,7 @@ def structure_command(
     return Answer(lambda: TextDocument(""), {"table": lambda: yaml}, *check_of_path(check))
 
 
-def _document(found: Structure) -> TextDocument:
+def _structure_document(found: Structure) -> TextDocument:
     spare = len(found.joints) - found.freedoms
     title = (
         f"{found.robot}: {found.base_frame} to {found.tip_frame}, {found.joints or 'no joints'},"
@@ -231,21 +212,20 @@ def _document(found: Structure) -> TextDocument:
             apart = f"{pair.distance * 1e3:.6g}" if pair.distance > 1e-12 else "0"
             rows.append((f"{pair.first}, {pair.second}", angle, apart))
         parts += ["", Table(("axes", "angle [deg]", "apart [mm]"), rows)]
-    parts += ["", *(_kind(kind) for kind in found.kinds)] if found.kinds else []
+    parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
     start = "from the point of the first axis nearest to the second axis"
-    far = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
+    bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
-        f"reach: {found.reached:.4g} m on samples{far}, {start}",
+        f"reach: {found.reached:.4g} m on samples{bound}, {start}",
         *(f"closed form: {solver}" for solver in found.solvers),
         "",
     ]
     return TextDocument(title, parts)
 
 
-def _kind(kind: StructureKind) -> str:
-    near = f"{kind.radians:.3g} rad off" if kind.radians else f"{kind.metres * 1e3:.3g} mm off"
-    off = "exactly" if kind.is_exact else near
-    at = (
-        "" if kind.at is None else f", centre ({', '.join(f'{round(x, 12):.6g}' for x in kind.at)}) m at zero"
-    )
-    return f"{kind.name}: {', '.join(kind.joints)}, {off}{at}"
+def _kind_line(kind: StructureKind) -> str:
+    deviation = f"{kind.radians:.3g} rad off" if kind.radians else f"{kind.metres * 1e3:.3g} mm off"
+    line = f"{kind.name}: {', '.join(kind.joints)}, {'exactly' if kind.is_exact else deviation}"
+    if kind.at is None:
+        return line
+    return f"{line}, centre ({', '.join(f'{round(x, 12):.6g}' for x in kind.at)}) m at zero"

@@ -1,12 +1,12 @@
-"""Commands that compute a quantity of a frame, such as `urdfkin jacobian`, `placement` and `imu`.
+"""Define the commands that compute a quantity of a frame, such as `urdfkin jacobian` and `placement`.
 
-Each quantity of `verify/quantities.py` has a command, and all have the same options and formats.
+Each quantity of `verify/quantities.py` has a command. All these commands have the same options and formats.
 """
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -17,31 +17,31 @@ import click
 
 from urdfkin.cli.options import (
     Inputs,
-    NumberFrom,
+    NumberInRange,
     a_option,
     base_options,
+    combine,
     convention_option,
     conversion_of,
-    frame_name,
+    frame_name_option,
     frame_option,
     load_robot,
+    locked_joints,
     oracle_option,
     q_option,
     read_inputs,
     reference_option,
     reject_unused_options,
     robot_argument,
-    said_of,
     seed_option,
-    tell_limits,
-    tell_notes,
-    together,
     trajectory_option,
     v_option,
     verify_option,
+    warn_of_limits,
+    warn_of_motion,
     with_base,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_line, compiling, exit_code
+from urdfkin.cli.output import TEXTS, Answer, check_line, exit_code, report_compilation, writes_answer
 from urdfkin.errors.display import NOISE, Table, TextDocument, six_digits
 from urdfkin.errors.escape import csv_cell
 from urdfkin.verify.quantities import (
@@ -51,8 +51,8 @@ from urdfkin.verify.quantities import (
     PLACEMENT,
     SIX,
     Quantity,
+    replay_line,
 )
-from urdfkin.verify.replay import replay_line
 
 if TYPE_CHECKING:
     from urdfkin.compiled.breakdown import AccelerationBreakdown
@@ -62,13 +62,13 @@ if TYPE_CHECKING:
     from urdfkin.verify.singular_values import SingularValues
 
 _F = TypeVar("_F", bound=Callable[..., Any])
-_VALUES = {"q": q_option, "v": v_option, "a": a_option}
+_VALUE_OPTIONS = {"q": q_option, "v": v_option, "a": a_option}
 _BASE = ("base_placement", "base_velocity", "base_acceleration")
 _trajectory = trajectory_option(
-    "Read q, v and a from a file instead of --q, --v and --a. CSV output has a row for each time."
+    "Read q, v and a from this file instead of --q, --v and --a. CSV output has one row for each time."
 )
-#: The terminal shows tables of at most this number of samples.
-_SHOWN = 5
+#: Maximum number of samples in printed tables
+_MOST_SAMPLES = 5
 
 
 def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
@@ -76,27 +76,28 @@ def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Cal
 
     `--help` lists the options in `own` after --frame, and the options in `last` before --format.
     """
-    return together(
-        *(robot_argument, frame_option, *own, convention_option, *(_VALUES[letter] for letter in inputs)),
-        *(_trajectory, base_options(inputs), seed_option, verify_option, oracle_option, *last),
-        answering(*TEXTS, "json", "csv", "npy"),
+    values = (_VALUE_OPTIONS[letter] for letter in inputs)
+    return combine(
+        *(robot_argument, frame_option, *own, convention_option, *values, _trajectory),
+        *(base_options(inputs), seed_option, verify_option, oracle_option(), *last),
+        writes_answer(*TEXTS, "json", "csv", "npy"),
     )
 
 
-def _read() -> Inputs:
-    """Load the robot of the command; read q, v and a or --trajectory, and the --base options."""
+def _read_options() -> Inputs:
+    """Load the robot of the running command, and read its options for q, v, a and the base."""
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
     robot = load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
     conversion = conversion_of(robot, options["convention"])
     if options["trajectory"] is not None:
-        inputs = _along(robot, options["frame"], options["trajectory"], "".join(values), conversion)
+        inputs = _read_trajectory(robot, options["frame"], options["trajectory"], "".join(values), conversion)
     else:
         inputs = read_inputs(robot, options["frame"], options["seed"], **values, conversion=conversion)
     return with_base(inputs, *map(options.get, _BASE))
 
 
-def _along(
+def _read_trajectory(
     robot: Robot, frame: str | None, path: Path, letters: str, conversion: Conversion | None
 ) -> Inputs:
     """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
@@ -109,20 +110,22 @@ def _along(
     x = read_samples(robot, path, conversion)
     if x.base is not None:
         reject_unused_options(context, _BASE, "along a --trajectory with a moving base")
-    said = said_of(robot)
+    settings = locked_joints(robot)
     q, t, rates = x.q, x.t, {letter: getattr(x, letter) for letter in letters[1:]}
     if any(value is None for value in rates.values()):
         motion = with_rates(robot.tree, x)
         q, t, rates = motion.q, motion.t, {letter: getattr(motion, letter) for letter in letters[1:]}
-        said["derivatives"] = motion.rates
-        tell_notes(motion)
-    tell_limits(robot, q)
+        settings["derivatives"] = motion.rates
+        warn_of_motion(motion)
+    warn_of_limits(robot, q)
     v, a = (rates.get(letter, np.zeros((len(q), robot.nv))) for letter in "va")
     frame = frame or robot.tip_frame
-    return Inputs(robot, frame, q, v, a, t, x.base, said, conversion, along=True)
+    return Inputs(robot, frame, q, v, a, t, x.base, settings, conversion, is_trajectory=True)
 
 
-def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any) -> Answer:
+def _verified_answer(
+    x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any
+) -> Answer:
     """Return an answer whose last line and exit code state the result of the check with Pinocchio."""
     certificate = x.robot.certificate()
     check = check_line(certificate)
@@ -133,19 +136,22 @@ def _checked(x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], 
     )
 
 
-def _samples(x: Inputs, shown: int, others: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the index and the heading of each of the first `shown` samples."""
+def _samples(
+    x: Inputs, most: int, others: str, of: Callable[[int], Iterable[str | Table]]
+) -> Iterator[str | Table]:
+    """Yield a heading and the tables `of(k)` for each of the first `most` samples, and mention the others."""
     n = len(x.q)
-    for k in range(min(n, shown)):
-        heading = f"sample {k}" if x.t is None else f"t = {x.t[k]:.6g} s"
-        yield k, [heading] if n > 1 else []
-    if n > shown:
-        yield -1, [f"... and {n - shown} more samples: --format {others} writes all"]
+    for k in range(min(n, most)):
+        if n > 1:
+            yield f"sample {k}" if x.t is None else f"t = {x.t[k]:.6g} s"
+        yield from of(k)
+    if n > most:
+        yield f"... and {n - most} more samples: --format {others} writes all"
 
 
 _ROBOT = (
-    "ROBOT is a path, a name from `urdfkin robots`, or - for standard input. The path can also be a table"
-    " of a robot: .toml, .json or .csv."
+    "ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The path may also be that"
+    " of a Denavit-Hartenberg table: .toml, .json or .csv."
 )
 _breakdown = click.option(
     "--breakdown",
@@ -163,11 +169,11 @@ def command_of(quantity: Quantity) -> click.Command:
     def compute(*, reference: str = "local_world_aligned", breakdown: bool = False, **_: Any) -> Answer:
         if breakdown:
             reject_unused_options(click.get_current_context(), ("convention",), "with --breakdown")
-        x = _read()
-        with compiling():
+        x = _read_options()
+        with report_compilation():
             if breakdown:
-                parts = x.robot.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference, base=x.base)
-                return _parts(x, reference, parts)
+                terms = x.robot.acceleration_breakdown(x.q, x.v, x.a, x.frame, reference, base=x.base)
+                return _breakdown_answer(x, reference, terms)
             inputs = [getattr(x, letter) for letter in quantity.inputs]
             result = x.robot.compute(quantity.name, inputs, x.frame, reference, base=x.base)
             if x.conversion is not None:
@@ -184,25 +190,19 @@ def command_of(quantity: Quantity) -> click.Command:
 
 
 def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | None = None) -> Answer:
-    """Return the answer for the results of n samples; `result` is an array of shape (n, ...)."""
     x = x.converted()
     if x.conversion and x.conversion.angular_first and quantity.labels == SIX:
         units = dict(reversed(list(quantity.units.items())))
         quantity = replace(quantity, labels=(*SIX[3:], *SIX[:3]), units=units)
-    how = [f"{name.replace('_', ' ')} {word}" for name, word in x.said.items() if isinstance(word, str)]
-    where = "".join(f", {said}" for said in ([reference] if reference else []) + how)
-    where += ", moving base" if x.base is not None else ""
-
-    def parts() -> Iterator[str | Table]:
-        for k, heading in _samples(x, _SHOWN, "csv, json or npy"):
-            yield from heading
-            if k >= 0:
-                yield _table(x, quantity, result[k])
-
-    return _checked(
+    settings = [
+        f"{name.replace('_', ' ')} {word}" for name, word in x.settings.items() if isinstance(word, str)
+    ]
+    base = ["moving base"] if x.base is not None else []
+    where = "".join(f", {word}" for word in [*([reference] if reference else []), *settings, *base])
+    return _verified_answer(
         x,
         f"{quantity.name} of {x.frame}{where}",
-        parts,
+        lambda: _samples(x, _MOST_SAMPLES, "csv, json or npy", lambda k: [_table(x, quantity, result[k])]),
         json=lambda: _data(x, quantity, reference, result),
         csv=lambda: _rows(x, quantity, result),
         npy=lambda: result,
@@ -222,18 +222,21 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
         "rows": list(quantity.labels) or None,
         "coordinates": list(x.coordinate_names),
         "rates": list(x.rate_names),
-        **({} if x.t is None else {"t": x.t.tolist()}),
-        **{letter: getattr(x, letter).tolist() for letter in quantity.inputs},
-        **x.said,
+        **_input_data(x, quantity.inputs),
+        **x.settings,
         "result": result.tolist(),
     }
 
 
+def _input_data(x: Inputs, letters: str) -> dict[str, Any]:
+    times = {} if x.t is None else {"t": x.t.tolist()}
+    return times | {letter: getattr(x, letter).tolist() for letter in letters}
+
+
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
-    if quantity.columns and not x.along:
+    if quantity.columns and not x.is_trajectory:
         rates = [csv_cell(name) for name in x.rate_names]
-        # The CSV of a Hessian has one line for each entry of the Jacobian.
-        # Each line lists the derivatives of this entry with respect to each joint.
+        # The CSV of a Hessian has one line for each entry of the Jacobian, with the entry's derivatives.
         keys = [[row] for row in quantity.labels]
         for _ in range(2, quantity.axes):
             keys = [[*key, rate] for key in keys for rate in rates]
@@ -250,12 +253,12 @@ def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[ob
         yield from ([t, *map(repr, row)] for t, row in samples)
 
 
-#: The first CSV column is "t" if the samples have times, otherwise "sample".
+#: Heading of the first CSV column for samples without times, and for samples with times
 _TIME = ("sample", "t")
 
 
 def _times(x: Inputs) -> Iterable[object]:
-    """Return the times of the samples, or their indices if they have no times."""
+    """Return the times of the samples; for samples without times, return their indices."""
     return range(len(x.q)) if x.t is None else map(repr, x.t.tolist())
 
 
@@ -263,7 +266,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
     if quantity.columns:
         return _columns(quantity, x.rate_names, value)
     if not quantity.units:
-        relative_to = x.said.get("relative_to", "the world")
+        relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
     if len(value) != 3 * len(quantity.units):  # a position and a quaternion
@@ -274,9 +277,9 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 
 
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
-    """Return a table with one row for each entry of v, that is, the entry's column of the Jacobian.
+    """Return a table with one row for each column of the Jacobian.
 
-    For a Hessian, the table has one row for each pair of entries of v whose derivatives are not all zero.
+    For a Hessian, the table has one row for each pair of joint velocities with a derivative that is not zero.
     """
     import numpy as np
 
@@ -291,27 +294,21 @@ def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Tab
 # -- the parts of an acceleration --------------------------------------------------------------------
 
 
-def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
-    """Return the contribution of each joint to the acceleration of the frame.
-
-    Pinocchio checks the sum of the contributions, which is the acceleration.
-    """
+def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
     from urdfkin.compiled.breakdown import KINDS
+
+    heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
+
+    def table(k: int) -> Iterator[Table]:
+        noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
+        rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
+        # With four digits, a row fits on the terminal.
+        cells = [(*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
+        yield Table(heads, cells, left=2)
 
     def parts() -> Iterator[str | Table]:
         yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
-        heads = ("joint", "kind", *(f"{side} {axis}" for side in ("lin", "ang") for axis in "xyz"))
-        for k, heading in _samples(x, 2, "csv, json or npy"):
-            yield from heading
-            if k < 0:
-                continue
-            noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
-            rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
-            # With four digits, a row fits on the terminal.
-            cells = [
-                (*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows
-            ]
-            yield Table(heads, cells, left=2)
+        yield from _samples(x, 2, "csv, json or npy", table)
 
     def rows() -> Iterator[list[object]]:
         yield [_TIME[x.t is not None], "joint", "kind", *SIX]
@@ -330,13 +327,12 @@ def _parts(x: Inputs, reference: str, found: AccelerationBreakdown) -> Answer:
             "rows": list(SIX),
             "joints": list(found.joints),
             "kinds": list(KINDS),
-            **({} if x.t is None else {"t": x.t.tolist()}),
-            **{letter: getattr(x, letter).tolist() for letter in "qva"},
+            **_input_data(x, "qva"),
             **{name: getattr(found, name).tolist() for name in ("base", "terms", "total")},
         }
 
     title = f"acceleration of {x.frame}, {reference}, by joint"
-    return _checked(x, title, parts, json=data, csv=rows, npy=lambda: found.terms)
+    return _verified_answer(x, title, parts, json=data, csv=rows, npy=lambda: found.terms)
 
 
 # -- commands with options of their own --------------------------------------------------------------
@@ -361,14 +357,13 @@ _FORMS = {
 @click.command("placement", epilog=f"Example: {PLACEMENT.example}")
 @computing_options(
     PLACEMENT.inputs,
-    frame_name("--relative-to", "Link or joint relative to which the pose is given. Default: the world."),
+    frame_name_option("--relative-to", "Link or joint in whose frame the pose is expressed.", "the world"),
     click.option(
         "--as",
         "written",
         type=click.Choice(["matrix", *_FORMS]),
         default="matrix",
-        show_default=True,
-        help="How to print the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
+        help="Form of the pose. rpy: x, y, z, roll, pitch, yaw as in a URDF's <origin>."
         " quaternion: x, y, z, qx, qy, qz, qw. wxyz: x, y, z, qw, qx, qy, qz.",
     ),
 )
@@ -379,56 +374,52 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
     angles, or a position and a quaternion. Pinocchio checks that the angles or the quaternion give the same
     rotation as T.
 
-    ROBOT is a path, a name from `urdfkin robots`, or - for standard input. ROBOT can also be the file of a
-    Denavit-Hartenberg table (.toml, .json or .csv).
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The path may also be that of
+    a Denavit-Hartenberg table: .toml, .json or .csv.
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
-    x = _read()
-    with compiling():
+    x = _read_options()
+    with report_compilation():
         if relative_to is None:
             T = x.robot.placement(x.q, x.frame, base=x.base)
         else:
             T = x.robot.relative_placement(x.q, x.frame, relative_to)
-            x = x.saying(relative_to=relative_to)
+            x = x.with_settings(relative_to=relative_to)
     if written == "matrix":
         return _answer(x, PLACEMENT, T)
-    x = x.saying(written_as=written)
-    return _answer(x, _FORMS[written], _numbers(x, T, written, verify=verify))
+    x = x.with_settings(written_as=written)
+    return _answer(x, _FORMS[written], _short_poses(x, T, written, verify=verify))
 
 
-def _numbers(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
-    """Return the position and orientation of each pose as (n, 6) or (n, 7) numbers.
-
-    If Pinocchio has checked the poses, Pinocchio also checks these positions and orientations.
-    """
+def _short_poses(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
+    """Return each pose as six or seven numbers; if Pinocchio has checked T, it also checks the rotation."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of
 
-    of: Mapping[str, Callable[[Any], FloatArray]]
-    of = {"rpy": rpy_of, "quaternion": quaternion_of, "wxyz": quaternion_of}
-    orientation = of[written](R := T[:, :3, :3])
+    R = T[:, :3, :3]
+    orientation = np.asarray(rpy_of(R) if written == "rpy" else quaternion_of(R))
     if verify and x.robot.certificate().verified:
         from urdfkin.verify.orientation import check_orientations
 
-        check_orientations(orientation, R, x.frame, lambda k: _again(x, k, written))
+        check_orientations(orientation, R, x.frame, lambda k: _replay_command(x, k, written))
     if written == "wxyz":
         orientation = np.roll(orientation, 1, axis=-1)
     return np.hstack((T[:, :3, 3], orientation))
 
 
-def _again(x: Inputs, k: int, written: str) -> str:
+def _replay_command(x: Inputs, k: int, written: str) -> str:
     """Return a command line that computes only the pose of sample `k`, for an error message."""
     line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
-    given = click.get_current_context().params
+    options = click.get_current_context().params
     for name in ("relative_to", "base_placement"):
-        if given[name] is not None:
-            line += f" --{name.replace('_', '-')} {shlex.quote(given[name])}"
+        if options[name] is not None:
+            line += f" --{name.replace('_', '-')} {shlex.quote(options[name])}"
     return f"{line} --as {written}"
 
 
-#: This is a copy of `urdfkin.kinematics.rotation.SEQUENCES`, whose import would slow --help down.
+#: Copy of `urdfkin.kinematics.rotation.SEQUENCES`; the import of that module would slow --help down
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
@@ -443,44 +434,45 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
         type=click.Choice(REPRESENTATIONS),
         metavar="NAME",
         default="ZYZ",
-        show_default=True,
-        help="rpy (roll, pitch, yaw as in a URDF), quaternion, or the axes of three Euler angles: capital"
-        " letters for moving axes (ZYZ), small letters for fixed axes (xyz, which is rpy).",
+        help="Representation of the orientation: rpy (roll, pitch, yaw as in a URDF), quaternion, or the axes"
+        " of three Euler angles. Capital letters are moving axes (ZYZ), small letters are fixed axes (xyz,"
+        " which is rpy).",
     ),
     click.option(
         "--nearest",
-        type=NumberFrom(min=0.0),
+        type=NumberInRange(min=0.0),
         metavar="RAD",
         help="Smallest allowed distance (rad) from a representational singularity of the Euler angles.",
+        show_default="1e-9",
     ),
 )
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    Each row of the table belongs to one entry of v, for example the velocity of one joint. The row lists the
-    rates of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity. `urdfkin
-    jacobian` prints angular velocities instead.
+    Each row of the table belongs to one joint velocity, or to another entry of v. The row lists the time
+    derivatives of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity.
+    `urdfkin jacobian` prints angular velocities instead.
     """
     from urdfkin.kinematics.rotation import NEAREST
 
-    x, nearest = _read(), NEAREST if nearest is None else nearest
-    with compiling():
+    x, nearest = _read_options(), NEAREST if nearest is None else nearest
+    with report_compilation():
         J = x.robot.analytical_jacobian(x.q, x.frame, representation, nearest=nearest, base=x.base)
     if x.conversion is not None:
         J = x.conversion.columns(x.q, J)
     row = replace(ANALYTICAL_JACOBIAN, labels=("x", "y", "z", *labels(representation)))
-    return _answer(x.saying(representation=representation), row, J)
+    return _answer(x.with_settings(representation=representation), row, J)
 
 
 def labels(representation: str) -> tuple[str, ...]:
-    """Return the names of an orientation's numbers.
+    """Return the names of the numbers that represent an orientation.
 
     >>> labels("xyz"), labels("ZYZ")
     (('roll', 'pitch', 'yaw'), ('Z1', 'Y2', 'Z3'))
     """
     angles = ("roll", "pitch", "yaw")
-    known = {"rpy": angles, "xyz": angles, "quaternion": ("qx", "qy", "qz", "qw")}
-    return known.get(representation) or tuple(f"{axis}{k}" for k, axis in enumerate(representation, 1))
+    named = {"rpy": angles, "xyz": angles, "quaternion": ("qx", "qy", "qz", "qw")}
+    return named.get(representation) or tuple(f"{axis}{k}" for k, axis in enumerate(representation, 1))
 
 
 @click.command(
@@ -492,7 +484,6 @@ def labels(representation: str) -> tuple[str, ...]:
         "--gravity",
         metavar="X,Y,Z",
         default="0,0,-9.81",
-        show_default=True,
         help="Acceleration of gravity in the world's axes, m/s^2.",
     ),
 )
@@ -503,15 +494,15 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     minus gravity. A sensor at rest reads 9.81 upwards. The gyroscope reads the angular velocity in rad/s.
 
     The input is a configuration --q with joint velocities --v and joint accelerations --a, a batch of them,
-    or a --trajectory. For a moving base, use --base-velocity and the other --base options, or arrays in the
-    .npz file. With --root-joint floating, the pose of the base is part of --q. For details, run `urdfkin
-    explain gravity-in-an-acceleration`.
+    or a --trajectory. The motion of the root link is given by --base-velocity and the other --base options,
+    or by arrays in the .npz file. With --root-joint floating, the pose of the root link is part of --q. See
+    `urdfkin explain gravity-in-an-acceleration`.
     """
     from urdfkin.robot.trajectory import numbers
 
-    x = _read()
+    x = _read_options()
     g = numbers(gravity.split(","), "--gravity", ("x", "y", "z"))
-    with compiling():
+    with report_compilation():
         return _answer(x, IMU, x.robot.imu(x.q, x.v, x.a, x.frame, gravity=g, base=x.base))
 
 
@@ -525,34 +516,32 @@ def imu_command(gravity: str, **_: Any) -> Answer:
     "--rows",
     type=click.Choice(["all", "linear", "angular"]),
     default="all",
-    show_default=True,
-    help="Use all rows of the Jacobian, or only the linear or angular ones; `all` mixes metres and radians.",
+    help="Rows of the Jacobian to use; `all` mixes metres and radians.",
 )
 @convention_option
 @q_option
 @_trajectory
 @seed_option
 @verify_option
-@answering()
+@writes_answer()
 def singular_values_command(rows: str, **_: Any) -> Answer:
     """Compute the singular values, condition number and manipulability of a frame's Jacobian.
 
     Each value has a guaranteed lower and upper bound. The bounds include the error of the Jacobian and the
-    rounding of the decomposition. Manipulability is Yoshikawa's sqrt(det J J^T), the product of the singular
-    values. The command also computes the derivative of the manipulability with respect to each joint, from
-    the Hessian.
+    rounding errors of the decomposition. The manipulability is Yoshikawa's sqrt(det J J^T), the product of
+    the singular values. The command also computes the derivative of the manipulability with respect to each
+    joint, from the Hessian.
 
-    At a singularity, the command prints the rank, the lost directions and the joints that cause them. At such
-    a configuration, the manipulability may have no derivative. A missing derivative is nan in CSV and null in
-    JSON. See `urdfkin explain singularity`.
+    At a singularity, the command prints the rank, the lost directions and the joints that cause them. The
+    manipulability may have no derivative there: nan in CSV, null in JSON. See `urdfkin explain singularity`.
 
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.
     """
     from urdfkin.system.documents import plain
 
-    x = _read()
-    with compiling():
+    x = _read_options()
+    with report_compilation():
         found = x.robot.singular_values(x.q, x.frame, rows, base=x.base)
         gradient = found.manipulability_gradient(x.robot.hessian(x.q, x.frame, base=x.base))
     if x.conversion is not None:
@@ -560,20 +549,16 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     x = x.converted()
     names = [f"sigma_{k + 1}" for k in range(found.values.value.shape[-1])]
 
-    def parts() -> Iterator[str | Table]:
-        for k, heading in _samples(x, _SHOWN, "csv or json"):
-            yield from heading
-            if k >= 0:
-                lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _between(names, found, k)]
-                yield Table(("", "value", "no less than", "no more than"), lines)
-                if singularity := found.singularity(k):
-                    yield from str(singularity).splitlines()
-                    continue  # The manipulability has no derivative.
-                slopes = zip(x.rate_names, gradient[k].tolist(), strict=True)
-                yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
+    def parts(k: int) -> Iterator[str | Table]:
+        lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _bounded(names, found, k)]
+        yield Table(("", "value", "no less than", "no more than"), lines)
+        if singularity := found.singularity(k):
+            yield from str(singularity).splitlines()  # the manipulability has no derivative
+        else:
+            slopes = zip(x.rate_names, gradient[k].tolist(), strict=True)
+            yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
 
     def data() -> dict[str, Any]:
-        named = ("singular_values", found.values), ("condition", found.condition)
         return {
             "robot": x.robot.name,
             "source": x.robot.source,
@@ -581,13 +566,11 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             "rows": rows,
             "coordinates": list(x.coordinate_names),
             "rates": list(x.rate_names),
-            **({} if x.t is None else {"t": x.t.tolist()}),
-            "q": x.q.tolist(),
-            **x.said,
-            **{
-                name: plain(between._asdict())
-                for name, between in (*named, ("manipulability", found.manipulability))
-            },
+            **_input_data(x, "q"),
+            **x.settings,
+            "singular_values": plain(found.values._asdict()),
+            "condition": plain(found.condition._asdict()),
+            "manipulability": plain(found.manipulability._asdict()),
             "manipulability_gradient": plain(gradient),
             "singularities": [
                 {"rank": one.rank, "full": one.full, "lost": one.lost.tolist(), "reasons": one.reasons}
@@ -602,16 +585,19 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
         heads = [name + side for name in (*names, "condition", "manipulability") for side in sides]
         yield [_TIME[x.t is not None], *heads, *(csv_cell(f"by {rate}") for rate in x.rate_names)]
         for k, (t, slopes) in enumerate(zip(_times(x), gradient.tolist(), strict=True)):
-            numbers = [n for _, sides in _between(names, found, k) for n in sides]
+            numbers = [n for _, sides in _bounded(names, found, k) for n in sides]
             yield [t, *map(repr, numbers), *map(repr, slopes)]
 
-    title = "".join(f", {name} {word}" for name, word in x.said.items() if isinstance(word, str))
-    return _checked(x, f"singular values of {x.frame}, {rows} rows{title}", parts, json=data, csv=lines)
+    settings = "".join(f", {name} {word}" for name, word in x.settings.items() if isinstance(word, str))
+    title = f"singular values of {x.frame}, {rows} rows{settings}"
+    return _verified_answer(
+        x, title, lambda: _samples(x, _MOST_SAMPLES, "csv or json", parts), json=data, csv=lines
+    )
 
 
-def _between(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
+def _bounded(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
     """Yield name, value and bounds of the singular values, condition and manipulability of sample `k`."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
-    for name, between in (("condition", found.condition), ("manipulability", found.manipulability)):
-        yield name, [float(side[k]) for side in between]
+    yield "condition", [float(side[k]) for side in found.condition]
+    yield "manipulability", [float(side[k]) for side in found.manipulability]

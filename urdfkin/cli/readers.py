@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.options import Whole, load_robot, robot_argument
-from urdfkin.cli.output import Answer, answering
+from urdfkin.cli.options import load_robot, robot_argument, samples_option, seed_option
+from urdfkin.cli.output import Answer, writes_answer
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_value
 
@@ -18,23 +18,23 @@ if TYPE_CHECKING:
 
 @click.command("readers", epilog="Example: urdfkin readers ur5 --with mujoco,yourdfpy")
 @robot_argument
-@click.option("--with", "libraries", metavar="NAME,...", help="Libraries. Default: all that are installed.")
 @click.option(
-    "--samples",
-    type=Whole(0),
-    default=5,
-    show_default=True,
-    help="Number of random configurations, in addition to q = 0.",
+    "--with",
+    "libraries",
+    metavar="NAMES",
+    help="Libraries to compare, separated by commas.",
+    show_default="all installed libraries",
 )
-@click.option("--seed", type=Whole(0), default=0, show_default=True, help="Seed of the configurations.")
-@answering()
+@samples_option(5, "Number of random configurations, in addition to q = 0.")
+@seed_option
+@writes_answer()
 def command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
     """Compare how other libraries read ROBOT: joints, their order, and the poses of all links.
 
     The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
-    Toolbox and scikit-robot. Each installed library reads the file in a process of its own. Pinocchio and
-    MuJoCo read MJCF files, and Newton reads USD files. The poses of all links are compared with urdfkin's. If
-    a library reads a joint differently, the command names the element of the file that causes the difference,
+    Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each
+    library reads the file in its own process. The poses of all links are compared with urdfkin's. If a
+    library reads a joint differently, the command names the element of the file that causes the difference,
     for example the joint's `axis`.
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
@@ -47,35 +47,35 @@ def command(robot: str, libraries: str | None, samples: int, seed: int) -> Answe
 
     def lines() -> Iterator[list[object]]:
         yield ["library", "version", "joint", "element", "difference", "size"]
-        for one in found:
-            if one.refused is not None:
-                yield [one.library, one.version, "", "", csv_value(one.refused), ""]
-            for each in one.differences:
-                words = map(csv_value, (each.joint, each.element, each.words))
-                yield [one.library, one.version, *words, repr(each.size)]
+        for reading in found:
+            if reading.refused is not None:
+                yield [reading.library, reading.version, "", "", csv_value(reading.refused), ""]
+            for difference in reading.differences:
+                words = map(csv_value, (difference.joint, difference.element, difference.words))
+                yield [reading.library, reading.version, *words, repr(difference.size)]
 
-    data = {"robot": loaded.name, "readers": [one.as_dict() for one in found]}
-    code = int(not all(one.agrees for one in found))
+    data = {"robot": loaded.name, "readers": [reading.as_dict() for reading in found]}
+    code = int(not all(reading.agrees for reading in found))
     return Answer(lambda: _document(loaded.name, found), {"json": lambda: data, "csv": lines}, code=code)
 
 
 def _document(name: str, found: tuple[LibraryReading, ...]) -> TextDocument:
-    rows = [(f"{one.library} {one.version}", *_cells(one)) for one in found]
-    table = Table(("library", "poses", "joints"), rows, left=3)
+    rows = [(f"{reading.library} {reading.version}", *_cells(reading)) for reading in found]
+    parts: list[Table | str] = [Table(("library", "poses", "joints"), rows, left=3)]
     differences = [
-        (each.joint, each.element, each.words, f"{each.size:.2g}")
-        for one in found
-        for each in one.differences
+        (one.joint, one.element, one.words, f"{one.size:.2g}")
+        for reading in found
+        for one in reading.differences
     ]
-    heads = ("joint", "element", "difference", "size")
-    more = [Table(heads, differences, left=3, names=(0,))] if differences else []
-    refused = [f"{one.library} refuses the file: {one.refused}" for one in found if one.refused is not None]
-    missing = [f"{one.library} merges links: {', '.join(one.missing)}" for one in found if one.missing]
-    return TextDocument(f"{name}: how other libraries read the file", [table, *more, *refused, *missing])
+    if differences:
+        parts.append(Table(("joint", "element", "difference", "size"), differences, left=3, names=(0,)))
+    parts += [f"{x.library} refuses the file: {x.refused}" for x in found if x.refused is not None]
+    parts += [f"{x.library} merges links: {', '.join(x.missing)}" for x in found if x.missing]
+    return TextDocument(f"{name}: how other libraries read the file", parts)
 
 
-def _cells(one: LibraryReading) -> tuple[str, str]:
-    if one.refused is not None:
+def _cells(reading: LibraryReading) -> tuple[str, str]:
+    if reading.refused is not None:
         return "refused", "-"
-    poses = "the same" if one.agrees else f"off by {one.worst:.2g}"
-    return poses, f"{len(one.joints)}, {'in the same order' if one.same_order else 'in another order'}"
+    poses = "the same" if reading.agrees else f"off by {reading.worst:.2g}"
+    return poses, f"{len(reading.joints)}, in {'the same' if reading.same_order else 'another'} order"

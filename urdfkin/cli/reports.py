@@ -1,4 +1,4 @@
-"""`urdfkin report`: show, convert and compare reports of validations."""
+"""`urdfkin report`: show, convert and compare the reports of validations."""
 
 from __future__ import annotations
 
@@ -11,27 +11,30 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.campaign import merge, status
-from urdfkin.cli.exit import crash, refuse
-from urdfkin.cli.options import NumberFrom, schema_option, together
-from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, console, write_file
+from urdfkin.cli.exit import report_crash, report_error
+from urdfkin.cli.options import FILE, NumberInRange, combine, markdown_option, schema_option
+from urdfkin.cli.output import TEXTS, Answer, check_writable, console, writes_answer
 from urdfkin.cli.streams import say
 from urdfkin.errors import SourceError, UrdfkinError
-from urdfkin.system.files import is_folder
+from urdfkin.system.files import is_folder, write_file
 
 if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-_PATH = click.Path(path_type=Path, dir_okay=False)
-
-#: These options name an output file of a report.
+#: Options that name an output file of a report
 FILES = ("json_", "html", "junit", "markdown")
-report_options = together(
-    click.option("--html", type=_PATH, help="Write the report as an HTML page that works offline."),
+report_options = combine(
+    click.option("--json", "json_", type=FILE, help="Also write the report to this file as JSON."),
     click.option(
-        "--junit", type=_PATH, help="Write JUnit XML, with a test case for each robot and quantity."
+        "--html", type=FILE, help="Also write the report to this file as an HTML page that works offline."
     ),
-    click.option("--markdown", type=_PATH, help="Write the result as Markdown for a pull request comment."),
+    click.option(
+        "--junit",
+        type=FILE,
+        help="Also write JUnit XML to this file, with a test case for each robot and quantity.",
+    ),
+    markdown_option,
     click.option(
         "--cases/--no-cases", default=False, help="Show the command that reproduces each worst case."
     ),
@@ -41,35 +44,35 @@ report_options = together(
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
     """Write a report in the requested formats; if one file cannot be written, write the others.
 
-    The result is 0, or the exit code of the first format that could not be written. Its error has been
-    printed.
+    Return 0, or the exit code of the first file that could not be written. Errors are printed.
     """
     codes = [_write(document, name, path) for name in FILES if (path := files[name]) is not None]
     return next(filter(None, codes), 0)
 
 
 def say_written(files: Mapping[str, Path | None]) -> None:
-    if named := [str(files[name]) for name in FILES if files[name]]:
-        say(f"wrote {', '.join(named)}")
+    if written := [str(files[name]) for name in FILES if files[name]]:
+        say(f"wrote {', '.join(written)}")
 
 
 def _write(document: Document, form: str, path: Path) -> int:
     try:
-        for place, data in _files(document, form, path):
-            if place.parent != path.parent:
-                place.parent.mkdir(exist_ok=True)
-            write_file(place, data)
+        for file, data in _files(document, form, path):
+            if file.parent != path.parent:
+                file.parent.mkdir(exist_ok=True)
+            write_file(file, data)
     except UrdfkinError as error:
-        return refuse(error)
+        return report_error(error)
     except OSError as error:
-        return refuse(SourceError("cannot be written", where=str(path), found=error.strerror or str(error)))
+        found = error.strerror or str(error)
+        return report_error(SourceError("cannot be written", where=str(path), found=found))
     except Exception as error:
-        return crash(error)
+        return report_crash(error)
     return 0
 
 
 def _files(document: Document, form: str, path: Path) -> Iterator[tuple[Path, bytes]]:
-    """Yield the path and the content of each file of a report; HTML can have a page and other files."""
+    """Yield the path and the content of each file of a report; an HTML page may have further files."""
     if form == "json_":
         yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
     elif form == "junit":
@@ -83,14 +86,14 @@ def _files(document: Document, form: str, path: Path) -> Iterator[tuple[Path, by
     else:
         from urdfkin.report.html import as_files
 
-        yield from ((path.parent / place, text.encode()) for place, text in as_files(document, path.name))
+        yield from ((path.parent / name, text.encode()) for name, text in as_files(document, path.name))
 
 
 EXAMPLE = "urdfkin report results.json --html report.html --junit report.xml"
 
 
-class _Results(click.Group):
-    """The subcommands of `report`. Without a subcommand, `report FILE` means `report show FILE`."""
+class _ReportGroup(click.Group):
+    """The subcommands of `report`; `report RESULTS` means `report show RESULTS`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if not ctx.resilient_parsing and (not args or args[0] not in (*self.commands, "-h", "--help")):
@@ -98,7 +101,7 @@ class _Results(click.Group):
         return super().parse_args(ctx, args)
 
 
-@click.group("report", cls=_Results, epilog=f"Example: {EXAMPLE}")
+@click.group("report", cls=_ReportGroup, epilog=f"Example: {EXAMPLE}")
 def report_command() -> None:
     """Show, convert or compare the results of earlier validations.
 
@@ -109,15 +112,14 @@ def report_command() -> None:
 
 @report_command.command("show", epilog=f"Example: {EXAMPLE}")
 @click.argument("results", metavar="RESULTS.json|DIR", type=click.Path(path_type=Path), required=False)
-@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
 @schema_option("urdfkin.validation.document:VALIDATION", "a report")
 @click.pass_context
 def show(context: click.Context, /, results: Path | None, cases: bool, **files: Path | None) -> None:
-    """Show a report or convert it to HTML, JUnit or Markdown.
+    """Show a report, or convert it to HTML, JUnit or Markdown.
 
-    RESULTS can be the folder of --store, even while the validation runs. If robots are still missing in this
-    folder, the command shows the run as interrupted.
+    The argument is the JSON file of `urdfkin validate --json FILE`, or the folder DIR of `--store DIR`. The
+    validation may still be running; a validation with missing robots is shown as interrupted.
 
     The exit code is that of the validation. 0: everything verified. 1: a disagreement. 2: a robot could
     not be read, or the file cannot be used. 3: a robot was not verified. 130: interrupted.
@@ -148,28 +150,30 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
 @click.argument("new", metavar="NEW.json", type=click.Path(path_type=Path))
 @click.option(
     "--factor",
-    type=NumberFrom(1.0),
+    type=NumberInRange(1.0),
     default=2.0,
-    show_default=True,
-    help="A worst disagreement that grows by more than this factor counts as a regression.",
+    help="Count a worst disagreement that grows by more than this factor as a regression.",
 )
-@click.option(
-    "--markdown",
-    type=click.Path(path_type=Path),
-    help="Write the result as Markdown for a pull request comment.",
-)
-@answering(*TEXTS, "json")
+@markdown_option
+@writes_answer(*TEXTS, "json")
 def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) -> Answer:
     """Compare two reports: versions, robots, verdicts and disagreements.
 
-    Each of these changes is a regression. The run passed before and fails now. A robot is missing, or its
-    verdict is worse. More results lie outside their bound. A quantity is no longer compared, or it is
-    compared on fewer samples. A bound is wider. A worst disagreement grew by more than the factor and is
-    above 2 eps*scale. A changed model is listed joint by joint. A changed model alone is not a regression;
-    `same` and `diff` compute how far its frames move. If a report contradicts itself, for example in its
-    numbers of samples, the command exits with 2. Exit 0: no regression. 1: a regression. 2: a file that
-    cannot be used.
-    """
+    \b
+    Each of these changes is a regression:
+    - The run passed before and fails now.
+    - A robot is missing, or its verdict is worse.
+    - More results are outside their bound.
+    - A quantity is no longer compared, or is compared on fewer samples.
+    - A bound is wider.
+    - A worst disagreement grew by more than --factor, and is above 2 eps*scale.
+
+    A changed model is listed joint by joint. A changed model alone is not a regression; `urdfkin same` and
+    `urdfkin diff` compute how far its frames move.
+
+    Exit 0: no regression. 1: a regression. 2: a file cannot be used, for example because its numbers of
+    samples contradict each other.
+    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
     from urdfkin.report.compare import compare, document, markdown_of
     from urdfkin.report.reading import read_document
 
@@ -194,14 +198,15 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 @click.argument("paths", metavar="DIR|RESULTS.json...", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--all", "all_", is_flag=True, help="Show all runs and changes, not only the latest.")
 @schema_option("urdfkin.report.history:HISTORY", "the data")
-@answering(*TEXTS, "json")
+@writes_answer(*TEXTS, "json")
 def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
     """Show how the validation results of each robot changed over several runs of `urdfkin validate`.
 
-    The arguments are reports (JSON files), the folders of `validate --store`, or folders that contain both.
-    Runs are ordered by their start. The command identifies a robot by its source, which is a path or a name.
-    If a file was renamed, the command uses the robot's name. Changes and regressions are defined as in
-    `report compare`. With `--output history.html`, the command writes an offline page with charts.
+    The arguments are reports (JSON files), folders of `urdfkin validate --store`, or folders that contain
+    both. Runs are ordered by their start. The command identifies a robot by its source (a path or a name of
+    the catalogue). If a file was renamed, the command identifies it by the robot's name. Changes and
+    regressions are defined as in `urdfkin report compare`. With `--output history.html`, the command writes
+    an HTML page with charts, which works offline.
 
     If a file cannot be used, the command prints its name and the reason, and shows the other files. Exit 0:
     every file was used. 2: a file cannot be used.

@@ -1,4 +1,4 @@
-"""`urdfkin robots` and `urdfkin info`: list the robots that have a short name; show one robot."""
+"""`urdfkin robots`: list the robots of the catalogue. `urdfkin info`: show one robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.options import load_robot, robot_argument
-from urdfkin.cli.output import Answer, answering
+from urdfkin.cli.output import Answer, writes_answer
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_value
 from urdfkin.system.lazy_import import lazy_import
@@ -24,32 +24,29 @@ _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
 @click.command("robots", epilog="Example: urdfkin robots --family arm")
 @click.option("--family", metavar="NAME", help=f"Show only the robots of one family: {', '.join(_FAMILIES)}.")
-@answering()
+@writes_answer()
 def robots_command(family: str | None) -> Answer:
-    """List the robots of the catalogue, which are loaded by name.
+    """List the robots of the catalogue, which every command loads by name.
 
-    The catalogue contains the URDF files of example-robot-data and of urdfkin. If a command has the option
-    --base, --tip or --frame, its default is the base or the tip in this list.
+    The catalogue contains the URDF files of the package example-robot-data and of urdfkin. The base and the
+    tip in this list are the defaults of the options --base, --tip and --frame.
     """
     entries = [entry for entry in catalogue().values() if family in (None, entry.family)]
     if not entries:
         raise click.UsageError(f"no robots of family {family!r}; the families are: {', '.join(_FAMILIES)}")
     heads = ("name", "family", "base", "tip")
     rows = [(entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries]
-    off = [
+    without_mimic = [
         f"{entry.name}: mimic joints are loaded as free joints: {entry.reason}"
         for entry in entries
         if entry.reason
     ]
-    return Answer(
-        lambda: TextDocument(
-            "", [Table(heads, rows, left=4, names=(0, 2, 3)), f"{len(entries)} robots", *off]
-        ),
-        {
-            "json": lambda: json.dumps([_as_dict(entry) for entry in entries], indent=2) + "\n",
-            "csv": lambda: [heads, *rows],
-        },
-    )
+    table = Table(heads, rows, left=4, names=(0, 2, 3))
+    data = {
+        "json": lambda: json.dumps(list(map(_as_dict, entries)), indent=2) + "\n",
+        "csv": lambda: [heads, *rows],
+    }
+    return Answer(lambda: TextDocument("", [table, f"{len(entries)} robots", *without_mimic]), data)
 
 
 def _as_dict(entry: Entry) -> dict[str, object]:
@@ -64,20 +61,20 @@ def _as_dict(entry: Entry) -> dict[str, object]:
     }
 
 
-#: Only JSON needs this module, which imports the tables.
+#: Function that only JSON needs, and whose import is slow
 _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 
 
 @click.command("info", epilog="Example: urdfkin info panda")
 @robot_argument
-@answering()
+@writes_answer()
 def info_command(robot: str) -> Answer:
     """Show a robot's links, joints, axes, limits, indices in q and v, and mimic rules.
 
-    The joints have the same order as in q, in v and in the columns of a Jacobian. This order is Pinocchio's.
-    If the joints have another order in the file, the command reports it. Limits are in rad and rad/s; those
-    of prismatic joints are in m and m/s. A link that is not indented is a child of the link above it. If a
-    link has several children, lines lead to them.
+    The joints have the same order as in q, in v and in the columns of a Jacobian. This is Pinocchio's order;
+    the last line states whether the file has another order. Limits are in rad and rad/s, for prismatic joints
+    in m and m/s. A link that is not indented is a child of the link above it. If a link has several children,
+    lines lead to them.
     """
     loaded = load_robot(robot)
     data = {"json": lambda: _describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}
@@ -85,7 +82,7 @@ def info_command(robot: str) -> Answer:
 
 
 def _fitted(out: Console, document: TextDocument) -> TextDocument:
-    """If the table is wider than the terminal, show each link and its joint in one column."""
+    """Return the document; in a table wider than the terminal, each link and its joint share a column."""
     from urdfkin.report.listing import fits
 
     parts = list(document.parts)
@@ -98,7 +95,7 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of the table; the names of the links are without the lines of the drawn tree."""
+    """Yield the rows of the table; the links are named without the lines of the drawn tree."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

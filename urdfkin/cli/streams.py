@@ -1,8 +1,8 @@
-"""Safe standard streams: robust against stream failures, and against control characters in names.
+"""Protect the standard streams against failures, and against control characters in names.
 
 A shell can close standard output. Standard output can be a file on a full disk, or a pipe to a program that
-exits early. The encoding of standard output may not support every character of a joint's name. This module
-handles all these failures without a traceback.
+exits early. Its encoding may not support every character of a joint's name. In these cases, the command ends
+without a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
 commands of CI services. All output passes through this stream, also the output of click and Python. A
@@ -26,16 +26,16 @@ import click
 from urdfkin.errors import DegreesWarning, SourceError
 from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
 
-#: If the reader of a pipe has exited, the exit code is 128 + SIGPIPE, as in shells.
+#: Exit code if the reader of a pipe has exited, as in shells
 READER_GONE = 128 + signal.SIGPIPE
 
 
 def prepare() -> None:
-    """Prepare the standard streams; call it once, before a command begins."""
-    _occupy_closed()
+    """Replace the standard streams by streams that report failures, before a command begins."""
+    _open_closed_streams()
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
-    warnings.showwarning = _warn
+    warnings.showwarning = _show_warning
     # Each command prints its own line about joint values that look like degrees.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
@@ -45,7 +45,7 @@ def finish() -> None:
     sys.stdout.flush()
 
 
-class _Raw(io.FileIO):
+class _RawStream(io.FileIO):
     """Standard output or standard error as a raw file.
 
     The first failure of standard output ends the command with an error. Failures of standard error are
@@ -57,24 +57,24 @@ class _Raw(io.FileIO):
         self._failed = False
 
     def write(self, data: Any) -> Any:
-        """Write to the file until a write fails, then discard the data."""
-        if self._failed:  # Python writes again at exit.
-            return len(memoryview(data).cast("B"))
-        try:
-            return super().write(data)
-        except OSError as error:
-            self._failed = True
-            if self.fileno() == 2:
-                return len(memoryview(data).cast("B"))
-            if error.errno == errno.EPIPE:
-                raise SystemExit(READER_GONE) from None
-            raise SourceError(
-                "cannot be written", where="standard output", found=error.strerror or str(error)
-            ) from None
+        if not self._failed:
+            try:
+                return super().write(data)
+            except OSError as error:
+                self._failed = True
+                if self.fileno() == 1:
+                    raise _stop_command(error) from None
+        return len(memoryview(data).cast("B"))  # after a failure, data are discarded
+
+
+def _stop_command(error: OSError) -> BaseException:
+    if error.errno == errno.EPIPE:
+        return SystemExit(READER_GONE)
+    return SourceError("cannot be written", where="standard output", found=error.strerror or str(error))
 
 
 def _with_errors(stream: Any, descriptor: int) -> Any:
-    """Return a standard stream that reports write errors; return the stream of a test unchanged."""
+    """Return a standard stream that reports errors of writing; another stream is returned unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -82,7 +82,7 @@ def _with_errors(stream: Any, descriptor: int) -> Any:
         return stream
     stream.flush()
     return io.TextIOWrapper(
-        io.BufferedWriter(_Raw(descriptor)),
+        io.BufferedWriter(_RawStream(descriptor)),
         encoding=stream.encoding,
         errors="backslashreplace",
         line_buffering=stream.line_buffering,
@@ -90,11 +90,11 @@ def _with_errors(stream: Any, descriptor: int) -> Any:
     )
 
 
-def _occupy_closed() -> None:
+def _open_closed_streams() -> None:
     """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
-    If standard input was closed, reading from it fails. If standard output was closed, writing to it fails.
-    If standard error was closed, text written to it is lost.
+    The null device is opened in the wrong direction for standard input and output: reading from a closed
+    standard input fails, and writing to a closed standard output fails. Text for standard error is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -107,7 +107,7 @@ def _occupy_closed() -> None:
             setattr(sys, name, open(descriptor, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
-def _warn(
+def _show_warning(
     message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any
 ) -> None:
     """Print a warning of urdfkin as one line, and other warnings in Python's format."""
@@ -117,19 +117,18 @@ def _warn(
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno))
 
 
-#: The package rich writes these escape sequences for colours and for progress bars.
+#: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: This many characters of an unfinished line are searched again together with the next piece.
-#: A CI command may be written in two pieces.
-_STORED = 64
+#: Maximum length of an unfinished line that is stored, because the next piece may complete a CI command
+_MOST_STORED = 64
 
 
 class SafeStream:
     """A text stream that escapes control characters and CI commands.
 
-    The bytes of a NumPy file are written to the attribute `buffer`, without escapes. Set `styled` only if
-    nothing but the package rich writes to the stream: escape sequences for colours are then not escaped.
-    `encoding` is the encoding that this stream reports.
+    `styled` keeps escape sequences for colours; set it only if nothing but the package rich writes to the
+    stream. `encoding` is the encoding that this stream reports. The bytes of a NumPy file are written to the
+    attribute `buffer`, without escapes.
     """
 
     def __init__(self, stream: TextIO, *, styled: bool = False, encoding: str | None = None) -> None:
@@ -140,29 +139,27 @@ class SafeStream:
 
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
-        self._pass(
-            "".join(
-                piece if k % 2 else self._without_commands(_plain(piece)) for k, piece in enumerate(pieces)
-            )
-        )
+        # Every second piece is an escape sequence.
+        pieces[::2] = [self._without_commands(_plain(piece)) for piece in pieces[::2]]
+        self._write_raw("".join(pieces))
         return len(text)
 
     def write_commands(self, text: str) -> None:
-        self._pass(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
+        self._write_raw(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
 
     def write_file(self, text: str) -> None:
         """Write a file's text as UTF-8, whatever the encoding of the stream."""
         self.stream.flush()
-        self.stream.buffer.write(self.tamed_file(text).encode())
+        self.stream.buffer.write(self.escaped_file(text).encode())
         self.stream.buffer.flush()
 
-    def tamed_file(self, text: str) -> str:
+    def escaped_file(self, text: str) -> str:
         """Return the text that `write_file` writes; a carriage return at the end of a line is not escaped."""
         *lines, last = text.split("\n")
         plain = [_plain(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
         return self._without_commands("\n".join([*plain, _plain(last)]))
 
-    def _pass(self, text: str) -> None:
+    def _write_raw(self, text: str) -> None:
         encoding = self.stream.encoding or "utf-8"
         if not text.isascii():
             text = text.encode(encoding, "backslashreplace").decode(encoding)
@@ -181,9 +178,9 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Only the last 16 characters of a long line are stored.
-        # An "x" before them means that the removed text was not blank.
-        self._line = whole if len(whole) <= _STORED else ("x" if whole.strip() else "") + whole[-16:]
+        # Only the last 16 characters of a long line are stored; "x" stands for text before them.
+        is_long = len(whole) > _MOST_STORED
+        self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
 
     def __getattr__(self, name: str) -> Any:
@@ -202,7 +199,7 @@ def guard() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # Click bypasses streams with other encodings. SafeStream escapes missing characters.
+            # Click would bypass a stream with another encoding.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 
@@ -212,7 +209,7 @@ def say(line: str, *, err: bool = False) -> None:
 
 
 def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
-    """Print one line of words; on a terminal, the words may have styles."""
+    """Print one line; each word has a style, which only a terminal shows."""
     stream = SafeStream(sys.stdout, styled=sys.stdout.isatty())
     texts = (
         click.style(printable(text), **style) if stream.styled else printable(text) for text, style in words
@@ -226,7 +223,7 @@ def say_file(text: str) -> None:
 
 def harmless(text: str) -> str:
     """Return a text as `say_file` would print it, with control characters escaped."""
-    return SafeStream(sys.stdout).tamed_file(text)
+    return SafeStream(sys.stdout).escaped_file(text)
 
 
 def command_lines(text: str) -> None:

@@ -1,4 +1,4 @@
-"""The console for tables and coloured lines; markup and control characters in names have no effect."""
+"""Define the console for tables and coloured lines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TRAILING = re.compile(r" +$", re.MULTILINE)
 
 
 class Terminal(Console):
-    """Rich's console without markup; each printed text stays on one line."""
+    """A console of the package rich in which markup and control characters in names have no effect."""
 
     def __init__(self, stream: TextIO, **options: Any) -> None:
         safe = SafeStream(stream, styled=True)
@@ -22,7 +22,7 @@ class Terminal(Console):
         safe.styled = self.is_terminal
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print tables and texts; texts are never wrapped, so that they can be copied."""
+        """Print tables and texts; texts are not wrapped, so that they can be copied."""
         texts = [printable(o) if isinstance(o, str) else o for o in objects]
         only_text = all(isinstance(o, str) for o in objects)
         if self.is_terminal or only_text:

@@ -1,4 +1,4 @@
-"""`urdfkin validate`: compare every frame and joint with Pinocchio, on many samples; study the accuracy."""
+"""`urdfkin validate`: compare every frame and joint with Pinocchio on many samples; study the accuracy."""
 
 from __future__ import annotations
 
@@ -10,32 +10,31 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from urdfkin.cli.campaign import progress
+from urdfkin.cli.campaign import progress, warn
 from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.exit import stoppable
 from urdfkin.cli.options import (
-    Whole,
-    how_to_load,
+    WholeNumber,
+    load_options,
     load_robot,
-    lock_options,
-    mimic_option,
+    oracle_option,
     reject_unused_options,
-    root_joint_option,
-    source_options,
+    robot_options,
+    samples_option,
+    seed_option,
 )
-from urdfkin.cli.output import check_writable, compiling, console
+from urdfkin.cli.output import check_writable, console, report_compilation
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.urdf.catalogue import examples
-from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import compared, not_compared
 
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
-    from urdfkin.validation.accuracy import Judgement
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged, StudySettings
+    from urdfkin.validation.accuracy import AccuracyStudy
+    from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy, StudySettings
     from urdfkin.validation.engines import Engine
     from urdfkin.validation.results import ValidationReport
 
@@ -50,78 +49,66 @@ def judge_all(
     retry: bool = False,
     how: Mapping[str, Any],
 ) -> ValidationReport:
-    """Run the accuracy study of every compared robot and return the report with its results.
+    """Run the accuracy study of every compared robot, and return the report with the results of the study.
 
-    If the study of a robot fails, a line on stderr states the reason. An interrupt skips the remaining
-    robots.
-
-    Args:
-        report: The report of `validate` for the same robots, in the same order. With `shard`, the report of
-            this part.
-        given: Robots, or their sources.
-        settings: Settings of the study.
-        store: Folder of --store, into which the results of the study are also written; None: no folder.
-        shard: The value I/N of --shard. This process studies only the robots whose first samples belong to
-            part I.
-        retry: Whether to repeat the study of a robot whose study failed in an earlier run.
-        how: `mimic`, `root_joint`, `xacro_args`, `lock` and `joints`, as in `load`.
+    `report` is the report of `validate` for the robots `given`, or for the part I of them if `shard` is I/N.
+    Then only robots whose first samples belong to part I are studied. The results are also written to the
+    folder `store`. With `retry`, a study that failed in an earlier run is repeated. `how` are arguments of
+    `load`. If the study of a robot fails, a line on stderr states the reason. An interrupt skips the
+    remaining robots.
     """
-    from urdfkin.validation.accuracy_store import NotJudged
-    from urdfkin.validation.campaign import shares
+    from urdfkin.validation.accuracy_store import FailedStudy
+    from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Cut
 
-    parts = shares(len(given), Cut(report.samples), shard)
+    parts = chunks_of_shard(len(given), Cut(report.samples), shard)
     here = [i for i, part in enumerate(parts) if part]
-    judgements: list[Judgement | None] = []
+    studies: list[AccuracyStudy | None] = []
     try:
         with _open_results(store, settings, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
                 if not robot.tallies or parts[i].start > 0:
                     continue
                 found = None if results is None else results.found(i)
-                if found is None or (retry and isinstance(found, NotJudged)):
-                    found, is_lasting = _study(
-                        given[i], settings, None if results is None else results.stamp(i), how
-                    )
+                if found is None or (retry and isinstance(found, FailedStudy)):
+                    stamp = None if results is None else results.stamp(i)
+                    found, is_lasting = _study(given[i], settings, stamp, how)
                     if results is not None and is_lasting:
                         results.keep(i, found)
-                if isinstance(found, NotJudged):
+                if isinstance(found, FailedStudy):
                     say(f"urdfkin: {robot.source}: no accuracy result: {found.reason}", err=True)
-                judgements.append(None if isinstance(found, NotJudged) else found)
+                studies.append(None if isinstance(found, FailedStudy) else found)
     except KeyboardInterrupt:
         report = replace(report, interrupted=True)
-    return replace(report, judgements=tuple(judgements))
+    return replace(report, studies=tuple(studies))
 
 
 @contextmanager
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyResult | None]:
-    """Open the accuracy results of a store, or of one part of it, so that no other process can write them."""
+    """Open the accuracy results of a store, or of a shard; until they are closed, no other process writes."""
     if folder is None:
         yield None
         return
     from urdfkin.validation.accuracy_store import AccuracyResult
-    from urdfkin.validation.store import Store, opened
+    from urdfkin.validation.store import Store, open_store
 
-    def tell(message: str) -> None:
-        say(f"urdfkin: warning: {message}", err=True)
-
-    with opened(folder, Store.reading(folder, tell).manifest, tell, shard=shard) as store:
-        store_results = AccuracyResult(store, settings)
-        store_results.begin()
-        yield store_results
+    with open_store(folder, Store.reading(folder, warn).manifest, warn, shard=shard) as store:
+        results = AccuracyResult(store, settings)
+        results.begin()
+        yield results
 
 
 def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
-) -> tuple[Judgement | NotJudged, bool]:
-    """Study a robot. Return the accuracy result, and whether to store it (not after a crash)."""
+) -> tuple[AccuracyStudy | FailedStudy, bool]:
+    """Return the accuracy result of a robot, and whether to store it. After a crash it is not stored."""
     import numpy as np
 
     from urdfkin.model.configuration import draw_base
-    from urdfkin.validation.accuracy import judge
-    from urdfkin.validation.accuracy_store import NotJudged
+    from urdfkin.validation.accuracy import accuracy_study
+    from urdfkin.validation.accuracy_store import FailedStudy
     from urdfkin.validation.robot_input import subject
 
     is_same = True
@@ -130,13 +117,13 @@ def _study(
         if is_same := stamp in (None, robot.stamp):
             rng = np.random.default_rng([settings.seed, 1])
             base = draw_base(settings.samples, rng) if settings.moving_base else None
-            return judge(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
+            return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
         raise InputError(
             "the robot file has changed since its results were compared",
             remedy="start the validation again when the file no longer changes",
         )
     except Exception as error:
-        return NotJudged(f"{type(error).__name__}: {error}"), is_same and isinstance(error, UrdfkinError)
+        return FailedStudy(f"{type(error).__name__}: {error}"), is_same and isinstance(error, UrdfkinError)
 
 
 _T = TypeVar("_T", bound=click.Command)
@@ -154,60 +141,45 @@ def _with_quantities(command: _T) -> _T:
 @click.option(
     "--all", "all_", is_flag=True, help="Validate all robots of example-robot-data in the catalogue."
 )
-@click.option(
-    "--samples",
-    type=Whole(0),
-    default=1000,
-    show_default=True,
-    help="Number of random configurations for each robot.",
-)
-@click.option(
-    "--seed", type=Whole(0), default=0, show_default=True, help="Seed of the random configurations."
-)
-@click.option("--jobs", type=Whole(1), default=1, show_default=True, help="Number of local processes.")
-@mimic_option("Couple mimic joints to the mimicked joints (default).")
-@root_joint_option("Add a moving joint between the world and the root link.")
-@click.option(
-    "--oracle",
-    type=click.Choice(tuple(ORACLES)),
-    default="pinocchio",
-    help="`mujoco`: also compare with MuJoCo.",
-)
+@samples_option(1000, "Number of random configurations of each robot.")
+@seed_option
+@click.option("--jobs", type=WholeNumber(1), default=1, help="Number of local processes.")
+@robot_options
+@oracle_option("Compare only with Pinocchio; or with Pinocchio and MuJoCo (mujoco).")
 @click.option(
     "--isolate",
     is_flag=True,
     help="Run each robot in its own process; a crash is reported as that robot's result.",
 )
-@source_options
-@lock_options
 @click.option(
     "--store",
     type=click.Path(path_type=Path),
-    help="Folder for results. Repeat the same command to resume an interrupted run.",
+    metavar="DIR",
+    help="Folder for the results. To resume an interrupted run, repeat the same command.",
 )
 @click.option("--retry", type=click.Choice(["failed"]), help="With --store: compute failed robots again.")
-@click.option("--shard", metavar="I/N", help="With --store: run only part I of N parts of the validation.")
+@click.option(
+    "--shard", metavar="I/N", help="With --store: split the validation into N parts, and run only part I."
+)
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Address of a dask scheduler, or local:N for N workers on this machine.",
+    help="Compute with the workers of this dask scheduler; local:N starts N workers on this machine.",
 )
 @click.option("--json-progress", is_flag=True, help="Print progress as lines of JSON on standard error.")
 @click.option(
     "--judge",
     "judged",
     is_flag=True,
-    help="Also run an accuracy study: compare urdfkin and Pinocchio with values at 50 digits.",
+    help="Also study the accuracy: compare urdfkin and Pinocchio with results computed at 50 digits.",
 )
 @click.option(
     "--judge-samples",
-    type=Whole(1),
+    type=WholeNumber(1),
     default=5,
-    show_default=True,
-    help="Number of random configurations for --judge.",
+    help="With --judge: number of random configurations of each robot.",
 )
 @click.option("--judge-moving-base", is_flag=True, help="With --judge: also move the root link at random.")
-@click.option("--json", "json_", type=click.Path(path_type=Path), help="Write the report as JSON.")
 @report_options
 @click.pass_context
 def command(
@@ -225,18 +197,19 @@ def command(
 ) -> None:
     """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
-    Compared: {compared}. Not compared: {not_compared}. For quantities that are not compared here, urdfkin
-    checks each result when it computes the result.
+    Compared: {compared}. Not compared: {not_compared}. Quantities that are not compared here are checked
+    whenever urdfkin computes them.
 
     Configurations are random within the joint limits. The command adds the neutral configuration, and the
     configurations in which all joints are at their lower or upper limits. In every eighth sample, joint
     velocities and accelerations are a hundred times larger than in the others. Disagreements are in multiples
-    of eps * scale, where eps is 2.2e-16; rounding alone gives 1 to 10. Exit 0: verified. 1: a
-    disagreement. 2: a robot cannot be read. 3: a robot was not verified. 128 + n: stopped by signal n;
-    finished results are saved.
+    of eps * scale, where eps is 2.2e-16; rounding alone gives 1 to 10.
 
     With --store, the same command resumes an interrupted run, and `urdfkin report DIR` shows the report at
     any time.
+
+    Exit 0: verified. 1: a disagreement. 2: a robot cannot be read. 3: a robot was not verified. 128 + n:
+    stopped by signal n; finished results are saved.
     """
     files = {name: options.pop(name) for name in FILES}
     store, shard, retry = (options[name] for name in ("store", "shard", "retry"))
@@ -256,17 +229,23 @@ def command(
     from urdfkin.validation.campaign import validate
 
     check_writable(*files.values())
-    how = how_to_load()
+    how = load_options()
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
     given = [_load_stdin(robot, how) if judged else robot for robot in robots or examples()]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
-    with stoppable() as stop, compiling(), _cluster(scheduler) as on, progress(as_json=json_progress) as tell:
-        report = validate(given, executor=on, progress=tell, **options, **how)
+    with (
+        stoppable() as stop,
+        report_compilation(),
+        _cluster(scheduler) as executor,
+        progress(as_json=json_progress) as tell,
+    ):
+        report = validate(given, executor=executor, progress=tell, **options, **how)
         if judged and not report.interrupted:
-            of = StudySettings(judge_samples, options["seed"], judge_moving_base)
-            report = judge_all(report, given, of, store=store, shard=shard, retry=retry is not None, how=how)
+            settings = StudySettings(judge_samples, options["seed"], judge_moving_base)
+            retries = retry is not None
+            report = judge_all(report, given, settings, store=store, shard=shard, retry=retries, how=how)
     if shard:
         _say_shard(report, shard, store)
         context.exit(stop.exit_code(report.exit_code))
@@ -292,14 +271,14 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load standard input now: it can be read only once, and the accuracy study needs it later."""
+    """Load a robot from standard input, which can be read only once; return another source unchanged."""
     from urdfkin.robot.loading import load
 
     return load(source, **how) if source == "-" else source
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
-    """Load a USD stage now, with its variants and its articulation; another robot is returned as it is."""
+    """Load a USD file with its variants and its articulation; return another robot unchanged."""
     from urdfkin.urdf.sources import is_usd
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}
@@ -309,7 +288,7 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
-    """Print the result of a shard; a full report is possible only after the shards are merged."""
+    """Print the results of a shard; a report needs the results of all shards."""
     from urdfkin.report.words import counted
 
     for robot in report.robots:

@@ -1,4 +1,4 @@
-"""The command `urdfkin vectors`: write test vectors for other programs."""
+"""`urdfkin vectors`: write test vectors for other programs."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 from urdfkin.cli.completion import complete_robot
-from urdfkin.cli.options import Whole, load_robot, schema_option
-from urdfkin.cli.output import Answer, answering
+from urdfkin.cli.options import load_robot, samples_option, schema_option
+from urdfkin.cli.output import Answer, counted, writes_answer
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_value
@@ -25,7 +25,7 @@ EXAMPLE = "urdfkin vectors write vectors ur5 panda"
 def vectors_command() -> None:
     """Write test vectors for other programs.
 
-    A library in any language compares its own results with these test vectors. docs/vectors.md explains how.
+    A library in any language compares its results with these test vectors; docs/vectors.md explains how.
     """
 
 
@@ -37,28 +37,22 @@ def vectors_command() -> None:
 @click.option(
     "--catalogue/--no-catalogue",
     default=True,
-    help="Write the robots of the catalogue too (default), which refer to the files of example-robot-data.",
+    help="Without ROBOT: also write the robots of the catalogue, which refer to files of example-robot-data.",
 )
-@click.option(
-    "--samples",
-    type=Whole(1, 1000),
-    default=3,
-    show_default=True,
-    help="Configurations of each robot. The first is the zero configuration.",
-)
-@schema_option("urdfkin.validation.vectors:VECTORS", "a file")
-@answering()
+@samples_option(3, "Number of configurations of each robot; the first one is zero.", least=1, most=1000)
+@schema_option("urdfkin.validation.vectors:VECTORS", "the files")
+@writes_answer()
 def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
-    Without ROBOT, the command writes the vectors of the robots of the catalogue, and of some 70 small robots.
-    Each small robot tests one feature of URDF. With ROBOT, the command writes the vectors of only the given
-    robots. For each robot, there is a JSON file, and a text file with the same numbers, separated by tabs.
-    SHA256SUMS has the digests of all files.
+    With ROBOT, the command writes the test vectors of these robots only. Without ROBOT, it writes those of
+    the robots of the catalogue, and of some 70 small robots, each of which tests one feature of URDF. Each
+    robot has a JSON file, and a text file with the same numbers, separated by tabs. The file SHA256SUMS has
+    the digests of all files.
 
     The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
-    spatial acceleration. The files contain the placement once, and each other quantity in the frames LOCAL,
-    WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and --samples.
+    spatial acceleration. The files contain the placement once, and each other quantity in the reference
+    frames LOCAL, WORLD and LOCAL_WORLD_ALIGNED. The files depend only on the robots and on --samples.
     """
     from urdfkin.validation import vectors
 
@@ -100,6 +94,6 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
 
 def _document(folder: Path, written: Sequence[Written]) -> TextDocument:
     rows = [(one.robot, one.files[0].name, f"{one.numbers:,}") for one in written]
-    robots = "1 robot" if len(written) == 1 else f"{len(written)} robots"
+    robots = counted(len(written), "robot")
     total = f"{sum(one.numbers for one in written):,} numbers of {robots} in {folder}"
     return TextDocument("", [Table(("robot", "file", "numbers"), rows, left=2, names=(0, 1)), total])

@@ -1,4 +1,4 @@
-"""The command `urdfkin verify`: check a function or a program of the user."""
+"""`urdfkin verify`: check a function or a program of the user."""
 
 from __future__ import annotations
 
@@ -12,19 +12,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urdfkin.cli.options import (
-    NumberFrom,
-    Whole,
+    FILE,
+    NumberInRange,
     convention_option,
     frame_option,
     load_robot,
     oracle_option,
     reference_option,
     robot_argument,
+    samples_option,
     seed_option,
 )
-from urdfkin.cli.output import TEXTS, Answer, answering, check_writable, compiling, write_file
+from urdfkin.cli.output import TEXTS, Answer, check_writable, report_compilation, writes_answer
 from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinError
 from urdfkin.errors.display import Strong, TextDocument
+from urdfkin.system.files import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: A function returns one result of these quantities for each configuration.
+#: Quantities that a function of the user can compute
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 
@@ -44,43 +46,38 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
 @click.option(
     "--quantity",
     type=click.Choice(_QUANTITIES),
-    help="Quantity that the function computes. Default: the quantity in the function's name.",
+    help="Quantity that the function or program computes.",
+    show_default="the quantity in the function's name; jacobian for a program",
 )
 @frame_option
 @reference_option
 @convention_option
-@click.option(
-    "--samples", type=Whole(0), default=1000, show_default=True, help="Number of random configurations."
-)
+@samples_option(1000, "Number of random configurations.")
 @seed_option
 @click.option(
     "--factor",
-    type=NumberFrom(min=0, min_open=True),
+    type=NumberInRange(min=0, min_open=True),
     default=1.0,
-    show_default=True,
-    help="Multiply the bound by this factor, for a function that rounds more often than the textbook's"
-    " recursion.",
+    help="Multiply the error bound by this factor, for a function with more rounding operations than the"
+    " textbook's recursion.",
 )
 @click.option(
-    "--batch", is_flag=True, help="Call the function with many configurations at once: q is an array (n, nq)."
+    "--batch", is_flag=True, help="Call the function with n configurations at once: q is an array (n, nq)."
 )
 @click.option(
     "--program", is_flag=True, help="TARGET is the command of a program that reads and writes lines of JSON."
 )
 @click.option(
     "--timeout",
-    type=NumberFrom(min=0, max=86400, min_open=True),
+    type=NumberInRange(min=0, max=86400, min_open=True),
     default=10.0,
-    show_default=True,
-    help="Longest time for an answer of the program, in seconds.",
+    help="With --program: longest time for a result of the program, in seconds.",
 )
 @click.option(
-    "--junit",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Write JUnit XML, with a test case for each function.",
+    "--junit", type=FILE, help="Also write JUnit XML to this file, with a test case for each function."
 )
-@oracle_option
-@answering(*TEXTS, "json")
+@oracle_option()
+@writes_answer(*TEXTS, "json")
 def verify_command(
     target: str,
     robot: str,
@@ -97,7 +94,7 @@ def verify_command(
     junit: Path | None,
     oracle: Any,
 ) -> Answer:
-    """Compare your function or program with urdfkin and Pinocchio, within the derived bound.
+    """Compare your function or program with urdfkin and Pinocchio, within the derived error bound.
 
     TARGET is FILE.py:FUNCTION. If TARGET is FILE.py, the command checks each function of the file whose name
     contains a quantity, for example `jacobian`. The arguments of a function are the arrays q (nq,), v (nv,)
@@ -106,35 +103,35 @@ def verify_command(
     answers each line with a line {"result": [...]}. The file and the program run with your rights.
 
     The command calls the function in the zero configuration, at the joint limits, and in random
-    configurations. If a usual mistake explains wrong results, the command names the mistake. Examples are a
-    wrong frame, reference frame, joint order, sign or unit, or a missing term. Exit code 0: all results
-    agree; 1: they do not; 3: no oracle can check the robot.
+    configurations. If a common mistake explains wrong results, the command names the mistake: a wrong frame,
+    reference frame, joint order, sign or unit, or a missing term.
+
+    Exit 0: all results agree. 1: a result disagrees. 2: bad input. 3: no oracle can check the robot.
     """
     from urdfkin.validation.functions import verify_function
     from urdfkin.validation.programs import Program
 
     check_writable(junit)
     loaded = load_robot(robot, oracle=oracle)
-    checks: list[FunctionCheck] = []
     with ExitStack() as stack:
-        stack.enter_context(compiling())
+        stack.enter_context(report_compilation())
         functions: dict[str, Callable[..., object]]
         if program:
             if batch:
                 raise click.UsageError("--batch is for a function in Python, and --program for a program")
             name = quantity or "jacobian"
-            of = None if name in ("placement", "imu") else reference
-            at = frame or loaded.tip_frame
+            reference_ = None if name in ("placement", "imu") else reference
+            frame_ = frame or loaded.tip_frame
             try:
                 words = shlex.split(target)
             except ValueError as error:
                 raise click.UsageError(f"the command of the program cannot be read: {error}") from None
-            command = Program(words, loaded, name.replace("-", " "), at, of, convention, timeout)
+            command = Program(words, loaded, name.replace("-", " "), frame_, reference_, convention, timeout)
             functions = {name: stack.enter_context(command)}
         else:
             functions = _functions(target)
-        for name, function in functions.items():
-            check = verify_function(
+        checks = [
+            verify_function(
                 function,
                 loaded,
                 (quantity or _quantity_of(name)).replace("-", " "),
@@ -146,7 +143,8 @@ def verify_command(
                 factor=factor,
                 batch=batch,
             )
-            checks.append(check)
+            for name, function in functions.items()
+        ]
     if junit is not None:
         from urdfkin.report.junit import functions_as_junit
 
@@ -157,12 +155,11 @@ def verify_command(
 
 
 def _document(checks: Sequence[FunctionCheck]) -> TextDocument:
-    sheets = [check._sheet() for check in checks]
-    if len(sheets) == 1:
-        return sheets[0]
-    return TextDocument(
-        "", [part for sheet in sheets for part in (Strong(sheet.title), *sheet.parts, "")][:-1]
-    )
+    documents = [check._sheet() for check in checks]
+    if len(documents) == 1:
+        return documents[0]
+    parts = [part for document in documents for part in (Strong(document.title), *document.parts, "")]
+    return TextDocument("", parts[:-1])
 
 
 def _data(checks: Sequence[FunctionCheck]) -> dict[str, Any]:
@@ -172,7 +169,7 @@ def _data(checks: Sequence[FunctionCheck]) -> dict[str, Any]:
 
 
 def _quantity_of(function: str) -> str:
-    name = _stated(function)
+    name = _quantity_in_name(function)
     if name is None:
         raise click.UsageError(
             f"the name of the function {function!r} contains no quantity; pass --quantity NAME, where"
@@ -181,7 +178,7 @@ def _quantity_of(function: str) -> str:
     return name
 
 
-def _stated(function: str) -> str | None:
+def _quantity_in_name(function: str) -> str | None:
     """Return the quantity in a function's name: "jacobian-rate" for `jacobian_rate_of_tool0`."""
     names = sorted(_QUANTITIES, key=len, reverse=True)
     return next((name for name in names if name.replace("-", "_") in function), None)
@@ -192,39 +189,38 @@ def _functions(target: str) -> dict[str, Callable[..., object]]:
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(
-            "a target is FILE.py or FILE.py:FUNCTION",
+            "TARGET must be FILE.py or FILE.py:FUNCTION",
             found=target,
             remedy="--program checks the command of a program",
         )
-    module = _module(path)
-    own = {key: value for key, value in vars(module).items() if callable(value) and key[0] != "_"}
-    if not name:
-        found = {key: value for key, value in own.items() if _stated(key)}
-        if not found:
-            raise InputError(
-                "no function of the file has the name of a quantity",
-                where=path,
-                found=", ".join(own) or "no function",
-                remedy=f"name a function {' or '.join(_QUANTITIES[:3])}, or pass FILE.py:FUNCTION",
-            )
-        return found
-    if not callable(getattr(module, name, None)):
-        raise UnknownNameError("function", name, own)
-    return {name: getattr(module, name)}
+    module = _import_file(path)
+    functions = {key: value for key, value in vars(module).items() if callable(value) and key[0] != "_"}
+    if name:
+        if not callable(getattr(module, name, None)):
+            raise UnknownNameError("function", name, functions)
+        return {name: getattr(module, name)}
+    named = {key: value for key, value in functions.items() if _quantity_in_name(key)}
+    if not named:
+        raise InputError(
+            "no function of the file has the name of a quantity",
+            where=path,
+            found=", ".join(functions) or "no function",
+            remedy=f"name a function {' or '.join(_QUANTITIES[:3])}, or pass FILE.py:FUNCTION",
+        )
+    return named
 
 
-def _module(path: str) -> ModuleType:
-    """Return a Python file as a module; this runs the file."""
+def _import_file(path: str) -> ModuleType:
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
-    name = f"_urdfkin_checks_{file.stem}"  # An installed module could have the name `file.stem`.
+    name = f"_urdfkin_checks_{file.stem}"  # an installed module could have the name `file.stem`
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    # The folder is last in sys.path, so that its files hide no installed module.
+    # At the end of sys.path, files of the folder hide no installed module.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)

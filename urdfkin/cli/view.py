@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from urdfkin.cli.options import (
-    Whole,
+    WholeNumber,
     convention_of_input_option,
     conversion_of,
     load_robot,
@@ -20,7 +20,7 @@ from urdfkin.cli.options import (
     seed_option,
     trajectory_option,
 )
-from urdfkin.cli.output import compiling
+from urdfkin.cli.output import report_compilation
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError
 
@@ -30,17 +30,19 @@ from urdfkin.errors import InputError
 @click.option(
     "--host",
     default="127.0.0.1",
-    show_default=True,
     help="Address to listen on (127.0.0.1: this machine; 0.0.0.0: the whole network).",
 )
 @q_option
 @seed_option
 @click.option(
-    "--browser/--no-browser", default=None, help="Open the browser.  [default: if there is a screen]"
+    "--browser/--no-browser",
+    default=None,
+    help="Open the address in the browser.",
+    show_default="browser, if there is a screen",
 )
-@trajectory_option("Samples to play.")
+@trajectory_option("Play the samples of this file.")
 @convention_of_input_option
-@click.option("--port", type=Whole(1, 65535), default=8080, show_default=True, help="Port to listen on.")
+@click.option("--port", type=WholeNumber(1, 65535), default=8080, help="Port to listen on.")
 def command(
     robot: str,
     q: str,
@@ -53,13 +55,13 @@ def command(
 ) -> None:
     """Show a robot in a browser tab, with sliders, shapes, frames, DH frames and arrows.
 
-    The viewer starts at --q. Without --q, the viewer starts in the configuration nearest to zero that is
-    within the joint limits. The viewer shows the position, velocity and other numbers of the frame that you
-    choose. Pinocchio checks these numbers again after each motion of the robot. The viewer needs the package
-    viser. Ctrl-C stops it.
+    The viewer starts at --q. Without --q, it starts in the configuration nearest to zero that is within the
+    joint limits. The viewer shows the position, velocity and other numbers of the frame that you choose.
+    Pinocchio checks these numbers again after each motion of the robot. The viewer needs the package viser.
+    Ctrl-C stops it.
 
-    With --trajectory, a CSV or .npz file as in `urdfkin plot`, the viewer plays the samples of the file. With
-    --convention, the input field of q also accepts and shows values in that convention.
+    With --trajectory, the viewer plays the samples of a CSV or .npz file. With --convention, the input field
+    of q accepts and shows values in that convention.
 
     The printed address ends with a secret key. Open the address with its key, and show it only to people who
     may see and move the robot. Other web pages and other users of this machine have no access.
@@ -69,19 +71,19 @@ def command(
 
     loaded = load_robot(robot)
     conversion = conversion_of(loaded, convention)
-    begin = None if q == "neutral" else read_inputs(loaded, None, seed, q, conversion=conversion).q
-    if begin is not None and len(begin) != 1:
+    start = None if q == "neutral" else read_inputs(loaded, None, seed, q, conversion=conversion).q
+    if start is not None and len(start) != 1:
         raise InputError(
-            "the viewer needs exactly one start configuration", where="--q", found=str(len(begin))
+            "the viewer needs exactly one start configuration", where="--q", found=str(len(start))
         )
-    played = None
+    motion = None
     if trajectory is not None:
-        if begin is not None:
+        if start is not None:
             raise click.UsageError(
                 "--q and --trajectory cannot be used together: a trajectory begins at its first sample"
             )
-        played = read_motion(loaded, trajectory, convention)
-        if played.base is not None:
+        motion = read_motion(loaded, trajectory, convention)
+        if motion.base is not None:
             raise InputError(
                 "the viewer does not move the root link",
                 where=str(trajectory),
@@ -89,13 +91,13 @@ def command(
                 remedy="use --root-joint floating, and write the pose of the root link into q",
             )
     server = new_server(host, port)
-    with compiling():
-        Viewer(server, loaded, None if begin is None else begin[0], played, conversion)
+    with report_compilation():
+        Viewer(server, loaded, None if start is None else start[0], motion, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # A pipe would get the address too late.
-        wanted = sys.stdout.isatty() and has_screen() if browser is None else browser
-        with opened_page(server.address) if wanted else nullcontext():
+        sys.stdout.flush()  # a pipe would get the address too late
+        opens = sys.stdout.isatty() and has_screen() if browser is None else browser
+        with opened_page(server.address) if opens else nullcontext():
             server.sleep_forever()
     except KeyboardInterrupt:
         server.stop()

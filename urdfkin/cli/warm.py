@@ -1,4 +1,4 @@
-"""`urdfkin warm`: compile every kernel now, so that later commands start fast."""
+"""`urdfkin warm`: compile all kernels, so that later commands start fast."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from urdfkin.errors import SourceError
 
 @click.command(epilog="Example: urdfkin warm")
 def command() -> None:
-    """Compile every kernel for this machine and store it, for container images and CI.
+    """Compile all kernels (machine code for batches) and store them, for container images and CI.
 
-    Without this command, urdfkin compiles a kernel when the kernel saves time. Each compilation takes some
-    seconds. Kernels are stored below XDG_CACHE_HOME. Kernels from another processor are compiled again. Exit
-    2: the kernels cannot be stored.
+    Without this command, urdfkin compiles a kernel when the kernel first saves time, for example for a large
+    batch. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME. On another processor,
+    they are compiled again.
+
+    Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """
-    from urdfkin.compiled.kept import cache_folder, listen_to_compile_events
+    from urdfkin.compiled.kernel_cache import cache_folder, listen_to_compile_events
     from urdfkin.compiled.machine import kernels
     from urdfkin.compiled.machine.single import one_configuration
     from urdfkin.verify.comparison import load_kernels

@@ -1,80 +1,55 @@
 """Bound the largest distance between the poses of a frame in two models, from below and from above.
 
-**Search.** The search looks for the configuration with the largest distance. The distance at the best
-configuration found is a lower bound of the largest distance. The true largest distance is between this lower
-bound and the upper bound (`urdfkin.model.mechanisms.upper_bound`). The search begins at the random
-configuration with the largest distance. The search then varies one coordinate at a time. This method works
-well because a position depends on the sine and the cosine of each joint value.
+**Search.** The search starts at the random configurations with the largest distances, and varies one
+coordinate at a time. The largest distance that it attains is a lower bound. The method works well because a
+position depends on the sine and the cosine of each joint value.
 
-**Branch and bound.** `urdfkin.model.mechanisms.upper_bound` adds the effects of all differences, each at its
-own worst configuration. If the models differ in many places, this sum is far above the largest distance.
-`Boxes` gives a sharper bound. `Boxes` divides the space of all variables into boxes, and bounds D(q) = p_B -
-p_A in each box. In a box with middle c and half widths h,
+**Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` adds the effects of all
+differences, each at its own worst configuration. If the models differ in many places, this sum is far above
+the largest distance. `tighten` computes a sharper bound. The function divides the space of all variables into
+boxes, and bounds D(q) = p_B - p_A in each box. In a box with middle c and half widths h,
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 
-Here D_i is the derivative of D by variable i, and M_ij bounds the second derivatives at every configuration.
-If the bound of a box is below the target, the box is finished. Every other box is halved.
-
-M_ij is computed joint by joint. The derivative of a rotated vector by the angle is the cross product of the
-axis u with the rotated vector. Let y be the position of B's frame, and d the vector from A's frame to B's
-frame. The derivatives of y and d by a joint value are
-
-    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
-
-with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
-and t' are the screw, axis, point and value of the matched joint in B. A derivative is a free vector: a joint
-between the base and this joint rotates the derivative and does not translate it
-(`urdfkin.model.mechanisms.upper_bound`).
+Here D_i is the derivative of D by variable i, and M_ij bounds the second derivatives at every configuration
+(`urdfkin.model.mechanisms.upper_bound.curvature`). If the bound of a box is below the target, the box is
+finished. Every other box is halved.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from urdfkin.compiled.evaluate import jacobians, placements
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.kinematics.roundings import EPS, FOLLOWER, NOT_ZERO
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT, NOT_ZERO
 from urdfkin.model.configuration import WIDEST, neutral, sample, with_unit_quaternions
 from urdfkin.model.mechanisms.mechanism import (
-    IDENTITY,
     Alignment,
     FramePair,
     LinearFunction,
-    MatchedJoints,
-    MatchedValues,
-    Screw,
     Variables,
-    apart,
+    pose_difference,
 )
-from urdfkin.model.mechanisms.upper_bound import (
-    COARSE,
-    Support,
-    at_the_frame,
-    before_it,
-    behind_first,
-    difference,
-    passed,
-    point,
-)
-from urdfkin.model.tree import FloatArray, inverse, pose
+from urdfkin.model.mechanisms.upper_bound import curvature, relevant_joints
+from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 
-#: A search starts with `SAMPLES` random configurations and `CORNERS` corners.
-#: In a corner, each variable is at an end of its range.
-SAMPLES, CORNERS = 512, 128
-#: The search starts from the `STARTS` worst random configurations.
-#: The search tries `ALONG` different values of each coordinate.
-STARTS, ALONG = 4, 13
-#: Number of frames in one batch of a search.
+#: Number of random configurations that are sampled before a search.
+SAMPLES = 512
+#: Number of sampled configurations in which each variable is at an end of its range.
+CORNERS = 128
+#: Number of sampled configurations at which a search starts.
+STARTS = 4
+#: Number of values of a coordinate that one step of a search tries.
+TRIED_VALUES = 13
+#: Number of frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: The search has one round for each of these numbers.
-#: In a round with the number 0.1, the search varies each coordinate within a tenth of its range.
+#: Fraction of a coordinate's range over which the coordinate is varied, for each round of a search.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -84,7 +59,7 @@ Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 class DistanceSearch:
     """Search over the common variables of two aligned robots.
 
-    If `as_written`, B's root stays at its pose, even if the matching begins at another link of B. Otherwise,
+    If `as_written`, B's root keeps its pose, even if the matching begins at another link of B. Otherwise,
     B is moved so that the link where the matching begins keeps its pose.
     """
 
@@ -101,15 +76,15 @@ class DistanceSearch:
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
-        #: (4, 4) pose of B's base link in A's root frame. If A's base link moves, this pose moves with it.
-        self.hold = found.X @ found.b.homes[found.base[1]]
-        #: For each robot: whether the base link belongs to the same rigid body as the root link.
-        self.stands = tuple(
+        #: (4, 4) pose of B's base link in A's root frame, in A's zero configuration.
+        self.T_root_base = found.X @ found.b.homes[found.base[1]]
+        #: Whether the base link belongs to the same rigid body as the root link, for each robot.
+        self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
         )
         #: Whether the distances depend on the motion between B's root and the link where the matching begins.
-        #: `upper_bounds` and `tightened` do not bound this motion.
-        self.unbounded = as_written and not all(self.stands)
+        #: `upper_bounds` and `tighten` do not bound this motion.
+        self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
         low, high = self.variables.ranges[name]
@@ -124,7 +99,7 @@ class DistanceSearch:
     def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return configurations (n, nq) of A and of B for values `z` (n, variables).
 
-        If `moved` is true, A's planar and floating joints are random instead of neutral.
+        A's planar and floating joints are neutral, or random if `moved` is true.
         """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
@@ -144,7 +119,7 @@ class DistanceSearch:
             q_b[:, tree_b.q_index[tree_b.joint_index(name)]] = line.at(values)
         return q_a, q_b
 
-    def belong_together(self, q_a: FloatArray, q_b: FloatArray) -> bool:
+    def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
         """Return whether `q_b` (1, nq) corresponds to `q_a`, and both are within the joint ranges."""
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
@@ -154,21 +129,21 @@ class DistanceSearch:
             tree, q = (self.robots[0].tree, q_a) if name.startswith("a:") else (self.robots[1].tree, q_b)
             z[0, k] = q[0, tree.q_index[tree.joint_index(name[2:])]]
         low, high = self.ends.T
-        room = EPS * FOLLOWER * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+        rounding = EPS * MIMIC_LIMIT * (1.0 + np.maximum(np.abs(low), np.abs(high)))
         alike = all(
-            (np.abs(mapped - q) <= EPS * FOLLOWER * (1.0 + np.abs(mapped))).all()
-            for mapped, q in zip(self.configurations(z), (q_a, q_b), strict=True)
+            (np.abs(expected - q) <= EPS * MIMIC_LIMIT * (1.0 + np.abs(expected))).all()
+            for expected, q in zip(self.configurations(z), (q_a, q_b), strict=True)
         )
-        return alike and bool((low - room <= z).all() and (z <= high + room).all())
+        return alike and bool((low - rounding <= z).all() and (z <= high + rounding).all())
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
         """Return poses (n, frames, 4, 4) of A and of B in A's root frame, at values (n, variables)."""
-        return self.poses_at(*self.configurations(z), frames, own_results)
+        return self.poses_at(*self.configurations(z), frames, own_poses)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses as `poses` does, at configurations (n, nq), computed by the given function."""
+        """Return the result of `poses` at configurations (n, nq), computed by the function `computed`."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.found.base[1]]
@@ -176,66 +151,66 @@ class DistanceSearch:
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
         if self.unbounded:
             return Ts_a, self.found.X @ Ts_b[:, 1:] @ tools
-        hold = self.hold
-        if not self.stands[0]:
+        T_root_base = self.T_root_base
+        if not self.base_fixed[0]:
             link = self.found.base[0]
             moved = computed(a, q_a, [a.tree.link_frames[link]])
-            hold = moved @ inverse(self.found.a.homes[link]) @ hold
-        return Ts_a, hold @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
+            T_root_base = moved @ inverse(self.found.a.homes[link]) @ T_root_base
+        return Ts_a, T_root_base @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
-    def at(
+    def distances_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
-        """Return distances (n, frames) of matching frame origins (m) at configurations of A and B."""
+        """Return the distances (n, frames) between the origins of matching frames (m) at q (n, nq)."""
         a, b = self.poses_at(q_a, q_b, frames, computed)
         return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
 
-    def random(self, n: int) -> FloatArray:
-        """Return random values (n, variables) within their ranges."""
+    def random_values(self, n: int) -> FloatArray:
+        """Return random values (n, variables) of the variables within their ranges."""
         low, high = self.ends.T
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
-    def metres(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (n, frames) between the origins of matching frames (m)."""
-        return self.at(*self.configurations(z), frames, own_results)
+    def distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
+        """Return the distances (n, frames) between the origins of matching frames (m) at values `z`."""
+        return self.distances_at(*self.configurations(z), frames, own_poses)
 
-    def seen(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return distances (n, frames) at random configurations and corners, and the variables' values."""
+    def sampled_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
+        """Return the distances (n, frames) at sampled values (n, variables), and these values."""
         low, high = self.ends.T
-        z = self.random(SAMPLES)
+        z = self.random_values(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
         z = np.concatenate((np.clip(np.zeros((1, len(self.names))), low, high), corners, z))
-        return self.metres(z, frames), z
+        return self.distances(z, frames), z
 
-    def worst(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
-        """Return the largest distance (m) found for each frame, and the values of the variables at it."""
-        found: list[tuple[float, FloatArray]] = []
+    def largest_distances(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
+        """Return the largest distance (m) found for each frame, with the values of the variables there."""
+        largest: list[tuple[float, FloatArray]] = []
         for first in range(0, len(frames), SEARCHED_TOGETHER):
-            some = frames[first : first + SEARCHED_TOGETHER]
-            off, z = self.seen(some)
-            found += self._climb(some, z[np.argsort(-off, axis=0)[:STARTS].T])
-        return found
+            batch = frames[first : first + SEARCHED_TOGETHER]
+            distances, z = self.sampled_distances(batch)
+            largest += self._maximize(batch, z[np.argsort(-distances, axis=0)[:STARTS].T])
+        return largest
 
-    def most_turned(self, frame: FramePair) -> FloatArray:
+    def largest_rotation(self, frame: FramePair) -> FloatArray:
         """Return the sampled values (variables,) at which the frame's orientations in A and B differ most."""
-        z = self.seen([frame])[1]
+        z = self.sampled_distances([frame])[1]
         Ts_a, Ts_b = self.poses(z, [frame])
-        turned = [apart(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
+        turned = [pose_difference(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
         return np.asarray(z[int(np.argmax(turned))])
 
-    def _climb(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
+    def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
         """Maximize each frame's distance by coordinate search, from start values (frames, starts, variables).
 
         Each frame is searched separately, but all searches are evaluated in one batch.
         """
-        ways = [self._variables_of(frame) for frame in frames]
+        variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
         best = self._own_distances(z[:, :, np.newaxis], frames)[..., 0]
-        steps = np.linspace(-0.5, 0.5, ALONG)
+        steps = np.linspace(-0.5, 0.5, TRIED_VALUES)
         for window in WINDOWS:
-            for turn in range(max(map(len, ways))):
-                i = np.array([way[turn % len(way)] if way else 0 for way in ways])
+            for turn in range(max(map(len, variables))):
+                i = np.array([own[turn % len(own)] if own else 0 for own in variables])
                 span = (high - low)[i][:, np.newaxis]
                 middle = (
                     ((low + high) / 2.0)[i][:, np.newaxis] if window == 1.0 else z[k, s, i[:, np.newaxis]]
@@ -244,24 +219,23 @@ class DistanceSearch:
                 values = np.clip(
                     values, low[i][:, np.newaxis, np.newaxis], high[i][:, np.newaxis, np.newaxis]
                 )
-                tried = np.repeat(z[:, :, np.newaxis], ALONG, axis=2)
-                tried[
-                    k[..., np.newaxis], s[..., np.newaxis], np.arange(ALONG), i[:, np.newaxis, np.newaxis]
-                ] = values
-                off = self._own_distances(tried, frames)
-                at = off.argmax(axis=2)
-                better = off[k, s, at] > best
+                tried = np.repeat(z[:, :, np.newaxis], TRIED_VALUES, axis=2)
+                place = k[..., np.newaxis], s[..., np.newaxis], np.arange(TRIED_VALUES)
+                tried[*place, i[:, np.newaxis, np.newaxis]] = values
+                distances = self._own_distances(tried, frames)
+                at = distances.argmax(axis=2)
+                better = distances[k, s, at] > best
                 z = np.where(better[..., np.newaxis], tried[k, s, at], z)
-                best = np.where(better, off[k, s, at], best)
+                best = np.where(better, distances[k, s, at], best)
         at = best.argmax(axis=1)
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return distances (frames, starts, values) for values `z` (frames, starts, values, variables)."""
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # -1 fails for a robot without variables
-        off = self.metres(flat, frames).reshape(*z.shape[:-1], len(frames))
+        distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
-        return np.asarray(off[n, :, :, n])
+        return np.asarray(distances[n, :, :, n])
 
     def _variables_of(self, frame: FramePair) -> list[int]:
         """Return the indices of the variables that move a frame in A or in B."""
@@ -280,7 +254,7 @@ class DistanceSearch:
         return [i for i, name in enumerate(self.names) if name in names]
 
 
-def own_results(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
+def own_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by urdfkin's forward recursion."""
     return placements(*_flat_inputs(robot, q, frames))
 
@@ -291,126 +265,21 @@ def _flat_inputs(robot: Robot, q: FloatArray, frames: Sequence[str]) -> tuple[Co
     return robot.plan([tree.frame_link(frame) for frame in frames]), with_unit_quaternions(tree, q)
 
 
-def pinocchios(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
+def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
     """Return poses (n, frames, 4, 4) computed by Pinocchio from the robot's text."""
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
 
-_ORIGIN = np.zeros(3)
-_Vectors = tuple[Support, Support]
-
-
-def curvature(
-    steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
-) -> tuple[list[str], FloatArray]:
-    """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
-
-    The bounds hold for matched joints that one variable moves by the same factor. If another pair of joints
-    has an effect on D, all bounds are inf.
-    """
-    names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
-    found = np.zeros((len(names), len(names)))
-    for i, j, most in _second_derivatives(steps, pairs, variables, frame):
-        both = pairs[i], pairs[j]
-        if not all(one.a.slope or one.b.slope for one in both):
-            continue
-        alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
-        # For a prismatic joint i, `most` contains no difference between the values of the two joints.
-        if not all(alike) and (most or (steps[i].kind != "turns" and not alike[0])):
-            return names, np.full_like(found, math.inf)
-        if not most:
-            continue
-        bend = most * abs(pairs[i].a.slope * pairs[j].a.slope)
-        at, to = (names.index(pairs[k].a.variable) for k in (i, j))
-        found[at, to] += bend
-        if i != j:
-            found[to, at] += bend
-    return names, found
-
-
-def _second_derivatives(
-    steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
-) -> Iterator[tuple[int, int, float]]:
-    """Yield i, j and a bound on the second derivative with respect to joints i and j, for all j <= i."""
-    free = [_as_free_vectors(step) for step in steps]
-    d, y = at_the_frame(frame, COARSE)
-    for i in reversed(range(len(steps))):
-        first = _derivatives(steps[i], pairs[i], variables, d, y)
-        if steps[i].kind == "turns":
-            yield i, i, _pass_to_front(_cross_products(free[i], *first), free[: i + 1], pairs, variables)
-        vectors = before_it(free[i], *first)
-        for j in reversed(range(i)):
-            if steps[j].kind == "turns":
-                second = _derivatives(free[j], pairs[j], variables, *vectors)
-                yield i, j, _pass_to_front(second, free[: j + 1], pairs, variables)
-                vectors = passed(free[j], pairs[j], variables, *vectors)
-            else:
-                vectors = before_it(free[j], *vectors)
-        d, y = passed(steps[i], pairs[i], variables, d, y)
-
-
-def _pass_to_front(
-    vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
-) -> float:
-    """Return the largest length that d has at the base; `vectors` contains d and y at the last joint."""
-    vectors = before_it(steps[-1], *vectors)
-    for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
-        slides = step.kind != "turns"
-        vectors = before_it(step, *vectors) if slides else passed(step, pair, variables, *vectors)
-    return vectors[0].largest()
-
-
-def _derivatives(
-    step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
-) -> _Vectors:
-    """Return the derivatives of the vectors d and y with respect to a joint's value.
-
-    The module's text defines d and y. The derivatives are expressed in the frame behind the joint's constant
-    rigid motion L.
-    """
-    if step.kind != "turns":
-        u, other = step.axis.direction, step.other.direction
-        return point(d.grid, other - u), point(d.grid, other)
-    d, y = difference(step, pair, variables, y, d), y.turned(step.other, *variables.range(pair.b))
-    return _cross_products(step, d, y)
-
-
-def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
-    """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
-
-    If u and u' differ, their difference is added to the bound on u x d.
-    """
-    G, axis, other = d.grid.points, step.axis, step.other
-    most = 0.0
-    if other is not axis:
-        reach = Support(d.grid, y.values - G @ other.point).largest()
-        most = float(np.linalg.norm(other.direction - axis.direction)) * reach
-        most += float(np.linalg.norm(np.cross(axis.direction, axis.point - other.point)))
-    across, there = np.cross(G, axis.direction), np.cross(G, other.direction)
-    bent = Support(d.grid, d.at(across) + most * d.grid.lengths)
-    return bent, Support(d.grid, y.at(there) - there @ other.point)
-
-
-def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a pair of matched joints without its translations, which do not affect free vectors."""
-    axis = Screw(step.axis.direction, _ORIGIN)
-    other = axis if step.other is step.axis else Screw(step.other.direction, _ORIGIN)
-    before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
-    return replace(step, axis=axis, other=other, before=before)
-
-
-#: Largest number of boxes that exist at a time; a box is a range for each variable.
-#: With `MOST` boxes, the bound of a frame takes one or two seconds of processor time.
-MOST = 2**17
-#: Number of boxes computed in one batch. The Jacobians of more boxes would take gigabytes of memory.
-TOGETHER = 2**16
+#: Maximum number of boxes that exist at a time; the bound of a frame then takes one or two seconds.
+MOST_BOXES = 2**17
+#: Number of boxes computed in one batch; the Jacobians of more boxes would take gigabytes of memory.
+BATCH = 2**16
 
 
 class Boxes:
-    """Upper bounds on the distance between a frame's origin in A and in B.
+    """Upper bounds on the distance between a frame's origin in A and in B, each for a box of configurations.
 
-    A box is a range for each variable. Each bound is valid for all configurations in one box. `names` are the
-    names of the variables that change the distance (`moved_together` finds them).
+    A box is a range for each variable. `names` are the names of the variables that change the distance.
     """
 
     def __init__(self, search: DistanceSearch, frame: FramePair, names: Sequence[str]) -> None:
@@ -419,10 +288,10 @@ class Boxes:
         self.middle = search.ends.mean(axis=1)
         trees = [robot.tree for robot in search.robots]
         self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
-        # Poses of B are expressed in A's root frame.
         q = search.configurations(self.middle[np.newaxis])[1]
         base = trees[1].link_frames[search.found.base[1]]
-        self.seen = search.hold @ inverse(own_results(search.robots[1], q, [base])[0, 0])
+        #: (4, 4) pose of B's root in A's root frame.
+        self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
         #: (nv, variables) derivatives of each robot's joint values by the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
@@ -451,7 +320,7 @@ class Boxes:
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
         p_a, J_a = self._origin(a, q_a, self.frames[0], np.zeros(3))
         p_b, J_b = self._origin(b, q_b, self.frames[1], self.tool)
-        R, p = self.seen[:3, :3], self.seen[:3, 3]
+        R, p = self.T_a_b[:3, :3], self.T_a_b[:3, 3]
         return p_b @ R.T + p - p_a, R @ (J_b @ self.rates[1]) - J_a @ self.rates[0]
 
     def _origin(
@@ -466,24 +335,25 @@ class Boxes:
         return T[:, :3, 3] + lever, J[:, :3] + np.cross(J[:, 3:], lever[:, :, np.newaxis], axis=1)
 
 
-def tightened(
-    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST
+def tighten(
+    search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST_BOXES
 ) -> float:
-    """Return a proven upper bound (m) on a frame's distance, with at most `most` boxes at a time.
+    """Return a proven upper bound (m) on a frame's distance, computed with at most `most` boxes at a time.
 
-    If the search proves the bound `target`, the function returns `target`. Otherwise the function returns a
-    bound of at most `upper`, which is proven already.
+    The result is `target` if the function proves this bound, and otherwise at most the proven bound `upper`.
     """
     variables = search.variables
-    steps, pairs = moved_together(search.found, variables, frame)
+    steps, pairs = relevant_joints(search.found, variables, frame)
     some = [pair for pair in pairs if pair is not None]
-    all_round = all(
+    # The search covers one turn of an unlimited revolute joint, but no other unlimited range.
+    ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, some, strict=False)
         for line in (pair.a, pair.b)
         if line.slope and math.inf in np.abs(variables.ranges[line.variable])
     )
-    if not target < upper < math.inf or len(some) < len(pairs) or not (all(search.stands) and all_round):
+    is_possible = len(some) == len(pairs) and all(search.base_fixed) and ranges_are_covered
+    if not target < upper < math.inf or not is_possible:
         return upper
     names, M = curvature(steps, some, variables, frame)
     boxes = Boxes(search, frame, names)
@@ -494,51 +364,28 @@ def tightened(
     if not names:  # no variable changes the distance between the frame's poses in A and B
         return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
-        i = _longest(h, M)
+        i = _worst_variable(h, M)
         h[i] /= 2.0
         c, proven = np.repeat(c, 2, axis=0), np.repeat(proven, 2)
         c[::2, i] -= h[i]
         c[1::2, i] += h[i]
-        if (rest := 0.5 * float(h @ M @ h)) < upper:
-            bounds = [boxes.bounds(c[k : k + TOGETHER], h) for k in range(0, len(c), TOGETHER)]
-            proven = np.minimum(proven, np.concatenate(bounds) + rest)
+        if (second_order := 0.5 * float(h @ M @ h)) < upper:
+            bounds = [boxes.bounds(c[k : k + BATCH], h) for k in range(0, len(c), BATCH)]
+            proven = np.minimum(proven, np.concatenate(bounds) + second_order)
             keep = proven > target
             c, proven = c[keep], proven[keep]
     return float(proven.max(initial=target))
 
 
-def moved_together(
-    found: Alignment, variables: Variables, frame: FramePair
-) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
-
-    Most joints before the first difference of the models rotate D without a change of its length. A mimic
-    joint after the difference may depend on a joint before the difference. This earlier joint then changes
-    the length of D. So the result begins with the first joint that differs, or whose variable also moves a
-    joint after the first difference.
-    """
-    steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
-    first = len(steps) - len(behind_first(found, variables, frame)[0])
-    for i in reversed(range(first)):
-        if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # all joints from joint i to the first difference are included
-    return steps[first:], pairs[first:]
-
-
-def _variables(pairs: Sequence[MatchedValues | None]) -> set[str]:
-    lines = (line for pair in pairs if pair is not None for line in (pair.a, pair.b))
-    return {line.variable for line in lines if line.slope}
-
-
-def _longest(h: FloatArray, M: FloatArray) -> int:
+def _worst_variable(h: FloatArray, M: FloatArray) -> int:
     """Return the index of the variable that contributes most to the second-order term of the bound."""
     return int((h * (M @ h)).argmax())
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return how many times a box must be halved before the box can have a bound below `upper`."""
+    """Return how many times a box must be halved before its bound can be below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
-        h[_longest(h, M)] /= 2.0
+        h[_worst_variable(h, M)] /= 2.0
         count += 1
     return count

@@ -1,4 +1,4 @@
-"""Write the result of `urdfkin same` as a certificate, and recheck a certificate without a search."""
+"""Write the result of `urdfkin same` as a certificate, and check a certificate again without a search."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 
 import numpy as np
 
-from urdfkin.comparison.bounds import DistanceSearch, own_results, pinocchios, tightened
+from urdfkin.comparison.bounds import DistanceSearch, own_poses, pinocchio_poses, tighten
 from urdfkin.comparison.result import Confirmation, ConfirmationState, Difference, Sameness, Verdict
 from urdfkin.comparison.verdict import CONFIRMED, Comparator
 from urdfkin.errors import InputError, UnknownNameError
@@ -20,8 +20,8 @@ from urdfkin.model.mechanisms.mechanism import (
     Gauge,
     JointTransform,
     Variables,
-    apart,
     is_pose,
+    pose_difference,
     variables_of,
 )
 from urdfkin.model.mechanisms.upper_bound import COARSE, FINE, upper_bounds
@@ -30,14 +30,13 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, of_length, plain, says
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
-#: Largest number of boxes in memory while a bound of a certificate is proven again.
+#: Maximum number of boxes in memory while a bound of a certificate is proven again.
 MOST_AGAIN = 2**22
 #: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) near zero.
-#: Another machine, which wrote the certificate, may round differently.
+#: The tolerances allow for the rounding of another machine that wrote the certificate.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: A bound that is proven again may exceed the certificate's bound by this multiple of the machine epsilon.
-#: The reason is that another machine may round sums differently.
-_LAST_BITS = 64.0
+#: Relative tolerance of a bound that is proven again, in units of the machine epsilon.
+_BOUND_TOLERANCE = 64.0
 #: Entries that `recheck` computes again from the two models, and compares with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
 
@@ -45,10 +44,8 @@ DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links"
 class CertifiedModel(TypedDict):
     """Name and source of one of the two compared models."""
 
-    name: Annotated[str, says("The robot's name.")]
-    source: Annotated[
-        str, says("Source of the robot: a path, a catalogue name, - for standard input, or <text>.")
-    ]
+    name: Annotated[str, says("Name of the robot.")]
+    source: Annotated[str, says("Path, catalogue name, - for standard input, or <text>.")]
 
 
 class CertifiedRule(TypedDict):
@@ -68,20 +65,13 @@ class DifferenceEntry(TypedDict):
 
     place: Annotated[str, says("Name of the joint or link of A that differs.")]
     what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
-    a: Annotated[Value, says("Value of the parameter in A; null: A has none.")]
-    b: Annotated[Value, says("Value of the parameter in B; null: B has none.")]
-    radians: Annotated[
-        Size, says("Size of the difference as an angle, radians; 0 if the difference has no angle.")
-    ]
-    metres: Annotated[
-        Size, says("Size of the difference as a length, metres; 0 if the difference has no length.")
-    ]
+    a: Annotated[Value, says("Value of the parameter in A; null if A has none.")]
+    b: Annotated[Value, says("Value of the parameter in B; null if B has none.")]
+    radians: Annotated[Size, says("Angular part of the difference, radians; 0 if there is none.")]
+    metres: Annotated[Size, says("Linear part of the difference, metres; 0 if there is none.")]
     detail: Annotated[
         Literal["", "alone", "converted"],
-        says(
-            "`alone`: the links after the joint agree. `converted`: the limits of B are expressed in A's"
-            " coordinate."
-        ),
+        says("`alone`: the links after the joint agree. `converted`: B's limits are in A's coordinate."),
     ]
 
 
@@ -90,23 +80,19 @@ class CertifiedConversion(TypedDict):
 
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
-    back: Annotated[
-        bool, says("Whether the pose in A is inverted, because the joint is reversed in one model.")
-    ]
+    back: Annotated[bool, says("Whether the pose in A is inverted: one model has the joint reversed.")]
 
 
 class CertifiedJoint(TypedDict):
-    """A joint of A and the matching joint of B."""
+    """A joint of A and the matching joint of B: value in B = `sense` * value in A + `offset`."""
 
     a: Annotated[str, says("Name of the joint in A.")]
     b: Annotated[str, says("Name of the joint in B.")]
     sense: Annotated[Literal[1, -1], says("Factor `sense` in: value in B = `sense` * value in A + `offset`.")]
-    offset: Annotated[
-        float, says("Constant `offset` in: value in B = `sense` * value in A + `offset`, rad or m.")
-    ]
+    offset: Annotated[float, says("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
-        says("Conversion of a planar or floating joint's pose; null: no conversion is needed."),
+        says("Conversion of a planar or floating joint's pose; null if not needed."),
     ]
 
 
@@ -126,28 +112,15 @@ class Rounding(TypedDict):
 
 
 class FrameEntry(TypedDict):
-    """The interval that contains the largest distance between a frame of A and the matching frame of B."""
+    """An interval that contains the largest distance between a frame of A and the matching frame of B."""
 
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
-    lower: Annotated[
-        Size, says("Lower bound of the largest distance, metres; it is attained at `q_a` and `q_b`.")
-    ]
-    upper: Annotated[
-        Size | None,
-        says(
-            "Proven upper bound of the distance in all configurations within limits, metres; null: no bound."
-        ),
-    ]
-    radians: Annotated[
-        Size | None,
-        says("Proven upper bound of the angle between the orientations, radians; null: no bound."),
-    ]
+    lower: Annotated[Size, says("Lower bound of the largest distance, metres: the distance at `q_a`, `q_b`.")]
+    upper: Annotated[Size | None, says("Proven upper bound of the distance, metres; null without a bound.")]
+    radians: Annotated[Size | None, says("Proven upper bound of the angle, radians; null without a bound.")]
     radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
-    q_a: Annotated[
-        list[float],
-        says("Configuration of A at which the lower bound is attained; empty if the frame does not differ."),
-    ]
+    q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
     q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
 
 
@@ -156,9 +129,7 @@ class Confirmed(TypedDict):
 
     state: Annotated[ConfirmationState, says("Whether the oracle confirmed the bounds.")]
     by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
-    configurations: Annotated[
-        Count, says("Number of configurations at which the oracle computed the distances.")
-    ]
+    configurations: Annotated[Count, says("Number of configurations of the oracle's check.")]
     metres: Annotated[Size, says("Largest distance that the oracle computed, metres.")]
     reason: Annotated[str, says("Reason why the oracle computed no distances; empty if it computed them.")]
 
@@ -170,26 +141,17 @@ class SameCertificate(Header):
     b: CertifiedModel
     up_to: Annotated[
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
-        says("Kinds of changes that are applied to B so that the models agree best."),
+        says("Kinds of changes of B with which the models agree best."),
     ]
-    differences: Annotated[
-        list[DifferenceEntry], says("Differences between the models, in order from the base to the tips.")
-    ]
+    differences: Annotated[list[DifferenceEntry], says("Differences, in order from the base to the tips.")]
     remarks: Annotated[
         list[DifferenceEntry],
         says("Differences without effect on motion: limits, joint kinds, and links that only one model has."),
     ]
     joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
-    links: Annotated[
-        list[Annotated[list[str], of_length(2)]], says("Matched pairs of a link of A and a link of B.")
-    ]
-    tools: Annotated[
-        list[ToolEntry], says("Matched links whose poses differ; they count as different tools.")
-    ]
-    orders: Annotated[
-        list[list[str]],
-        says("Lists of adjacent joints of B that were compared in another order, which their axes allow."),
-    ]
+    links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
+    tools: Annotated[list[ToolEntry], says("Matched links whose poses differ, as those of different tools.")]
+    orders: Annotated[list[list[str]], says("Adjacent joints of B that were compared in this other order.")]
     base: Annotated[Matrix, says("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
         list[str], of_length(2), says("The link of A and the link of B in whose frames poses are compared.")
@@ -201,10 +163,7 @@ class SameCertificate(Header):
     ]
     as_written: Annotated[
         FrameEntry | None,
-        says(
-            "Interval of the largest distance of the farthest frame without any change of B; null: B"
-            " needs no change."
-        ),
+        says("Interval of the farthest frame without any change of B; null if B needs no change."),
     ]
     checked: Confirmed
 
@@ -215,25 +174,27 @@ SAME = DocumentKind(
 )
 
 
-def certificate(found: Sameness, command: str | None = None) -> SameCertificate:
-    """Return the certificate: joint map, verdict, differences, and intervals; null: there is no bound."""
-    a, b = ({"name": name, "source": source} for name, source in zip(found.names, found.sources, strict=True))
+def certificate(result: Sameness, command: str | None = None) -> SameCertificate:
+    """Return the certificate of a result; `command` is the command line that computed the result."""
+    a, b = (
+        {"name": name, "source": source} for name, source in zip(result.names, result.sources, strict=True)
+    )
     document = {
         "schema": SAME.name,
         "versions": versions(),
-        "sha256": found.digests,
-        "verdict": found.verdict,
+        "sha256": result.digests,
+        "verdict": result.verdict,
         "command": command,
         "a": a,
         "b": b,
-        **{name: getattr(found, name) for name in _TAKEN_OVER},
-        "rounding": dict(zip(("metres", "radians"), found.rounding, strict=True)),
+        **{name: getattr(result, name) for name in _COPIED},
+        "rounding": dict(zip(("metres", "radians"), result.rounding, strict=True)),
     }
     return cast("SameCertificate", plain(document))
 
 
-#: Attributes of `Sameness` with the same name in the certificate.
-_TAKEN_OVER = (
+#: Attributes of `Sameness` that have the same name in the certificate.
+_COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
 )  # fmt: skip
@@ -249,16 +210,15 @@ def words_of(entry: DifferenceEntry) -> str:
 
 
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
-    """Check a certificate against two models, and return its wrong statements; none: it is right.
+    """Check a certificate against two models, and return a line of text for each wrong statement.
 
     The certificate states which joints match, and how the coordinates of A are converted to those of B. The
-    recheck uses these statements, so it needs no search. Only the verdict "differs" needs one, because
-    another alignment could make the models agree. First, the function checks the statements. The
-    transforms must be rigid motions, and the named joints must exist. If the certificate changes the order of
-    joints, the new order must give the same motion. Then the function computes the verdict, the changes and
-    the remarks again, and compares them with the certificate. A lower bound is a distance at a configuration
-    in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound is proven
-    again.
+    function checks these statements. The transforms must be rigid motions, and the named joints must exist.
+    If the certificate changes the order of joints, the new order must give the same motion. The function
+    then uses the statements, so it needs no search. Only the verdict "differs" needs a search, because
+    another alignment could make the models agree. The function computes the verdict, the changes and the
+    remarks again, and compares them with the certificate. A lower bound is a distance at a configuration in
+    the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound is proven again.
 
     Raises:
         InputError: the certificate was made for models with other texts, or names a joint or link that a
@@ -282,85 +242,80 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
 
 def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
     gauge = _gauge(document)
-    if (why := _not_a_gauge(document, gauge, comparator)) is not None:
-        yield why
+    if (error := _gauge_error(document, gauge, comparator)) is not None:
+        yield error
         return
-    found = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
-    variables = variables_of(found, comparator.tolerance)
-    said = comparator.said(found, variables)
-    wrong = list(_statement_errors(document, comparator, said))
+    alignment = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
+    variables = variables_of(alignment, comparator.tolerance)
+    result = comparator.result_without_bounds(alignment, variables)
+    wrong = list(_statement_errors(document, comparator, result))
     yield from wrong
     claims = {(frame["frame"], frame["frame_b"]): frame for frame in document["frames"]}
     if len(claims) < len(document["frames"]):
         yield "`frames`: a frame has two intervals"
-    search = comparator.search(found, variables)
-    for frame, names in zip(found.frames, said.links, strict=True):
+    search = comparator.search(alignment, variables)
+    for frame, names in zip(alignment.frames, result.links, strict=True):
         if (claim := claims.pop(names, None)) is None:
             yield f"frame {names[0]} has no interval"
         else:
-            yield from _interval_errors(search, frame, claim, said.rounding, sharply=not wrong)
+            yield from _interval_errors(search, frame, claim, result.rounding, sharply=not wrong)
     yield from (f"frame {names[0]} is not a common frame of the models" for names in claims)
     if document["verdict"] == Verdict.DIFFERS.value and not wrong:
         other = comparator.alignment()
-        better = comparator.said(other, variables_of(other, comparator.tolerance)).verdict
+        better = comparator.result_without_bounds(other, variables_of(other, comparator.tolerance)).verdict
         if better is not Verdict.DIFFERS:
             yield f"`verdict`: another alignment of B with A gives {better.value}, not differs"
-    if said.after:
-        yield from _as_written_errors(document["as_written"], comparator, found, sharply=not wrong)
+    if result.after:
+        yield from _as_written_errors(document["as_written"], comparator, alignment, sharply=not wrong)
     elif document["as_written"] is not None:
         yield "`as_written`: B needs no changes, so this entry must be null"
-    yield from _confirmation_errors(document["checked"], comparator, found, variables)
+    yield from _confirmation_errors(document["checked"], comparator, alignment, variables)
 
 
-def _statement_errors(document: SameCertificate, comparator: Comparator, said: Sameness) -> Iterator[str]:
-    """Yield errors in entries without a proof: names, verdict, differences, tools, and `DERIVED` entries."""
+def _statement_errors(document: SameCertificate, comparator: Comparator, result: Sameness) -> Iterator[str]:
     models = document["a"], document["b"]
     for which, model, robot in zip("AB", models, comparator.robots, strict=True):
         if model["name"] != robot.name:
             yield f"model {which}: its name is {robot.name}, not {model['name']}"
-    again = certificate(said)
-    wrong = {_place(one): one for one in again["differences"]}
-    claimed = {_place(one): one for one in document["differences"]}
-    for at, one in wrong.items():
-        if at not in claimed:
+    correct = certificate(result)
+    expected = {(one["place"], one["what"]): one for one in correct["differences"]}
+    claimed = {(one["place"], one["what"]): one for one in document["differences"]}
+    for key, one in expected.items():
+        if key not in claimed:
             yield f"`differences`: this difference is missing: {words_of(one)}"
-    for at, one in claimed.items():
-        if at not in wrong:
+    for key, one in claimed.items():
+        if key not in expected:
             yield f"`differences`: this is not a difference: {words_of(one)}"
     if len(claimed) < len(document["differences"]):
         yield "`differences`: an entry is listed twice"
-    for at, one in claimed.items():
-        if at in wrong and not _same_difference(one, wrong[at], said.rounding):
+    for key, one in claimed.items():
+        if key in expected and not _same_difference(one, expected[key], result.rounding):
             yield f"`differences`: the size or a value is wrong in: {words_of(one)}"
-    if not _equal(document["tools"], again["tools"], max(said.rounding)):
+    if not _equal(document["tools"], correct["tools"], max(result.rounding)):
         yield "`tools`: the entries differ from those computed from the models"
-    if document["verdict"] != said.verdict.value:
-        yield f"`verdict`: the models give {said.verdict.value}, not {document['verdict']}"
-    parts, right = dict(document), dict(again)
+    if document["verdict"] != result.verdict.value:
+        yield f"`verdict`: the models give {result.verdict.value}, not {document['verdict']}"
     yield from (
-        f"`{part}`: the entry differs from the one computed from the models"
-        for part in DERIVED
-        if not _equal(parts[part], right[part])
+        f"`{name}`: the entry differs from the one computed from the models"
+        for name in DERIVED
+        if not _equal(dict(document)[name], dict(correct)[name])
     )
 
 
-def _place(one: DifferenceEntry) -> tuple[str, str]:
-    return one["place"], one["what"]
-
-
-def _same_difference(claimed: DifferenceEntry, said: DifferenceEntry, rounding: tuple[float, float]) -> bool:
+def _same_difference(
+    claimed: DifferenceEntry, expected: DifferenceEntry, rounding: tuple[float, float]
+) -> bool:
     """Return whether two entries describe the same difference; metres and radians may differ by rounding."""
     return (
-        all(_equal(claimed[part], said[part]) for part in ("a", "b", "detail"))
-        and math.isclose(claimed["metres"], said["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
-        and math.isclose(claimed["radians"], said["radians"], rel_tol=_RELATIVE, abs_tol=rounding[1])
+        all(_equal(claimed[part], expected[part]) for part in ("a", "b", "detail"))
+        and math.isclose(claimed["metres"], expected["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
+        and math.isclose(claimed["radians"], expected["radians"], rel_tol=_RELATIVE, abs_tol=rounding[1])
     )
 
 
 def _confirmation_errors(
-    claimed: Confirmed, comparator: Comparator, found: Alignment, variables: Variables
+    claimed: Confirmed, comparator: Comparator, alignment: Alignment, variables: Variables
 ) -> Iterator[str]:
-    """Yield wrong statements about Pinocchio's check; a certificate without confirmation makes none."""
     state, reason = claimed["state"], claimed["reason"]
     if state != "confirmed" and reason and claimed == plain(Confirmation(state, reason=reason)):
         return
@@ -371,87 +326,85 @@ def _confirmation_errors(
             " for its absence"
         )
         return
-    off = float(comparator.pinocchio_distances(found, variables).max(initial=0.0))
-    rounding = comparator.rounding(found, variables)[0]
-    if not math.isclose(claimed["metres"], off, rel_tol=_RELATIVE, abs_tol=rounding):
-        yield f"`checked`: Pinocchio finds at most {off:.2g} m, not {claimed['metres']:.2g} m"
+    metres = float(comparator.pinocchio_distances(alignment, variables).max(initial=0.0))
+    rounding = comparator.rounding(alignment, variables)[0]
+    if not math.isclose(claimed["metres"], metres, rel_tol=_RELATIVE, abs_tol=rounding):
+        yield f"`checked`: Pinocchio finds at most {metres:.2g} m, not {claimed['metres']:.2g} m"
 
 
 def _gauge(document: SameCertificate) -> Gauge:
-    """Return the transforms, offsets and joint orders with which a certificate aligns B with A."""
     joints, base = document["joints"], document["base_links"]
     return Gauge(
         (base[0], base[1]),
         np.array(document["base"]),
         {one["a"]: (one["sense"], one["offset"]) for one in joints},
         {
-            one["a"]: JointTransform(np.array(made["before"]), np.array(made["behind"]), made["back"])
+            one["a"]: JointTransform(np.array(given["before"]), np.array(given["behind"]), given["back"])
             for one in joints
-            if (made := one["conversion"]) is not None
+            if (given := one["conversion"]) is not None
         },
         tuple(tuple(names) for names in document["orders"]),
     )
 
 
-def _not_a_gauge(document: SameCertificate, gauge: Gauge, comparator: Comparator) -> str | None:
-    """Return the reason why the certificate's alignment of B with A is not allowed; None if it is allowed."""
+def _gauge_error(document: SameCertificate, gauge: Gauge, comparator: Comparator) -> str | None:
+    """Return the reason why the certificate's alignment of B with A is not allowed, or None."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
         b.tree.joint_index(joint["b"])
     if not is_pose(JointKind.FLOATING, gauge.X):
         return "`base`: the matrix is not a rigid motion"
-    for name, made in gauge.conversions.items():
-        if not made.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
+    for name, conversion in gauge.conversions.items():
+        if not conversion.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in gauge.orders:
-        if not b.may_be_taken(names, comparator.tolerance):
+        if not b.allows_order(names, comparator.tolerance):
             return f"`orders`: the axes do not allow the order {', '.join(names)}"
-        b = b.in_order(names)
+        b = b.reordered(names)
     return None
 
 
-def _equal(claimed: Any, said: Any, zero: float = _ZERO) -> bool:
-    """Return whether two parts of a certificate are equal; the last digits of numbers may differ."""
-    if isinstance(said, dict):
+def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
+    """Return whether two entries of certificates are equal; the last digits of numbers may differ."""
+    if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
-            and claimed.keys() == said.keys()
-            and all(_equal(claimed[key], said[key], zero) for key in said)
+            and claimed.keys() == expected.keys()
+            and all(_equal(claimed[key], expected[key], zero) for key in expected)
         )
-    if isinstance(said, list):
+    if isinstance(expected, list):
         return (
             isinstance(claimed, list)
-            and len(claimed) == len(said)
-            and all(_equal(*pair, zero) for pair in zip(claimed, said, strict=True))
+            and len(claimed) == len(expected)
+            and all(_equal(*pair, zero) for pair in zip(claimed, expected, strict=True))
         )
-    if isinstance(said, float) and isinstance(claimed, float | int):
-        return math.isclose(claimed, said, rel_tol=_RELATIVE, abs_tol=zero)
-    return bool(claimed == said)
+    if isinstance(expected, float) and isinstance(claimed, float | int):
+        return math.isclose(claimed, expected, rel_tol=_RELATIVE, abs_tol=zero)
+    return bool(claimed == expected)
 
 
 def _as_written_errors(
-    claim: FrameEntry | None, comparator: Comparator, found: Alignment, *, sharply: bool
+    claim: FrameEntry | None, comparator: Comparator, alignment: Alignment, *, sharply: bool
 ) -> Iterator[str]:
     """Yield wrong statements about the largest distance between the unchanged models."""
-    written = comparator.as_written(found)
+    written = comparator.as_written(alignment)
     if claim is None:
         if written.frames:
             yield "`as_written`: the largest distance without changes of B is missing"
         return
     variables = variables_of(written, comparator.tolerance)
-    names = [
-        (comparator.trees[0].links[frame.a], comparator.trees[1].links[frame.b]) for frame in written.frames
-    ]
-    if (claim["frame"], claim["frame_b"]) not in names:
+    links = [tree.links for tree in comparator.trees]
+    frames = {(links[0][frame.a], links[1][frame.b]): frame for frame in written.frames}
+    if (frame := frames.get((claim["frame"], claim["frame_b"]))) is None:
         yield f"`as_written`: frame {claim['frame']} is not a common frame of the models"
         return
-    frame = written.frames[names.index((claim["frame"], claim["frame_b"]))]
     search = comparator.search(written, variables, as_written=True)
     rounding = comparator.rounding(written, variables)
-    off = search.seen(written.frames)[0].max(axis=0)
-    if claim["upper"] is not None and off.max() > claim["upper"] + rounding[0]:
-        yield f"`as_written`: frame {names[int(off.argmax())][0]} is {off.max():.6g} m off, which is farther"
+    distances = search.sampled_distances(written.frames)[0].max(axis=0)
+    if claim["upper"] is not None and distances.max() > claim["upper"] + rounding[0]:
+        farthest = links[0][written.frames[int(distances.argmax())].a]
+        yield f"`as_written`: frame {farthest} is {distances.max():.6g} m off, which is farther"
     problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
     yield from (f"`as_written`: {line}" for line in problems)
 
@@ -467,12 +420,11 @@ def _interval_errors(
     """Yield the wrong statements about an interval: compute its lower bound again, prove the upper bounds.
 
     Two frames are treated as equal if they differ by at most `rounding` (m, rad). If `sharply` is true, an
-    upper bound may be proven by branch and bound. This proof is slow, and the caller skips it if another part
-    of the certificate is wrong.
+    upper bound may be proven by branch and bound, which is slow.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
-        problems += _not_attained(search, frame, claim, rounding)
+        problems += _lower_bound_errors(search, frame, claim, rounding)
     yield from problems
     most = math.inf if claim["upper"] is None else claim["upper"]
     widest = math.inf if claim["radians"] is None else claim["radians"]
@@ -491,39 +443,35 @@ def _interval_errors(
     if _within(proven[1], radians, rounding[1]):
         if problems or not sharply:
             return
-        # A claimed upper bound is wrong if the models reach a larger distance.
-        attained = max(claim["lower"], float(search.seen([frame])[0].max()))
+        attained = max(claim["lower"], float(search.sampled_distances([frame])[0].max()))
         if metres < attained - 2.0 * rounding[0]:
             yield f"{place}: its upper bound is wrong: {attained:.6g} m is attained"
             return
         if not search.unbounded:
-            proven = tightened(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
+            proven = tighten(search, frame, metres, proven[0], MOST_AGAIN), proven[1]
         if _within(proven[0], metres, rounding[0]):
             return
     yield f"{place}: its upper bound is not proven; {proven[0]:.6g} m and {proven[1]:.6g} rad are proven"
 
 
-def _not_attained(
+def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Yield the reasons why the lower bound of an interval is wrong.
-
-    Either the configurations `q_a` and `q_b` are invalid, or urdfkin or Pinocchio computes a smaller distance
-    or angle there than the certificate states.
-    """
+    """Yield errors if `q_a` and `q_b` are invalid, or if a distance or angle there is smaller than stated."""
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
-    if not search.belong_together(q_a, q_b):
+    if not search.correspond(q_a, q_b):
         yield f"{place}: the configurations of A and B do not correspond, or exceed the limits"
         return
-    for computed, by in ((own_results, "urdfkin"), (pinocchios, "Pinocchio")):
-        turned, off = apart(*(Ts[0, 0] for Ts in search.poses_at(q_a, q_b, [frame], computed)))
-        if off < claim["lower"] - rounding[0]:
-            yield f"{place}: {by} finds {off:.6g} m at its configuration, not {claim['lower']:.6g} m"
-        if turned < claim["radians_seen"] - rounding[1]:
-            yield f"{place}: {by} finds {turned:.6g} rad there, not {claim['radians_seen']:.6g} rad"
+    for computed, by in ((own_poses, "urdfkin"), (pinocchio_poses, "Pinocchio")):
+        poses = search.poses_at(q_a, q_b, [frame], computed)
+        radians, metres = pose_difference(*(T[0, 0] for T in poses))
+        if metres < claim["lower"] - rounding[0]:
+            yield f"{place}: {by} finds {metres:.6g} m at its configuration, not {claim['lower']:.6g} m"
+        if radians < claim["radians_seen"] - rounding[1]:
+            yield f"{place}: {by} finds {radians:.6g} rad there, not {claim['radians_seen']:.6g} rad"
 
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:
     """Return whether the proven bound is at most the claimed bound, except for rounding."""
-    return proven <= claimed + rounding + _LAST_BITS * EPS * abs(claimed) if math.isfinite(claimed) else True
+    return proven <= claimed + rounding + _BOUND_TOLERANCE * EPS * abs(claimed) or not math.isfinite(claimed)

@@ -18,6 +18,7 @@ from urdfkin.comparison.result import (
     angle,
     length,
     limit_differences,
+    size_words,
     up_to,
 )
 from urdfkin.comparison.verdict import same
@@ -36,13 +37,13 @@ from urdfkin.urdf.writer import to_urdf
 
 #: Names of the numbers in a URDF attribute with several numbers.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
-#: Values of joint attributes that a file omits.
-_DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
-_AXIS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
-_RULE = {"mimic multiplier": 1.0, "mimic offset": 0.0}
+#: Default values of joint attributes: for every joint, for a joint with an axis, and for a mimic joint.
+_ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
+_AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
+_MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Changes of a link that move it, if the files have different formats.
+#: Changes of a link that displace the link, in a comparison of two formats.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -57,7 +58,7 @@ class ModelChange:
         what: The attribute, for example "origin x" or "mass"; "" if the whole element was added or removed.
         old: The value in the old version; None if the old version has no value.
         new: The value in the new version; None if the new version has no value.
-        size: For files of two formats, a text with the size of the change; otherwise empty.
+        size: A text with the size of the change, in a comparison of two formats; otherwise empty.
     """
 
     element: str
@@ -90,7 +91,7 @@ def word(value: Value | None) -> str:
 
 
 def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
-    """Return words for the distance by which changes move a frame, or for the angle of a pure rotation."""
+    """Return the distance by which changes move a frame as text, or the angle of a pure rotation."""
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -98,7 +99,7 @@ def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> s
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The effect of one joint's changes: the frame that moves most, and the distance by which it moves."""
+    """The effect of one joint's changes: the frame with the largest displacement, and this displacement."""
 
     element: str
     interval: Interval
@@ -121,9 +122,9 @@ class Changes:
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each changed joint that moves links, the effect if only this joint is changed.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
-        rounding: (m, rad) bound on the pose error of any frame. This error is caused by the single precision
-            of USD files. The bound is None if the files also have other differences. The bound is infinite if
-            it was not computed. The attribute `changes` does not contain this error.
+        rounding: (m, rad) bound on the pose error of any frame by the single precision of USD files, which is
+            not listed in `changes`. None if the files also have other differences; infinite if the bound was
+            not computed.
     """
 
     sources: tuple[str, str]
@@ -167,81 +168,76 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
         return _across_formats(old, new, effects=effects)
     changes = tuple(_changes(old.urdf, new.urdf))
     moving = list(dict.fromkeys(change.element for change in changes if change.moves)) if effects else []
-    some = (_effect(old.tree, new.tree, element, element.removeprefix("joint ")) for element in moving)
+    found = [_effect(old.tree, new.tree, element, element.removeprefix("joint ")) for element in moving]
     total = same(old, new).worst_as_written if moving else None
-    return Changes((old.source, new.source), changes, tuple(one for one in some if one is not None), total)
+    return Changes((old.source, new.source), changes, tuple(filter(None, found)), total)
 
 
 def _format(robot: Robot) -> str:
-    """Return the format of a robot's source; a Denavit-Hartenberg table counts as URDF."""
+    """Return the format of a robot's source: "USD", "MJCF", or "URDF" for all other sources."""
     if is_usd(robot.source):
         return "USD"
     return "MJCF" if robot.origin.sha256 else "URDF"
 
 
 def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
-    found = same(old, new, bounds=effects)
-    changes = tuple(_changes_of(found, (_format(old), _format(new))))
-    moving = [one.element for one in changes if one.moves and one.element != "robot"]
-    some = list[Effect | None]()
+    result = same(old, new, bounds=effects)
+    changes = tuple(_changes_of(result, (_format(old), _format(new))))
+    found = list[Effect | None]()
     if effects:
-        tree = _renamed(found)
+        tree = _renamed(result)
+        moving = [one.element for one in changes if one.moves and one.element != "robot"]
         for element in dict.fromkeys(moving):
             kind, _, name = element.partition(" ")
             if kind == "link" and (link := old.tree.link_index(name)):
                 name = old.tree.joints[link - 1].name
-            some.append(_effect(old.tree, tree, element, name))
-    total = found.worst_as_written if any(change.moves for change in changes) else None
-    rounding = found.written if found.up_to_single else None
-    all_effects = tuple(one for one in some if one is not None)
-    return Changes((old.source, new.source), changes, all_effects, total, rounding)
+            found.append(_effect(old.tree, tree, element, name))
+    total = result.worst_as_written if any(change.moves for change in changes) else None
+    rounding = result.written if result.up_to_single else None
+    return Changes((old.source, new.source), changes, tuple(filter(None, found)), total, rounding)
 
 
-def _changes_of(found: Sameness, formats: tuple[str, str]) -> Iterator[ModelChange]:
+def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelChange]:
     """Yield the differences of joints, then all other differences, then names and remarks."""
-    for at in found.unexplained:
+    for at in result.unexplained:
         if at.what and at.a is None:
             yield ModelChange(at.place, at.what, None, None, str(at.b))
         elif at.what:
             yield ModelChange(at.place, at.what, at.a, at.b)
-    yield from _not_compared(found)
-    for one in found.differences:
+    yield from _differences_in_size(result)
+    for one in result.differences:
         if one.what not in BOUNDED or one.what == "fixed":
             yield from _change_of(one)
-    for pair in found.joints:
+    for pair in result.joints:
         if pair.b not in spellings(pair.a) and pair.a not in spellings(pair.b):
             yield ModelChange(f"joint {pair.a}", "name", pair.a, pair.b)
         a, b = (
             tree.joints[tree.joint_index(name)]
-            for tree, name in zip(found.trees, (pair.a, pair.b), strict=True)
+            for tree, name in zip(result.trees, (pair.a, pair.b), strict=True)
         )
         if a.kind.nv == b.kind.nv and a.kind.turns == b.kind.turns:
-            single = SINGLE if found.single else 0.0
-            for one in limit_differences(a, b, found.rounding[1], single):
+            single = SINGLE if result.single else 0.0
+            for one in limit_differences(a, b, result.rounding[1], single):
                 yield from _change_of(one)
-    for one in found.remarks:
+    # The readers of MJCF and USD add the link "world" as the root.
+    roots = [tree.links[0] for tree, name in zip(result.trees, formats, strict=True) if name != "URDF"]
+    for one in result.remarks:
         if one.what in ("idle", "only in A", "only in B"):
-            yield from (change for change in _change_of(one) if not _is_world(found, formats, change))
+            yield from (
+                change for change in _change_of(one) if change.element != "link world" or "world" not in roots
+            )
 
 
-def _not_compared(found: Sameness) -> Iterator[ModelChange]:
+def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
     """Yield the differences that `same` finds, if some joint of the models cannot be compared."""
-    if found.up_to_single or (found.unexplained and all(one.what for one in found.unexplained)):
+    if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
-    listed = {one.place for one in found.unexplained if one.what}
-    for words in found.after:
+    listed = {one.place for one in result.unexplained if one.what}
+    for words in result.after:
         yield ModelChange("robot", "as a whole", None, None, words)
-    for one in found.differences:
+    for one in result.differences:
         if one.what in BOUNDED - {"fixed"} and one.place not in listed:
-            sizes = [f"{length(one.metres)} off"] if one.metres else []
-            sizes += [f"turned by {angle(one.radians)}"] if one.radians else []
-            yield ModelChange(one.place, one.what, *one.values, " and ".join(sizes))
-
-
-def _is_world(found: Sameness, formats: tuple[str, str], change: ModelChange) -> bool:
-    """Return whether a change is only the link "world", which the readers of MJCF and USD add as the root."""
-    roots = [tree.links[0] for tree, name in zip(found.trees, formats, strict=True) if name != "URDF"]
-    return change.element == "link world" and "world" in roots
+            yield ModelChange(one.place, one.what, *one.values, size_words(one.metres, one.radians))
 
 
 def _change_of(one: Difference) -> Iterator[ModelChange]:
@@ -250,82 +246,82 @@ def _change_of(one: Difference) -> Iterator[ModelChange]:
         return
     names = [one.place]
     if one.place.startswith("links "):
-        there = one.a if one.what == "only in A" else one.b
-        names = [f"link {name}" for name in there] if isinstance(there, tuple) else []
+        links = one.a if one.what == "only in A" else one.b
+        names = [f"link {name}" for name in links] if isinstance(links, tuple) else []
     for name in names:
         tag = name.partition(" ")[0]
         old, new = (tag, None) if one.what == "only in A" else (None, tag)
         yield ModelChange(name, "", old, new)
 
 
-def _renamed(found: Sameness) -> KinematicTree:
+def _renamed(result: Sameness) -> KinematicTree:
     """Return B's tree, in which each matched joint and link has A's name."""
-    tree = found.trees[1]
-    links = {theirs: ours for ours, theirs in found.links}
-    joints = {one.b: one.a for one in found.joints}
+    old, tree = result.trees
+    links = {theirs: ours for ours, theirs in result.links}
+    names = {one.b: one.a for one in result.joints}
     for i, joint in enumerate(tree.joints):  # a fixed joint gets the name of A's joint with the same link
         link = links.get(tree.links[i + 1])
-        if joint.name not in joints and link in found.trees[0].links[1:]:
-            joints[joint.name] = found.trees[0].joints[found.trees[0].link_index(link) - 1].name
+        if joint.name not in names and link in old.links[1:]:
+            names[joint.name] = old.joints[old.link_index(link) - 1].name
 
     def rule(joint: Joint) -> Mimic | None:
-        return joint.mimic and replace(joint.mimic, leader=joints.get(joint.mimic.leader, joint.mimic.leader))
+        return joint.mimic and replace(joint.mimic, leader=names.get(joint.mimic.leader, joint.mimic.leader))
 
-    made = tuple(
-        replace(joint, name=joints.get(joint.name, joint.name), mimic=rule(joint)) for joint in tree.joints
+    joints = tuple(
+        replace(joint, name=names.get(joint.name, joint.name), mimic=rule(joint)) for joint in tree.joints
     )
-    return KinematicTree(tree.name, tuple(links.get(link, link) for link in tree.links), made)
+    return KinematicTree(tree.name, tuple(links.get(link, link) for link in tree.links), joints)
 
 
 def _changes(old: str, new: str) -> Iterator[ModelChange]:
-    before, after = plain_xml(old), plain_xml(new)
-    if before.get("name") != after.get("name"):
-        yield ModelChange("robot", "name", before.get("name"), after.get("name"))
+    roots = plain_xml(old), plain_xml(new)
+    names = roots[0].get("name"), roots[1].get("name")
+    if names[0] != names[1]:
+        yield ModelChange("robot", "name", *names)
     for tag in ("joint", "link"):
-        was, now = ({str(e.get("name")): e for e in root.findall(tag)} for root in (before, after))
-        for name in dict.fromkeys([*was, *now]):
+        before, after = ({str(e.get("name")): e for e in root.findall(tag)} for root in roots)
+        for name in dict.fromkeys([*before, *after]):
             element = f"{tag} {name}"
-            if name not in was or name not in now:
-                old_tag, new_tag = (tag if name in there else None for there in (was, now))
+            if name not in before or name not in after:
+                old_tag, new_tag = (tag if name in there else None for there in (before, after))
                 yield ModelChange(element, "", old_tag, new_tag)
                 continue
-            facts, others = (_facts(e, tag) for e in (was[name], now[name]))
-            for what in dict.fromkeys([*facts, *others]):
-                if facts.get(what) != others.get(what):
-                    yield ModelChange(element, what, facts.get(what), others.get(what))
+            a, b = (_all_attributes(e, tag) for e in (before[name], after[name]))
+            for what in dict.fromkeys([*a, *b]):
+                if a.get(what) != b.get(what):
+                    yield ModelChange(element, what, a.get(what), b.get(what))
 
 
-def _facts(element: Element, tag: str) -> dict[str, Value]:
-    """Return the attributes of an element and its children, by names such as "origin x"."""
+def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
+    """Return the attributes of an element and its children, with defaults, by names such as "origin x"."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
-        defaults: dict[str, Value] = dict(_DEFAULTS)
-        defaults |= _AXIS if found.get("type") not in ("fixed", "floating") else {}
-        defaults |= _RULE if "mimic joint" in found else {}
+        defaults: dict[str, Value] = dict(_ORIGIN_DEFAULTS)
+        defaults |= _AXIS_DEFAULTS if found.get("type") not in ("fixed", "floating") else {}
+        defaults |= _MIMIC_DEFAULTS if "mimic joint" in found else {}
         found = defaults | found
     return found
 
 
-def _attributes(element: Element, way: str) -> Iterator[tuple[str, Value]]:
+def _attributes(element: Element, path: str) -> Iterator[tuple[str, Value]]:
     for name, text in element.attrib.items():
         if (parts := _PARTS.get(name)) and len(words := text.split()) == len(parts):
-            yield from (
-                (f"{way} {part}".strip(), _value(word)) for part, word in zip(parts, words, strict=True)
-            )
+            for part, number in zip(parts, words, strict=True):
+                yield f"{path} {part}".strip(), _value(number)
         else:
-            named = way if name in ("value", "link") and way else f"{way} {name}".strip()
-            yield named, _value(text)
+            what = path if name in ("value", "link") and path else f"{path} {name}".strip()
+            yield what, _value(text)
     tags = [child.tag for child in element]
     for k, child in enumerate(element):
         if isinstance(child.tag, str):
             count = f" {tags[: k + 1].count(child.tag)}" if tags.count(child.tag) > 1 else ""
-            yield from _attributes(child, f"{way} {child.tag}{count}".strip())
+            yield from _attributes(child, f"{path} {child.tag}{count}".strip())
 
 
 def _value(text: str) -> Value:
-    found = parse_float(text)
-    return text if found is None else found
+    number = parse_float(text)
+    return text if number is None else number
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
@@ -333,22 +329,22 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None
-    at, there = old.joint_index(name), new.joint_index(name)
-    joint = new.joints[there]
-    ends = [(tree.links[tree.joints[i].parent], tree.links[i + 1]) for tree, i in ((old, at), (new, there))]
+    i, k = old.joint_index(name), new.joint_index(name)
+    joint = new.joints[k]
+    ends = [(tree.links[tree.joints[j].parent], tree.links[j + 1]) for tree, j in ((old, i), (new, k))]
     if ends[0] != ends[1] or (joint.mimic and joint.mimic.leader not in names):
         return None
     joints = list(old.joints)
-    joints[at] = replace(joint, parent=joints[at].parent)
+    joints[i] = replace(joint, parent=joints[i].parent)
     try:
-        changed, plain = (_quietly(tree) for tree in (replace(old, joints=tuple(joints)), old))
-    except InputError:  # a URDF cannot describe this copy
+        changed, unchanged = (_quiet_robot(tree) for tree in (replace(old, joints=tuple(joints)), old))
+    except InputError:  # a URDF cannot describe the changed tree
         return None
-    worst = same(plain, changed).worst_as_written
+    worst = same(unchanged, changed).worst_as_written
     return None if worst is None else Effect(element, worst)
 
 
-def _quietly(tree: KinematicTree) -> Robot:
+def _quiet_robot(tree: KinematicTree) -> Robot:
     """Return a robot without warnings about the URDF that urdfkin writes for its tree."""
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)

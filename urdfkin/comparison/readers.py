@@ -1,7 +1,7 @@
 """Compare how other libraries read a robot file: the joints, the order of the joints, and the link poses.
 
-Each library runs in a process of its own, with its adapter in `urdfkin/verify/adapters.py`. The differences
-of poses are attributed to joints: a joint differs if the pose of its child link in its parent link differs.
+Each library runs in a separate process, with its adapter in `urdfkin/verify/adapters.py`. A joint counts as
+different if the pose of its child link in its parent link differs.
 """
 
 from __future__ import annotations
@@ -27,26 +27,24 @@ from urdfkin.verify.adapters import LIBRARIES, version
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
-#: Poses count as equal if their entries differ by at most `_EQUAL` * max(1, largest entry).
+#: Tolerance for the entries of poses, relative to max(1, largest entry).
 #: Libraries that compute in double precision differ by less than 1e-13.
-#: A misread element causes a larger difference.
-_EQUAL = 1e-9
-#: The same number for libraries that compute in single precision.
-_EQUAL_SINGLE = 1e-5
+_TOLERANCE = 1e-9
+#: Tolerance `_TOLERANCE` of libraries that compute in single precision.
+_TOLERANCE_SINGLE = 1e-5
 #: Time limit of a library, in seconds.
 _PATIENCE = 60.0
 #: Maximum number of bytes that a library's process may return.
-_MOST = 400_000_000
-#: Longest quotation of a library's message, in characters.
-_QUOTED = 200
+_MOST_BYTES = 400_000_000
+#: Maximum length of a library's message in a result, in characters.
+_MOST_CHARACTERS = 200
 
 
 @dataclass(frozen=True, slots=True)
 class ReaderDifference:
     """A joint that a library reads differently, and the element of the file that explains the difference.
 
-    `size` is the largest difference of an entry of the child link's pose in the parent link (m, or rotation
-    entry).
+    `size` is the largest difference between entries of the child link's pose in the parent link.
     """
 
     joint: str
@@ -94,7 +92,7 @@ def installed(form: str = "urdf") -> tuple[str, ...]:
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare how libraries read a robot's file with how urdfkin reads it, by default all `installed` ones.
+    """Compare the models that libraries and urdfkin read from a robot's file, by default all installed ones.
 
     The poses of all links are compared at q = 0 and at random configurations.
 
@@ -134,14 +132,12 @@ def compare_readers(
 
 
 def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
-    """Return the values of one configuration by joint: a number, or a list for planar and floating joints."""
-    left, values = q.tolist(), dict[str, Any]()
-    for joint in robot.tree.joints:
-        if not joint.nq:
-            continue
-        own, left = left[: joint.nq], left[joint.nq :]
-        values[joint.name] = own[0] if joint.nq == 1 else own
-    return values
+    """Return the values of a configuration by joint: a number, or a list for a planar or floating joint."""
+    return {
+        joint.name: q[i : i + joint.nq].tolist() if joint.nq > 1 else float(q[i])
+        for joint, i in zip(robot.tree.joints, robot.tree.q_index, strict=True)
+        if joint.nq
+    }
 
 
 def _reading(
@@ -154,25 +150,25 @@ def _reading(
     values = [values_of(robot, one) for one in q]
     command = own_python("from urdfkin.verify.adapters import main; main()")
     case = {"name": robot.name, "text": source, "configurations": values}
-    output, status = ask_python([*command, name], json.dumps([case]).encode(), _PATIENCE, _MOST)
+    output, status = ask_python([*command, name], json.dumps([case]).encode(), _PATIENCE, _MOST_BYTES)
     if status != 0 or not output:
         how = f"no answer in {_PATIENCE:g} s" if status is None else f"its process ended with {status}"
         return LibraryReading(title, number, how)
     answer = json.loads(output)
     if "error" in answer:
-        return LibraryReading(title, number, printable(answer["error"])[:_QUOTED])
-    theirs = [{link: np.array(T) for link, T in one.items()} for one in answer["poses"]]
+        return LibraryReading(title, number, printable(answer["error"])[:_MOST_CHARACTERS])
     links = robot.link_names
-    equal = (_EQUAL_SINGLE if LIBRARIES[name].single else _EQUAL) * max(1.0, float(np.abs(ours).max()))
-    shared = [i for i, link in enumerate(links) if all(link in one for one in theirs)]
+    tolerance = _TOLERANCE_SINGLE if LIBRARIES[name].single else _TOLERANCE
+    tolerance *= max(1.0, float(np.abs(ours).max()))
+    shared = [i for i, link in enumerate(links) if all(link in poses for poses in answer["poses"])]
     if not shared:
         return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
-    both = np.array([[one[links[i]] for i in shared] for one in theirs])
+    theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
     # The text lacks a root joint that `load` added, so poses are relative to the first common link.
-    both = np.linalg.inv(both[:, :1]) @ both
+    theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
-    worst = float(np.abs(both - ours[:, shared]).max())
-    poses = dict(zip(shared, both.swapaxes(0, 1), strict=True))
+    worst = float(np.abs(theirs - ours[:, shared]).max())
+    poses_of = dict(zip(shared, theirs.swapaxes(0, 1), strict=True))
     elements = _elements(source) if form == "urdf" else {}
     own = [joint for joint in answer["joints"] if joint in values[0]]
     new = (joint.name for joint in robot.tree.joints if form == "urdf" and joint.name not in elements)
@@ -187,13 +183,13 @@ def _reading(
             for i, link in enumerate(links)
             if i not in shared and (i or not added) and (form != "usd" or link in robot.prims)
         ),
-        worst=0.0 if worst <= equal else worst,
-        differences=tuple(_differences(robot, title, ours, poses, elements, own, equal)),
+        worst=0.0 if worst <= tolerance else worst,
+        differences=tuple(_differences(robot, title, ours, poses_of, elements, own, tolerance)),
     )
 
 
 def _source(robot: Robot) -> tuple[str, str]:
-    """Return a library's input and its format: a URDF text without shapes, or the path of another file."""
+    """Return a library's input (a URDF text without shapes, or the path of another file) and its format."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
@@ -234,60 +230,56 @@ def _differences(
     theirs: Mapping[int, FloatArray],
     elements: Mapping[str, Any],
     own: Sequence[str],
-    equal: float,
+    tolerance: float,
 ) -> Iterator[ReaderDifference]:
-    """Yield the joints with another pose of the child link in the parent link."""
     for i, joint in enumerate(robot.tree.joints, 1):
         if i not in theirs or joint.parent not in theirs:
             continue
         T = np.linalg.inv(ours[:, joint.parent]) @ ours[:, i]
-        found = np.linalg.inv(theirs[joint.parent]) @ theirs[i]
-        size = float(np.abs(T - found).max())
-        if not size <= equal:
-            element, words = _explained(joint, title, T, found, elements.get(joint.name), own, equal)
-            yield ReaderDifference(joint.name, element, words, size)
+        T_theirs = np.linalg.inv(theirs[joint.parent]) @ theirs[i]
+        size = float(np.abs(T - T_theirs).max())
+        if not size <= tolerance:
+            element, words = _cause(joint, T, T_theirs, elements.get(joint.name), own, tolerance)
+            yield ReaderDifference(joint.name, element, f"{title} {words}", size)
 
 
-def _explained(
-    joint: Joint, title: str, T: FloatArray, found: FloatArray, element: Any, own: Sequence[str], equal: float
+def _cause(
+    joint: Joint, T: FloatArray, T_theirs: FloatArray, element: Any, own: Sequence[str], tolerance: float
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    `T` (urdfkin) and `found` (library) are poses of the child link in the parent link, first at q = 0.
+    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link, first at q = 0.
     """
-    off = np.abs(T - found)
-    name, words = f"type {joint.kind.value}", "has no coordinate for it"
+    difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
-        free = np.abs(found - joint.T_parent_joint).max() <= equal
-        name, words = "mimic", "leaves it free" if free else "applies another rule"
-    elif off[0, :3, :3].max() > equal:
+        is_free = np.abs(T_theirs - joint.T_parent_joint).max() <= tolerance
+        return "mimic", "leaves it free" if is_free else "applies another rule"
+    if difference[0, :3, :3].max() > tolerance:
         origin = None if element is None else element.find("origin")
         quaternion = origin is not None and origin.get("quat_xyzw") is not None
-        name, words = f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has another rotation at q = 0"
-    elif off[0].max() > equal:
-        name, words = "origin xyz", "has another position at q = 0"
-    elif joint.name in own and joint.kind.has_axis:
-        name, words = "axis", _motion(joint, T, found, equal)
-    elif joint.name in own:
-        words = "moves it differently"
-    return name, f"{title} {words}"
+        return f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has another rotation at q = 0"
+    if difference[0].max() > tolerance:
+        return "origin xyz", "has another position at q = 0"
+    if joint.name in own and joint.kind.has_axis:
+        return "axis", _motion(joint, T, T_theirs, tolerance)
+    words = "moves it differently" if joint.name in own else "has no coordinate for it"
+    return f"type {joint.kind.value}", words
 
 
-def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str:
-    """Return words for the difference between urdfkin's and the library's motion from q = 0."""
+def _motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float) -> str:
     start = np.linalg.inv(T[0])
-    mine, theirs = start @ T[1:], start @ found[1:]
+    ours, theirs = start @ T[1:], start @ T_theirs[1:]
     if joint.kind is JointKind.PRISMATIC:
-        d = theirs[:, :3, 3] @ joint.axis
-        k = float(d @ (mine[:, :3, 3] @ joint.axis) / np.sum((mine[:, :3, 3] @ joint.axis) ** 2))
-        if np.abs(theirs[:, :3, 3] - k * mine[:, :3, 3]).max() <= equal:
+        d = ours[:, :3, 3] @ joint.axis
+        k = float(theirs[:, :3, 3] @ joint.axis @ d / np.sum(d**2))
+        if np.abs(theirs[:, :3, 3] - k * ours[:, :3, 3]).max() <= tolerance:
             return f"moves it {k:.6g} times as far"
-    elif np.abs(theirs - np.linalg.inv(mine)).max() <= equal:
+    elif np.abs(theirs - np.linalg.inv(ours)).max() <= tolerance:
         return "turns it the other way"
-    elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > equal:
+    elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > tolerance:
         return "returns a matrix that is no rotation"
-    direction, own = (_direction(joint, T[0]) for T in (theirs, mine))
-    if (length := math.hypot(*direction)) <= equal:
+    direction, own = (_direction(joint, T[0]) for T in (theirs, ours))
+    if (length := math.hypot(*direction)) <= tolerance:
         return "does not move it"
     sense = 1.0 if own @ joint.axis >= 0.0 else -1.0
     x, y, z = (f"{number:.4g}" for number in np.round(direction / length * sense, 6) + 0.0)
@@ -295,7 +287,7 @@ def _motion(joint: Joint, T: FloatArray, found: FloatArray, equal: float) -> str
 
 
 def _direction(joint: Joint, T: FloatArray) -> FloatArray:
-    """Return a vector along the displacement of a prismatic joint, or along the axis of a rotation."""
+    """Return a vector along a prismatic joint's displacement, or along a rotation's axis."""
     if joint.kind is JointKind.PRISMATIC:
         return T[:3, 3]
     return np.array([T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]])

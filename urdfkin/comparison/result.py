@@ -1,4 +1,4 @@
-"""Store the result of comparing two models: verdict, differences, matched joints, and distances of frames."""
+"""Result of comparing two models: verdict, differences, matched joints, and distances between frames."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from urdfkin.model.mechanisms.mechanism import (
     Mechanism,
     Tolerance,
     Variables,
-    apart,
     limits,
+    pose_difference,
     tolerance_of,
 )
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Lock, Mimic
@@ -37,16 +37,16 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
-#: `_TENTH`, 0.1 after rounding to four digits, is the smallest number with a unit prefix: 0.1 mm.
-#: Numbers from `_NINE` * `_TENTH` have no prefix: 0.9 m.
-_TENTH, _NINE = 0.09995, 9.0
+#: Smallest numbers that are written without a unit prefix (0.9 m) and with a unit prefix (0.1 mm).
+#: They include numbers that are rounded up to 0.9 or 0.1.
+_LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
 class Verdict(Enum):
     """The verdict: two models are the same, the same after the changes in `Sameness.up_to`, or different.
 
-    Two models are the same up to single precision if each joint differs by no more than the rounding of this
-    joint's own numbers to single precision.
+    Two models are the same up to single precision if each joint differs by no more than the error that single
+    precision can cause in the numbers of this joint.
     """
 
     SAME = "same"
@@ -55,9 +55,7 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes that do not make two models different.
-#: Two models are equivalent if they agree after changes of these kinds.
-#: The headline of a result names the kinds in this order.
+#: Kinds of changes that do not make two models different, in the order of the headline.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences that leave the distances of matching frames bounded.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
@@ -68,8 +66,8 @@ class SameQuestion:
     """A yes-or-no question about two models: whether they are equivalent, or within a distance of each other.
 
     Attributes:
-        within: Largest allowed distance between matching frames of the models as they are written, in metres
-            and in radians. None: the question is whether the models are equivalent.
+        within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they are
+            written. None: the question is whether the models are equivalent.
         strict: Whether the answer is also no for models that are equivalent but not the same, and for models
             with remarks, such as different joint limits.
     """
@@ -120,7 +118,7 @@ class Difference:
         b: The parameter's value in B. None if the parameter has no value.
         radians: Angular part of the difference, radians; 0 if the difference has no angular part.
         metres: Linear part of the difference, metres; 0 if the difference has no linear part.
-        detail: "alone" if the joint's axis differs, but the links behind the joint agree. "converted" if the
+        detail: "alone" if the joint's axis differs, but the links after the joint agree. "converted" if the
             limits of B were converted to the coordinate of A. Otherwise empty.
     """
 
@@ -134,7 +132,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The parameter's values in A and in B, as numbers or words; None: a model has no value."""
+        """The parameter's values in A and in B, as numbers or words; None if a model has no value."""
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -146,15 +144,14 @@ class Difference:
     def words(self) -> str:  # noqa: PLR0911, PLR0912  each parameter has its own line
         """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
-        off = [f"{length(self.metres)} off"] if self.metres else []
         match what:
             case "axis":
-                parts = " and ".join([*([f"tilted by {angle(self.radians)}"] if self.radians else []), *off])
+                sizes = [f"tilted by {angle(self.radians)}"] if self.radians else []
+                sizes += [f"{length(self.metres)} off"] if self.metres else []
                 alone = " (the links after this joint are not)" if self.detail == "alone" else ""
-                return f"{place}: its axis is {parts}{alone}"
+                return f"{place}: its axis is {' and '.join(sizes)}{alone}"
             case "place":
-                parts = " and ".join([*off, *([f"turned by {angle(self.radians)}"] if self.radians else [])])
-                return f"{place} is {parts} on its rigid body"
+                return f"{place} is {size_words(self.metres, self.radians)} on its rigid body"
             case "frame":
                 return f"{place}: its plane is tilted by {angle(self.radians)}"
             case "fixed":
@@ -209,7 +206,7 @@ def _range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference between the numbers of two models at one joint or link; rounding does not explain it.
+    """A difference between two models at one joint or link that rounding does not explain.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
@@ -218,8 +215,7 @@ class JointDifference:
         a: The parameter's value in A; None if `b` is the difference between A and B.
         b: The parameter's value in B, or a text. The text states the size of the difference, or why the
             models cannot be compared here.
-        explained: A text with the largest difference that rounding can cause. The text is empty if no number
-            is rounded.
+        explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
     """
 
     place: str
@@ -248,7 +244,7 @@ class Tool:
 
 #: Result of Pinocchio's check of the bounds.
 #: "not asked" means that the user requested no check.
-#: "not verified" means that Pinocchio could not confirm the bounds.
+#: "not verified" means that Pinocchio could not check the bounds.
 ConfirmationState = Literal["confirmed", "not asked", "not verified"]
 _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified by Pinocchio"}
 
@@ -371,16 +367,13 @@ class Sameness(Displayable):
 
     @property
     def _verdict(self) -> str:
-        """The verdict in words.
-
-        If the models are only the same after changes of B, the text lists these changes.
-        """
+        """The verdict in words; for `Verdict.SAME_AFTER` with the kinds of the changes of B."""
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
     def _sheet(self) -> TextDocument:
-        found: TextDocument = hook("a comparison as a document")(self)
-        return found
+        document: TextDocument = hook("a comparison as a document")(self)
+        return document
 
     @property
     def worst(self) -> Interval | None:
@@ -427,9 +420,9 @@ class Sameness(Displayable):
     def within_single(self) -> bool:
         """Whether the models differ, but no frame by more than the bound on the error of single precision.
 
-        The models are compared as they are written. This bound is a sum of the rounding errors of all joints.
-        An error in one joint can be smaller than this sum. Therefore, the property does not prove that
-        rounding is the cause; `up_to_single` proves it.
+        The models are compared as they are written. The bound is a sum of the rounding errors of all joints.
+        An error in one joint can be smaller than this sum. Therefore, only `up_to_single` proves that
+        rounding is the cause.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -459,7 +452,7 @@ class Sameness(Displayable):
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
-        >>> found.holds(Question(within=1.0))
+        >>> found.holds(SameQuestion(within=1.0))
         True
         """
         if not (bool(self) if question.within is None else self.within(question.within)):
@@ -534,12 +527,12 @@ class Sameness(Displayable):
         from urdfkin.model.conventions import Convention, Conversion, JointRule
 
         tree_a, tree_b = self.trees
-        of_b = {one.b: one for one in self.joints}
+        joints_of_b = {one.b: one for one in self.joints}
         rules, joints = {}, list[str]()
         for joint in tree_b.joints:
             if not joint.kind.nq or joint.mimic is not None:
                 continue
-            one = of_b.get(joint.name)
+            one = joints_of_b.get(joint.name)
             if one is None or tree_a.joints[tree_a.joint_index(one.a)].kind.nq != joint.kind.nq:
                 raise InputError(
                     "a joint of B has no joint of A",
@@ -606,9 +599,20 @@ def _with_prefix(value: float, unit: str) -> str:
     if value == 0.0:
         return f"0 {unit}"
     for prefix, factor in (("", 1.0), ("m", 1e3), ("µ", 1e6), ("n", 1e9), ("p", 1e12)):
-        if abs(value) * factor >= _TENTH * (1.0 if prefix else _NINE):
+        if abs(value) * factor >= (_LEAST_WITH_PREFIX if prefix else _LEAST_WITHOUT_PREFIX):
             return f"{value * factor:.4g} {prefix}{unit}"
     return f"{value:.2g} {unit}"
+
+
+def size_words(metres: float, radians: float) -> str:
+    """Return the size of a difference as text; a part that is 0 is omitted.
+
+    >>> size_words(0.0019, 0.0003), size_words(0.0, 0.0003)
+    ('1.9 mm off and turned by 0.3 mrad', 'turned by 0.3 mrad')
+    """
+    parts = [f"{length(metres)} off"] if metres else []
+    parts += [f"turned by {angle(radians)}"] if radians else []
+    return " and ".join(parts)
 
 
 def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
@@ -620,25 +624,30 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
         raise InputError(f"a joint of {which} occurs twice", where="map", found=repr(double))
 
 
-def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) -> tuple[tuple[str, str], ...]:
+def changes_of_b(
+    alignment: Alignment, rounding: Tolerance, *, tables: bool = False
+) -> tuple[tuple[str, str], ...]:
     """Return the changes that make B equal to A: the kind of each (an entry of `FREE`) and a line of text.
 
-    The function sets the tool poses in `found`. If one model is a Denavit-Hartenberg table (`tables`), every
-    frame that differs is a tool, because the poses of a table's frames depend on the table's convention.
+    The function sets the tool poses in `alignment`. If one model is a Denavit-Hartenberg table (`tables`),
+    every frame that differs is a tool, because the poses of a table's frames depend on its convention.
     """
     lines = list[tuple[str, str]]()
-    tree_a, tree_b = found.a.tree, found.b.tree
-    for which, mechanism, link in (("A", found.a, found.base[0]), ("B", found.b, found.base[1])):
+    tree_a, tree_b = alignment.a.tree, alignment.b.tree
+    for which, mechanism, link in (
+        ("A", alignment.a, alignment.base[0]),
+        ("B", alignment.b, alignment.base[1]),
+    ):
         if mechanism.body_of[link]:
             root, base = mechanism.tree.links[0], mechanism.tree.links[link]
             lines.append(
                 ("base", f"{which}'s root is {root}; the joints between {base} and this root are reversed")
             )
-    if found.X is not IDENTITY:
-        lines.append(("base", f"B's root is in A's root frame at {pose_words(found.X, rounding)}"))
-    for step in found.steps:
+    if alignment.X is not IDENTITY:
+        lines.append(("base", f"B's root is in A's root frame at {pose_words(alignment.X, rounding)}"))
+    for step in alignment.steps:
         if step.conversion is not None:
-            lines.append(("free joints", _conversion_words(found, step, step.conversion, rounding)))
+            lines.append(("free joints", _conversion_words(alignment, step, step.conversion, rounding)))
         if step.sense < 0 or step.offset:
             sign = "-" if step.sense < 0 else ""
             least = rounding.angle if step.kind == "turns" else rounding.way
@@ -652,22 +661,24 @@ def put_right(found: Alignment, rounding: Tolerance, *, tables: bool = False) ->
             words = f"q[{tree_b.joints[step.b].name}] = {sign}q[{tree_a.joints[step.a].name}]{constant}"
             lines += [("zeros", words)] if step.offset else []
             lines += [("senses", words)] if step.sense < 0 else []
-    return (*lines, *_tools_put_right(found, rounding, tables=tables))
+    return (*lines, *_tool_changes(alignment, rounding, tables=tables))
 
 
-def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
+def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
     """Yield the kind "tools" and a line of text for each changed tool.
 
     A frame that differs is a tool if it has no children, or if it describes how the robot is mounted.
     """
-    around, links = _around(found), (found.a.tree.links, found.b.tree.links)
-    for k, frame in enumerate(found.frames):
-        beside = (frame.a, frame.b) in around
-        if frame.differs and (beside or tables or _is_tool(found, frame)):
-            found.frames[k] = frame.put_right()
-            if beside and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b])):
-                continue  # the line about the base already reports this difference
-        if (tool := found.frames[k].tool) is not IDENTITY:
+    mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
+    for k, frame in enumerate(alignment.frames):
+        is_mount = (frame.a, frame.b) in mounts
+        if frame.differs and (is_mount or tables or _is_tool(alignment, frame)):
+            alignment.frames[k] = frame.as_tool()
+            if is_mount and rounding.holds(
+                *pose_difference(alignment.a.homes[frame.a], alignment.b.homes[frame.b])
+            ):
+                continue  # the line about the base reports the displacement of this frame
+        if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
                 "tools",
@@ -675,28 +686,30 @@ def _tools_put_right(found: Alignment, rounding: Tolerance, *, tables: bool) -> 
             )
 
 
-def _around(found: Alignment) -> set[tuple[int, int]]:
+def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
     """Return the matching frames of the root body that only describe how the robot is mounted.
 
     Some of these frames are links before the first link with a moving joint. The other frames are links such
-    as a world or a table: they carry no moving joint, and have the same pose in the root frames of A and B.
+    as a world or a table, which carry no moving joint and have the same pose in the root frames of A and B.
     """
-    if found.a.body_of[found.base[0]] or found.b.body_of[found.base[1]]:
+    if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
-    (before_a, idle_a), (before_b, idle_b) = (_beside_the_joints(m) for m in (found.a, found.b))
-    rounding = tolerance_of(found.a, found.b)
+    (before_a, beside_a), (before_b, beside_b) = (
+        _links_without_joints(m) for m in (alignment.a, alignment.b)
+    )
+    rounding = tolerance_of(alignment.a, alignment.b)
     return {
         (frame.a, frame.b)
-        for frame in found.frames
+        for frame in alignment.frames
         if (frame.a in before_a and frame.b in before_b)
         or (
-            (frame.a in before_a | idle_a and frame.b in before_b | idle_b)
-            and rounding.holds(*apart(found.a.homes[frame.a], found.b.homes[frame.b]))
+            (frame.a in before_a | beside_a and frame.b in before_b | beside_b)
+            and rounding.holds(*pose_difference(alignment.a.homes[frame.a], alignment.b.homes[frame.b]))
         )
     }
 
 
-def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
+def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
     """Return two sets of links of the root body: links before the robot, and links beside the robot.
 
     A fixed child link of a link before the robot, such as a pedestal, carries all moving joints. A link
@@ -716,12 +729,13 @@ def _beside_the_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
 
 
 def _conversion_words(
-    found: Alignment, step: MatchedJoints, made: JointTransform, rounding: Tolerance
+    alignment: Alignment, step: MatchedJoints, conversion: JointTransform, rounding: Tolerance
 ) -> str:
-    names = found.b.tree.joints[step.b].name, found.a.tree.joints[step.a].name
-    own = f"the {'inverse of the ' if made.back else ''}pose of q[{names[1]}]"
+    names = alignment.b.tree.joints[step.b].name, alignment.a.tree.joints[step.a].name
+    own = f"the {'inverse of the ' if conversion.back else ''}pose of q[{names[1]}]"
     M, N = (
-        "" if T is IDENTITY else f"the pose {pose_words(T, rounding)}" for T in (made.before, made.behind)
+        "" if T is IDENTITY else f"the pose {pose_words(T, rounding)}"
+        for T in (conversion.before, conversion.behind)
     )
     return f"the pose of q[{names[0]}] is {' times '.join(part for part in (M, own, N) if part)}"
 
@@ -741,12 +755,12 @@ def _rounded(x: float, rounding: float) -> float:
     return round(x, math.ceil(-math.log10(rounding))) + 0.0
 
 
-def _is_tool(found: Alignment, frame: FramePair) -> bool:
+def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
     """Return whether a frame is fixed and has no children, in A and in B.
 
     The child link of a mimic joint is no tool, even if the joint cannot move because its multiplier is 0.
     """
-    for tree, link in ((found.a.tree, frame.a), (found.b.tree, frame.b)):
+    for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
             return False
         if any(joint.parent == link for joint in tree.joints):
@@ -754,43 +768,45 @@ def _is_tool(found: Alignment, frame: FramePair) -> bool:
     return True
 
 
-def differences(found: Alignment, variables: Variables) -> tuple[Difference, ...]:
+def differences(alignment: Alignment, variables: Variables) -> tuple[Difference, ...]:
     """Return the differences that affect motion, ordered from the base to the tips."""
-    tree_a, tree_b, tolerance = found.a.tree, found.b.tree, tolerance_of(found.a, found.b)
-    placed: list[tuple[float, list[Difference]]] = [
-        (len(found.path(i)), _of_step(found, variables, i)) for i in range(len(found.steps))
+    tree_a, tree_b, tolerance = alignment.a.tree, alignment.b.tree, tolerance_of(alignment.a, alignment.b)
+    with_depth: list[tuple[float, list[Difference]]] = [
+        (len(alignment.path(i)), _joint_differences(alignment, variables, i))
+        for i in range(len(alignment.steps))
     ]
-    placed += [
+    with_depth += [
         (
-            len(found.path(frame.previous)) + 0.5,
-            [Difference(f"link {tree_a.links[frame.a]}", "place", None, None, *_beyond(frame, tolerance))],
+            len(alignment.path(frame.previous)) + 0.5,
+            [
+                Difference(
+                    f"link {tree_a.links[frame.a]}", "place", None, None, *_beyond_rounding(frame, tolerance)
+                )
+            ],
         )
-        for frame in found.frames
+        for frame in alignment.frames
         if frame.differs
     ]
-    ordered = [one for _, some in sorted(placed, key=lambda pair: pair[0]) for one in some]
-    for tree, joints, which in ((tree_a, found.only_a, "A"), (tree_b, found.only_b, "B")):
+    ordered = [one for _, some in sorted(with_depth, key=lambda pair: pair[0]) for one in some]
+    for tree, joints, which in ((tree_a, alignment.only_a, "A"), (tree_b, alignment.only_b, "B")):
         alone = [f"joint {tree.joints[j].name}" for j in sorted(joints) if tree.joints[j].kind.nv]
         ordered += [Difference(place, f"only in {which}") for place in alone]
-    have = {tree_a.links[frame.a] for frame in found.frames}
+    have = {tree_a.links[frame.a] for frame in alignment.frames}
     for link in tree_a.links:
-        if link in tree_b.links and link not in have and _of_the_pair(found, tree_a, tree_b, link):
+        if link in tree_b.links and link not in have and _on_matched_bodies(alignment, link):
             ours, theirs = (_carrier(tree, link) for tree in (tree_a, tree_b))
             ordered.append(Difference(f"link {link}", "carried by", ours, theirs))
     return tuple(ordered)
 
 
-def _of_the_pair(found: Alignment, tree_a: KinematicTree, tree_b: KinematicTree, link: str) -> bool:
-    """Return whether a link belongs to matching rigid bodies in A and in B.
+def _on_matched_bodies(alignment: Alignment, link: str) -> bool:
+    """Return whether both bodies of a link, in A and in B, have a matching body in the other model.
 
-    If the bodies do not match, only A or only B has the joint that moves the body. `differences` already
-    reports this joint.
+    For any other body, `differences` already reports the joint of only one model that moves the body.
     """
-    alone_a = {found.a.body_of[j + 1] for j in found.only_a}
-    alone_b = {found.b.body_of[j + 1] for j in found.only_b}
-    return (
-        found.a.body_of[tree_a.link_index(link)] not in alone_a
-        and found.b.body_of[tree_b.link_index(link)] not in alone_b
+    return all(
+        mechanism.body_of[mechanism.tree.link_index(link)] not in {mechanism.body_of[j + 1] for j in only}
+        for mechanism, only in ((alignment.a, alignment.only_a), (alignment.b, alignment.only_b))
     )
 
 
@@ -800,9 +816,9 @@ def _carrier(tree: KinematicTree, link: str) -> str:
     return f"joint {path[-1].name}" if path else "the base"
 
 
-def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]:
-    tolerance = tolerance_of(found.a, found.b)
-    step, tree_a, tree_b = found.steps[i], found.a.tree, found.b.tree
+def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> list[Difference]:
+    tolerance = tolerance_of(alignment.a, alignment.b)
+    step, tree_a, tree_b = alignment.steps[i], alignment.a.tree, alignment.b.tree
     joint, other = tree_a.joints[step.a], tree_b.joints[step.b]
     place = f"joint {joint.name}"
     if step.unlike == "kind":
@@ -815,19 +831,19 @@ def _of_step(found: Alignment, variables: Variables, i: int) -> list[Difference]
         some.append(Difference(place, "frame", radians=step.tilt, metres=step.shift))
     elif step.differs:
         detail = "alone" if step.other is not step.axis else ""
-        some.append(Difference(place, "axis", None, None, *_beyond(step, tolerance), detail))
-    if i in (*variables.freer_a, *variables.freer_b, *variables.rules):
+        some.append(Difference(place, "axis", None, None, *_beyond_rounding(step, tolerance), detail))
+    if i in variables.rules:
         some.append(Difference(place, "mimic rule", joint.mimic, other.mimic))
     return some
 
 
-def _beyond(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
+def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
     """Return the tilt (rad) and shift (m) of a joint or frame between A and B; 0 if within rounding."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
 
 
 def remarks(
-    found: Alignment,
+    alignment: Alignment,
     variables: Variables,
     tolerance: Tolerance,
     single: float = 0.0,
@@ -840,27 +856,29 @@ def remarks(
     limits are first converted to the coordinate of A's joint.
     """
     some = list[Difference]()
-    for step in found.steps:
+    for step in alignment.steps:
         if not step.unlike:
-            a, b = found.a.tree.joints[step.a], found.b.tree.joints[step.b]
+            a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
             zero = (1, 0.0) if as_written else (step.sense, step.offset)
             some += limit_differences(a, b, tolerance.angle, single, zero)
-    for tree, which in ((found.a.tree, "A"), (found.b.tree, "B")):
+    for tree, which in ((alignment.a.tree, "A"), (alignment.b.tree, "B")):
         for lock in filter(None, map(idle, tree.joints)):
             value = lock.joint.kind.value, lock.value
             some.append(Difference(f"joint {lock.joint.name}", "idle", *_in_order(which, value)))
-    # The values of all joints agree, but the coordinate of B is the value of A's mimic joint.
-    for step in found.steps:
-        a, b = found.a.tree.joints[step.a], found.b.tree.joints[step.b]
+    # A joint can be independent in B and a mimic joint in A, although all joint values agree.
+    for step in alignment.steps:
+        a, b = alignment.a.tree.joints[step.a], alignment.b.tree.joints[step.b]
         line = variables.leaders.get(b.name)
         if a.mimic is not None and line is not None and line.variable == f"a:{a.mimic.leader}":
             some.append(Difference(f"joint {a.name}", "independent joint", a.mimic))
-    for tree, other, which in ((found.a.tree, found.b.tree, "A"), (found.b.tree, found.a.tree, "B")):
-        paired = {tree.links[frame.a if which == "A" else frame.b] for frame in found.frames}
-        lacking = [link for link in tree.links if link not in other.links and link not in paired]
-        if lacking:
-            names = _in_order(which, tuple(lacking))
-            some.append(Difference(f"links of {which}", f"only in {which}", *names))
+    for tree, other, which in (
+        (alignment.a.tree, alignment.b.tree, "A"),
+        (alignment.b.tree, alignment.a.tree, "B"),
+    ):
+        matched = {tree.links[frame.a if which == "A" else frame.b] for frame in alignment.frames}
+        alone = tuple(link for link in tree.links if link not in other.links and link not in matched)
+        if alone:
+            some.append(Difference(f"links of {which}", f"only in {which}", *_in_order(which, alone)))
     return tuple(some)
 
 
@@ -889,7 +907,7 @@ def limit_differences(
         yield Difference(place, "kind", a.kind.value, b.kind.value)
     back = sorted(sense * (end - offset) for end in limits(b))
     ours = limits(a)
-    if any(not _close(x, y, tolerance, single) for x, y in zip(ours, back, strict=True)):
+    if not all(_close(x, y, tolerance, single) for x, y in zip(ours, back, strict=True)):
         detail = "converted" if sense < 0 or offset else ""
         yield Difference(place, "limits", tuple(map(_finite, ours)), tuple(map(_finite, back)), detail=detail)
     for what in ("velocity", "effort"):

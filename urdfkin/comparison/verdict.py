@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from itertools import takewhile
 
 import numpy as np
 
-from urdfkin.comparison.bounds import MOST, DistanceSearch, pinocchios, tightened
+from urdfkin.comparison.bounds import MOST_BOXES, DistanceSearch, pinocchio_poses, tighten
 from urdfkin.comparison.result import (
     BOUNDED,
     FREE,
@@ -20,12 +21,14 @@ from urdfkin.comparison.result import (
     Sameness,
     Tool,
     Verdict,
+    angle,
+    changes_of_b,
     demand_joint_names,
     differences,
-    put_right,
+    length,
     remarks,
+    size_words,
 )
-from urdfkin.comparison.single import JointComparison
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
@@ -38,10 +41,13 @@ from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
     FramePair,
+    MatchedJoints,
     Mechanism,
+    Screw,
     Tolerance,
     Variables,
-    apart,
+    pose_difference,
+    smallest_motion,
     tolerance_of,
     variables_of,
 )
@@ -53,14 +59,13 @@ from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import checked_choice
 
-#: Number of configurations at which Pinocchio checks the distances between matching frames.
+#: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: Number of frames among which the frame with the largest distance is searched.
-#: These frames have the largest distances at random configurations.
+#: Maximum number of frames that are searched thoroughly for the largest distance.
 FARTHEST = 4
-#: Longest allowed path, metres; the squares of longer lengths would overflow.
+#: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 LONGEST = 1e150
-#: An upper bound of at most NEAR times the largest distance found needs no improvement.
+#: An upper bound is sharp enough if it is at most this factor times the largest distance found.
 NEAR = 1.05
 
 
@@ -70,7 +75,7 @@ def same(
     *,
     map: Mapping[str, str] | None = None,
     bounds: bool = True,
-    boxes: int = MOST,
+    boxes: int = MOST_BOXES,
     within: float | None = None,
 ) -> Sameness:
     """Decide and prove whether two models move alike in every configuration.
@@ -87,7 +92,7 @@ def same(
             names and axes do not determine.
         bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
             most of the computing time.
-        boxes: Largest number of boxes of configurations that exist at the same time in branch and bound.
+        boxes: Maximum number of boxes of configurations that exist at the same time in branch and bound.
             Boxes give sharper bounds if the models differ in many places. With 0, no boxes are used.
         within: Distance (metres and radians) that you will pass to `Sameness.within`. The boxes are then used
             to prove that all frames are within this distance.
@@ -109,35 +114,30 @@ def same(
         >>> bool(found)
         False
     """
-    robots = _robot(a), _robot(b)
-    given = _parse_given_map(map)
+    robots = tuple(source if isinstance(source, Robot) else load(source) for source in (a, b))
+    joint_map = _parse_map(map)
     whole_number(boxes, "boxes", 0)
     if within is not None:
         within = real_number(within, "within")
-    for which, robot, names in (("A", robots[0], list(given)), ("B", robots[1], list(given.values()))):
-        demand_joint_names(robot.tree, names, which)
+    for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
+        demand_joint_names(robot.tree, list(names), which)
     # The copies protect the user's robots: a comparison stores many compiled trees in its robots.
-    return Comparator((copy(robots[0]), copy(robots[1])), given, bounds, boxes, within).judged()
+    return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
-def _parse_given_map(given: Mapping[str, str] | None) -> dict[str, str]:
-    """Return the user's map of joints; raise InputError if it does not map names to names."""
-    if given is None:
+def _parse_map(joint_map: Mapping[str, str] | None) -> dict[str, str]:
+    if joint_map is None:
         return {}
-    if not isinstance(given, Mapping) or any(
-        not isinstance(name, str) for pair in given.items() for name in pair
+    if not isinstance(joint_map, Mapping) or any(
+        not isinstance(name, str) for pair in joint_map.items() for name in pair
     ):
         raise InputError(
             "`map` is not a mapping of joint names",
             where="map",
-            found=repr(given),
+            found=repr(joint_map),
             remedy="give a dict from each joint name of A to a joint name of B",
         )
-    return dict(given)
-
-
-def _robot(source: Robot | Source | DHTable) -> Robot:
-    return source if isinstance(source, Robot) else load(source)
+    return dict(joint_map)
 
 
 class Comparator:
@@ -146,28 +146,26 @@ class Comparator:
     def __init__(
         self,
         robots: tuple[Robot, Robot],
-        given: dict[str, str],
+        joint_map: dict[str, str],
         bounds: bool,
-        boxes: int = MOST,
+        boxes: int = MOST_BOXES,
         within: float | None = None,
     ) -> None:
-        self.robots, self.given, self.bounds, self.boxes = robots, given, bounds, boxes
+        self.robots, self.joint_map, self.bounds, self.boxes = robots, joint_map, bounds, boxes
         self.within = within
         self.trees = a, b = robots[0].tree, robots[1].tree
-        labels, self.spelled = _spelled_alike(robots)
+        labels, self.spellings = _spelled_alike(robots)
         swapped = labels[1], labels[0]
-        names = {**self.spelled, **given}
+        names = {**self.spellings, **joint_map}
         trees = (
             _with_idle_joints_fixed(a, b, names, labels),
             _with_idle_joints_fixed(b, a, _reversed(names), swapped),
         )
-        parting = (
-            _fixed_here(*trees, self.spelled, labels),
-            _fixed_here(trees[1], trees[0], _reversed(self.spelled), swapped),
-        )
         self.mechanisms = (
-            Mechanism(trees[0], parting[0], labels[0]),
-            Mechanism(trees[1], parting[1], labels[1]),
+            Mechanism(trees[0], _fixed_only_here(*trees, self.spellings, labels), labels[0]),
+            Mechanism(
+                trees[1], _fixed_only_here(*trees[::-1], _reversed(self.spellings), swapped), labels[1]
+            ),
         )
         for which, mechanism, robot in zip("AB", self.mechanisms, robots, strict=True):
             if not mechanism.size <= LONGEST:
@@ -178,141 +176,146 @@ class Comparator:
                     remedy="write origins in metres",
                 )
         self.tolerance: Tolerance = tolerance_of(*self.mechanisms)
+        self.has_table = any(robot.origin.table for robot in robots)
 
-    def judged(self) -> Sameness:
+    def compare(self) -> Sameness:
         """Return the complete result, with intervals and Pinocchio's confirmation."""
-        found = self.alignment()
-        self._check_map(found)
-        variables = variables_of(found, self.tolerance)
-        said = self.said(found, variables)
-        frames = self._intervals(found, variables)
-        as_written, most = None, said.written
-        if self.bounds:
-            most = _largest([(frame.upper, frame.radians) for frame in frames])
-        if said.after and self.bounds:
-            written = self.as_written(found)
+        alignment = self.alignment()
+        self._check_map(alignment)
+        variables = variables_of(alignment, self.tolerance)
+        result = self.result_without_bounds(alignment, variables)
+        if not self.bounds:
+            return replace(result, checked=self._confirm(alignment, variables, ()))
+        frames = self._intervals(alignment, variables)
+        farthest, bound = None, _largest([(frame.upper, frame.radians) for frame in frames])
+        if result.after:
+            written = self.as_written(alignment)
             moving = variables_of(written, self.tolerance)
-            as_written = self._farthest(written, moving)
-            most = self._most(written, moving, as_written)
-            if len(written.frames) < len(self._compared_links(found)):
-                most = (math.inf, math.inf)
-        checked = self._confirm(found, variables, frames)
-        return replace(said, frames=frames, as_written=as_written, written=most, checked=checked)
+            farthest = self._farthest_as_written(written, moving)
+            bound = self._bound_as_written(written, moving, farthest)
+            if len(written.frames) < len(self._compared_links(alignment)):
+                bound = math.inf, math.inf
+        checked = self._confirm(alignment, variables, frames)
+        return replace(result, frames=frames, as_written=farthest, written=bound, checked=checked)
 
     def alignment(self) -> Alignment:
         """Search for the alignment of B with A for which most joints and links agree."""
-        return align(*self.mechanisms, {**self.spelled, **self.given})
+        return align(*self.mechanisms, {**self.spellings, **self.joint_map})
 
-    def said(self, found: Alignment, variables: Variables) -> Sameness:
-        """Return the result without intervals and confirmation; set the tool frames in `found`."""
+    def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
+        """Return the result without intervals and confirmation; set the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
-        tables = any(robot.origin.table for robot in self.robots)
-        after = put_right(found, self.tolerance, tables=tables)
-        free = {what for what, _ in after}
-        wrong = differences(found, variables)
-        single = self.single(found, variables)
-        verdict = Verdict.DIFFERS if wrong else Verdict.SAME_AFTER if after else Verdict.SAME
-        unexplained = () if verdict is Verdict.SAME else self.unexplained(found)
+        changes = changes_of_b(alignment, self.tolerance, tables=self.has_table)
+        kinds = {kind for kind, _ in changes}
+        different = differences(alignment, variables)
+        single = self._single_precision_bound(alignment, variables)
+        verdict = Verdict.DIFFERS if different else Verdict.SAME_AFTER if changes else Verdict.SAME
+        unexplained = () if verdict is Verdict.SAME else self._unexplained_differences(alignment)
         if single is not None and verdict is not Verdict.SAME and not unexplained:
-            verdict = Verdict.UP_TO_SINGLE if {one.what for one in wrong} <= BOUNDED else verdict
+            verdict = Verdict.UP_TO_SINGLE if {one.what for one in different} <= BOUNDED else verdict
         return Sameness(
             names=(self.robots[0].name, self.robots[1].name),
             sources=(self.robots[0].source, self.robots[1].source),
             digests=(self.robots[0].sha256, self.robots[1].sha256),
             verdict=verdict,
-            after=tuple(dict.fromkeys(words for _, words in after)),
-            up_to=tuple(what for what in FREE if what in free),
-            differences=wrong,
+            after=tuple(dict.fromkeys(words for _, words in changes)),
+            up_to=tuple(kind for kind in FREE if kind in kinds),
+            differences=different,
             remarks=remarks(
-                found,
+                alignment,
                 variables,
                 self.tolerance,
                 SINGLE if single else 0.0,
                 as_written=verdict is Verdict.UP_TO_SINGLE,
             ),
             joints=tuple(
-                JointMap(names[0][s.a], names[1][s.b], s.sense, s.offset, s.conversion) for s in found.steps
+                JointMap(names[0][s.a], names[1][s.b], s.sense, s.offset, s.conversion)
+                for s in alignment.steps
             ),
-            links=tuple((links[0][f.a], links[1][f.b]) for f in found.frames),
+            links=tuple((links[0][f.a], links[1][f.b]) for f in alignment.frames),
             tools=tuple(
-                Tool(links[0][f.a], links[1][f.b], f.tool) for f in found.frames if f.tool is not IDENTITY
+                Tool(links[0][f.a], links[1][f.b], f.tool) for f in alignment.frames if f.tool is not IDENTITY
             ),
-            orders=found.b.orders,
-            base=found.X,
-            base_links=(links[0][found.base[0]], links[1][found.base[1]]),
-            rounding=self.rounding(found, variables),
+            orders=alignment.b.orders,
+            base=alignment.X,
+            base_links=(links[0][alignment.base[0]], links[1][alignment.base[1]]),
+            rounding=self.rounding(alignment, variables),
             single=single,
             unexplained=unexplained,
             frames=(),
             as_written=None,
             written=(math.inf, math.inf),
             narrowed=tuple(
-                f"{which}: {one}"
+                f"{which}: {words}"
                 for which, tree in zip("AB", self.trees, strict=True)
-                for one in narrowed_ranges(tree)
+                for words in narrowed_ranges(tree)
             ),
             checked=Confirmation("not asked", reason="the bounds are not computed yet"),
             trees=self.trees,
         )
 
-    def single(self, found: Alignment, variables: Variables) -> tuple[float, float] | None:
-        """Bound the distance and angle (m, rad) between frames that single precision can cause, or None.
+    def _single_precision_bound(
+        self, alignment: Alignment, variables: Variables
+    ) -> tuple[float, float] | None:
+        """Bound the distance and angle (m, rad) between frames that single precision can cause.
 
-        The bound is the sum of the errors of both files and of the rounding errors of double precision.
+        The bound is the sum of the errors of both files and of the rounding errors of double precision. The
+        result is None if both files have double precision.
         """
         if all(robot.single is None for robot in self.robots):
             return None
-        most = np.array(self.rounding(found, variables))
-        pairs = [(frame.a, frame.b) for frame in found.frames]
-        off = np.zeros((len(pairs), 2))
+        pairs = [(frame.a, frame.b) for frame in alignment.frames]
+        errors = np.zeros((len(pairs), 2))
         for which, robot in enumerate(self.robots):
             if robot.single is not None and pairs:
-                off += robot.single.links[[pair[which] for pair in pairs]]
-        metres, radians = (most + off.max(axis=0, initial=0.0)).tolist()
+                errors += robot.single.links[[pair[which] for pair in pairs]]
+        rounding = np.array(self.rounding(alignment, variables))
+        metres, radians = (rounding + errors.max(axis=0, initial=0.0)).tolist()
         return metres, radians
 
-    def unexplained(self, found: Alignment) -> tuple[JointDifference, ...]:
+    def _unexplained_differences(self, alignment: Alignment) -> tuple[JointDifference, ...]:
         """Return the differences of the unchanged models that rounding does not explain, joint by joint.
 
-        A is compared with B, and B with A, because the bounds differ (`urdfkin.comparison.single`).
+        A is compared with B, and B with A, because the bounds differ (`JointComparison`).
         """
-        off = [
+        errors = [
             np.zeros((len(tree.joints), 3)) if robot.single is None else robot.single.joints
             for tree, robot in zip(self.trees, self.robots, strict=True)
         ]
         a, b = self.mechanisms
-        unlike = tuple(
-            JointComparison(found, (off[0], off[1]), base_as_written(a, b), self.tolerance).differences()
+        found = tuple(
+            JointComparison(
+                alignment, (errors[0], errors[1]), base_as_written(a, b), self.tolerance
+            ).differences()
         )
-        if unlike or not (off[0].any() or off[1].any()):
-            return unlike
-        back = align(b, a, {theirs: ours for ours, theirs in found.names.items()})
-        other = JointComparison(back, (off[1], off[0]), base_as_written(b, a), self.tolerance)
+        if found or not (errors[0].any() or errors[1].any()):
+            return found
+        back = align(b, a, _reversed(alignment.names))
+        other = JointComparison(back, (errors[1], errors[0]), base_as_written(b, a), self.tolerance)
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
-    def as_written(self, found: Alignment) -> Alignment:
-        """Return the alignment of the unchanged models, with the joint and link pairs of `found`.
+    def as_written(self, alignment: Alignment) -> Alignment:
+        """Return the alignment of the unchanged models, with the joint and link pairs of `alignment`.
 
         If one model is a Denavit-Hartenberg table, only links with equal names are compared, because the
         poses of the table's other links depend on its convention.
         """
         a, b = self.mechanisms
-        gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=found.b.orders)
-        written = align(a, b, found.names, gauge)
-        written.frames = written.frames_of(self._compared_links(found))
+        gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
+        written = align(a, b, alignment.names, gauge)
+        written.frames = written.frames_of(self._compared_links(alignment))
         return written
 
-    def _compared_links(self, found: Alignment) -> list[tuple[int, int]]:
-        tables = any(robot.origin.table for robot in self.robots)
+    def _compared_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
-        pairs = ((frame.a, frame.b) for frame in found.frames)
-        return [(a, b) for a, b in pairs if not tables or links[0][a] == links[1][b]]
+        pairs = ((frame.a, frame.b) for frame in alignment.frames)
+        return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
 
-    def _check_map(self, found: Alignment) -> None:
-        made = found.names
-        for ours, theirs in self.given.items():
-            if made.get(ours) != theirs:
+    def _check_map(self, alignment: Alignment) -> None:
+        names = alignment.names
+        for ours, theirs in self.joint_map.items():
+            if names.get(ours) != theirs:
                 raise InputError(
                     "these joints cannot be matched: their parent links are not matched",
                     where="map",
@@ -320,72 +323,77 @@ class Comparator:
                     remedy="also map the joints before these joints, or remove this pair",
                 )
 
-    def search(self, found: Alignment, variables: Variables, *, as_written: bool = False) -> DistanceSearch:
-        return DistanceSearch(self.robots, found, variables, as_written=as_written)
+    def search(
+        self, alignment: Alignment, variables: Variables, *, as_written: bool = False
+    ) -> DistanceSearch:
+        return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
-    def rounding(self, found: Alignment, variables: Variables) -> tuple[float, float]:
+    def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
         """Bound the distance and the angle (m, rad) between two frames that differ only by rounding.
 
         `same` ignores a small rounding difference at each joint, and these differences add up along the path.
         For a joint without limits, the sum uses the range in which the joint is sampled.
         """
-        ways = [
-            max(abs(end) for end in ends)
-            for step, pair in zip(found.steps, variables.pairs, strict=True)
-            if pair is not None and step.kind == "prismatic"
-            if math.isfinite(sum(ends := variables.range(pair.a)))
+        pairs = [
+            (step.kind, pair)
+            for step, pair in zip(alignment.steps, variables.pairs, strict=True)
+            if pair is not None
         ]
-        ways += [WIDEST for step in found.steps if step.kind in ("planar", "floating")]
-        reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(ways)
-        slides, turns = (
-            sum(
-                pair.rounding
-                for step, pair in zip(found.steps, variables.pairs, strict=True)
-                if pair is not None and (step.kind == "prismatic") is slide
-            )
-            for slide in (True, False)
-        )
-        way, angle = found.deepest * self.tolerance.way, found.deepest * self.tolerance.angle + turns
-        return way + slides + angle * reach, angle
+        travels = [
+            max(map(abs, ends))
+            for kind, pair in pairs
+            if kind == "prismatic" and math.isfinite(sum(ends := variables.range(pair.a)))
+        ]
+        travels += [WIDEST for step in alignment.steps if step.kind in ("planar", "floating")]
+        reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(travels)
+        slides = sum(pair.rounding for kind, pair in pairs if kind == "prismatic")
+        turns = sum(pair.rounding for kind, pair in pairs if kind != "prismatic")
+        metres = alignment.deepest * self.tolerance.way
+        radians = alignment.deepest * self.tolerance.angle + turns
+        return metres + slides + radians * reach, radians
 
-    def _intervals(self, found: Alignment, variables: Variables) -> tuple[Interval, ...]:
-        frames = found.frames
-        metres, radians = self.rounding(found, variables)
-        if not self.bounds:
-            return ()
-        uppers = self._uppers(found, variables)
-        off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
-        search = self.search(found, variables)
-        seen = dict(zip(off, search.worst([frames[k] for k in off]), strict=True)) if off else {}
-        self._sharpen(uppers, frames, search, NEAR * max((way for way, _ in seen.values()), default=0.0))
+    def _intervals(self, alignment: Alignment, variables: Variables) -> tuple[Interval, ...]:
+        frames = alignment.frames
+        metres, radians = self.rounding(alignment, variables)
+        uppers = self._upper_bounds(alignment, variables)
+        different = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
+        search = self.search(alignment, variables)
+        largest = search.largest_distances([frames[k] for k in different])
+        worst = dict(zip(different, largest, strict=True))
+        self._sharpen(uppers, frames, search, NEAR * max((way for way, _ in largest), default=0.0))
         return tuple(
-            self._interval(found, frame, search, seen.get(k), (uppers[k][0] + metres, uppers[k][1] + radians))
+            self._interval(
+                alignment, frame, search, worst.get(k), (uppers[k][0] + metres, uppers[k][1] + radians)
+            )
             for k, frame in enumerate(frames)
         )
 
-    def _most(
+    def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) for all frames; improve it only if it can then prove `within`."""
+        """Return one bound (m, rad) for all frames; sharpen it only if it can then prove `within`."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
         metres, radians = self.rounding(written, variables)
-        uppers = self._uppers(written, variables)
+        uppers = self._upper_bounds(written, variables)
         target = 0.0 if self.within is None else self.within - metres
         if farthest is not None and farthest.lower <= target:
             self._sharpen(uppers, written.frames, search, target)
-        most = _largest(uppers)
-        return most[0] + metres, most[1] + radians
+        largest = _largest(uppers)
+        return largest[0] + metres, largest[1] + radians
 
-    def _uppers(self, found: Alignment, variables: Variables) -> list[tuple[float, float]]:
+    def _upper_bounds(self, alignment: Alignment, variables: Variables) -> list[tuple[float, float]]:
         """Return the bound (m, rad) of each frame; the largest bounds are computed on a finer grid."""
-        frames = found.frames
-        uppers = [upper_bounds(found, variables, frame) for frame in frames]
-        off = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
+        frames = alignment.frames
+        uppers = [upper_bounds(alignment, variables, frame) for frame in frames]
+        different = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
         fine = set[int]()
-        while len(fine) < FARTHEST and off and (widest := max(off, key=lambda k: uppers[k])) not in fine:
-            uppers[widest] = upper_bounds(found, variables, frames[widest], FINE)
+        while len(fine) < min(FARTHEST, len(different)):
+            widest = max(different, key=lambda k: uppers[k])
+            if widest in fine:
+                break
+            uppers[widest] = upper_bounds(alignment, variables, frames[widest], FINE)
             fine.add(widest)
         return uppers
 
@@ -401,56 +409,59 @@ class Comparator:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
                 break
-            sharper = tightened(search, frames[widest], target, uppers[widest][0], self.boxes)
+            sharper = tighten(search, frames[widest], target, uppers[widest][0], self.boxes)
             uppers[widest] = sharper, uppers[widest][1]
             if sharper > target:
                 break
 
-    def _farthest(self, found: Alignment, variables: Variables) -> Interval | None:
+    def _farthest_as_written(self, written: Alignment, variables: Variables) -> Interval | None:
         """Search for the frame with the largest distance between A and B, and return its interval."""
-        if not found.frames:
+        if not written.frames:
             return None
-        metres, radians = self.rounding(found, variables)
-        search = self.search(found, variables, as_written=True)
-        off = search.seen(found.frames)[0].max(axis=0)
-        far = [found.frames[k] for k in np.argsort(-off, kind="stable")[:FARTHEST]]
-        if off.max() <= metres:  # no position differs, so the frame with the largest angle counts
-            far = [max(found.frames, key=lambda frame: upper_bounds(found, variables, frame)[1])]
-        climbed = zip(search.worst(far), far, strict=True)
-        seen, frame = max(climbed, key=lambda both: both[0][0])
-        upper = (math.inf, math.inf) if search.unbounded else upper_bounds(found, variables, frame, FINE)
-        return self._interval(found, frame, search, seen, (upper[0] + metres, upper[1] + radians))
+        metres, radians = self.rounding(written, variables)
+        search = self.search(written, variables, as_written=True)
+        distances = search.sampled_distances(written.frames)[0].max(axis=0)
+        far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:FARTHEST]]
+        if distances.max() <= metres:  # no position differs, so the frame with the largest angle counts
+            far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
+        worst = zip(search.largest_distances(far), far, strict=True)
+        attained, frame = max(worst, key=lambda pair: pair[0][0])
+        upper = (math.inf, math.inf) if search.unbounded else upper_bounds(written, variables, frame, FINE)
+        return self._interval(written, frame, search, attained, (upper[0] + metres, upper[1] + radians))
 
     def _interval(
         self,
-        found: Alignment,
+        alignment: Alignment,
         frame: FramePair,
         search: DistanceSearch,
-        seen: tuple[float, FloatArray] | None,
+        attained: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:
+        """Return a frame's interval; `attained` is the largest distance (m) found, with its variables."""
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
-        if seen is None:
+        if attained is None:
             return Interval(*names, 0.0, *upper, 0.0, (), ())
-        metres, z = seen
-        rounding = self.rounding(found, search.variables)
+        metres, z = attained
+        rounding = self.rounding(alignment, search.variables)
         if metres <= rounding[0] and upper[1] > rounding[1]:
-            z = search.most_turned(frame)
+            z = search.largest_rotation(frame)
         poses = search.poses(z[np.newaxis], [frame])
-        turned = apart(poses[0][0, 0], poses[1][0, 0])[0]
+        radians = pose_difference(poses[0][0, 0], poses[1][0, 0])[0]
         q_a, q_b = search.configurations(z[np.newaxis])
         lower = max(0.0, metres - rounding[0])
-        return Interval(*names, lower, *upper, turned, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
+        return Interval(*names, lower, *upper, radians, tuple(q_a[0].tolist()), tuple(q_b[0].tolist()))
 
-    def _confirm(self, found: Alignment, variables: Variables, frames: tuple[Interval, ...]) -> Confirmation:
+    def _confirm(
+        self, alignment: Alignment, variables: Variables, frames: tuple[Interval, ...]
+    ) -> Confirmation:
         """Check the bounds with Pinocchio, which reads the texts of A and B with its own parser."""
         if not all(checked_choice(robot.verifier.policy) for robot in self.robots):
             return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
             if (reason := robot.verifier.cannot()) is not None:
                 return Confirmation("not verified", reason=reason)
-        off = self.pinocchio_distances(found, variables)
-        for interval, metres in zip(frames, off, strict=False):
+        distances = self.pinocchio_distances(alignment, variables)
+        for interval, metres in zip(frames, distances, strict=False):
             if not metres <= interval.upper * (1.0 + EPS):
                 raise UrdfkinError(
                     "Pinocchio finds a distance beyond its proven bound",
@@ -458,13 +469,14 @@ class Comparator:
                     found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
                     remedy="please report this as an error of urdfkin, with both robots",
                 )
-        return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(off.max(initial=0.0)))
+        return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(distances.max(initial=0.0)))
 
-    def pinocchio_distances(self, found: Alignment, variables: Variables) -> FloatArray:
+    def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
         """Return each frame's largest distance (m) at `CONFIRMED` configurations, by Pinocchio."""
-        search = self.search(found, variables)
-        q_a, q_b = search.configurations(search.random(CONFIRMED), moved=True)
-        return np.asarray(search.at(q_a, q_b, found.frames, pinocchios).max(axis=0, initial=0.0))
+        search = self.search(alignment, variables)
+        q_a, q_b = search.configurations(search.random_values(CONFIRMED), moved=True)
+        distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
+        return np.asarray(distances.max(axis=0, initial=0.0))
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
@@ -475,7 +487,7 @@ def _reversed(names: Mapping[str, str]) -> dict[str, str]:
     return {theirs: ours for ours, theirs in names.items()}
 
 
-def _fixed_here(
+def _fixed_only_here(
     tree: KinematicTree,
     other: KinematicTree,
     names: Mapping[str, str],
@@ -507,7 +519,7 @@ def _with_idle_joints_fixed(
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
     A joint with the multiplier 0 never moves. The joint remains a mimic joint if the other model has a
-    matching joint (as in `_fixed_here`) that moves: then `same` compares the two joints.
+    matching joint (as in `_fixed_only_here`) that moves: then `same` compares the two joints.
     """
     moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
@@ -547,14 +559,14 @@ def _spelled_alike(
     return (labels[0], labels[1]), joints
 
 
-def _originals(names: Sequence[str], spelt: Sequence[str]) -> dict[str, str]:
+def _originals(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
     """Map each name that the USD file spells differently to the original name in `names`."""
-    known, found = set(spelt), dict[str, set[str]]()
+    known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
         if name not in known:
             for word in spellings(name) & known - set(names):
-                found.setdefault(word, set()).add(name)
-    return {word: own.pop() for word, own in found.items() if len(own) == 1}
+                originals.setdefault(word, set()).add(name)
+    return {word: own.pop() for word, own in originals.items() if len(own) == 1}
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
@@ -579,3 +591,258 @@ def parse_map(words: tuple[str, ...]) -> dict[str, str]:
             raise InputError("a pair of joints is JOINT_OF_A=JOINT_OF_B", where="--map", found=repr(word))
         pairs[ours] = theirs
     return pairs
+
+
+class JointComparison:
+    """Prove joint by joint that single precision is the cause of every difference between two models.
+
+    A bound on the displacement of a frame by rounding is a sum over all joints. An error in one joint can be
+    smaller than this sum, and a comparison with the sum does not detect the error. The proof in this class
+    does not add errors along the chain. Each joint may differ only by the rounding of the numbers in its own
+    definition.
+
+    **Compared quantities.** Two files can describe the same joint by different frames. For example, the
+    origin of a joint may be shifted along its axis, and a converter may add links or merge fixed links. The
+    proof therefore compares quantities that do not depend on the choice of frames. `same` computes these
+    quantities for each link that both models have. The robot is in the zero configuration, and the quantities
+    are expressed in the frame of a link P. P is the link's nearest ancestor in A that both models have. The
+    quantities are
+
+    - the pose of the link;
+    - the direction and the line of the axis of each joint between P and the link;
+    - the multiplier and the offset of each mimic rule.
+
+    By the product of exponentials, these quantities determine the pose of each common link in every
+    configuration. The models are compared as they are written: the roots of A and B coincide, and no joint
+    direction, joint zero or tool frame is changed.
+
+    **Bound.** Let the joints 1 to n be the joints on the path from P to the link. Rounding can shift the
+    frame after joint i by up to w_i, and rotate this frame by up to e_i. The function
+    `urdfkin.verify.usd_check.single_precision` computes w_i and e_i from the numbers of joint i. Let R_i be
+    the constant rotation of joint i, and p_i its origin. A star marks the exact values. Then
+
+        R_1 ... R_n    and    R*_1 ... R*_n    are apart by at most    e_1 + ... + e_n,
+
+    because the angle of a product of rotations is at most the sum of their angles. Let W be the position
+    error (m) and E the rotation error (rad) of the frame before joint i. The position error of the frame
+    after the joint is then at most
+
+        W + E |p_i| + w_i,
+
+    because R p_i - R* p*_i = (R - R*) p_i + R* (p_i - p*_i). The axis of joint i passes through the origin of
+    the frame after the joint, and is fixed in this frame. Therefore, the errors of the axis are at most the
+    position error and the rotation error of this frame. The multiplier and the offset of a mimic rule have a
+    relative error of at most 2^-24.
+
+    In B, P may be no ancestor of the link: the paths to P and to the link may branch at a common ancestor.
+    Let W and E be the position error and the rotation error of the link relative to this common ancestor. Let
+    V and F be the position error and the rotation error of P relative to the common ancestor. Let d be the
+    distance between the link and P. Then the position error of the link relative to P is at most W + V + F d,
+    and the rotation error is at most E + F. `same` ignores the rounding errors of double precision, so these
+    errors are added to the bounds. If both models are rounded, the bounds of both models are added.
+
+    **Both orders.** The bound for one joint can contain the rounding of other joints. This happens if the
+    parent of the joint is a link that only B has, or if P is far from the joint in B. Therefore, `same`
+    compares A with B, and also B with A. If the comparison starts with a rounded model, the path from P to
+    the link must have at most one moving joint. In the other model, the path from the common ancestor to P
+    must have no rounded joint. Otherwise, `same` reports the difference as not explained.
+
+    **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
+    difference. `same` names the first joint with such a difference. A joint can still have an error that is
+    smaller than the rounding of its own numbers. No comparison of the two models can detect an error of this
+    size. The proof does not cover planar joints, floating joints, joints in another order, and links on
+    different branches of A and B. These joints and links must agree up to double precision. Otherwise, `same`
+    reports the difference as not explained.
+
+    Args:
+        alignment: The alignment of the two models; only its pairs of joints and links are used.
+        errors: Bounds (joints, 3) on the errors of each joint of A and of B: m, rad, and the relative error
+            of its mimic rule. They are 0 for double precision.
+        base: (4, 4) pose of B's root in A's root frame, for unchanged models.
+        tolerance: The largest differences that count as rounding of double precision.
+    """
+
+    def __init__(
+        self,
+        alignment: Alignment,
+        errors: tuple[FloatArray, FloatArray],
+        base: FloatArray,
+        tolerance: Tolerance,
+    ) -> None:
+        self.alignment, self.errors, self.base, self.tolerance = alignment, errors, base, tolerance
+        self.mechanisms = alignment.a, alignment.b
+        self.trees = alignment.a.tree, alignment.b.tree
+        self.pairs = {frame.a: frame.b for frame in alignment.frames}
+        self.steps = {step.a: step for step in alignment.steps}
+        root_of_b = next((a for a, b in self.pairs.items() if b == 0), 0)
+        #: The link of A and the link of B at which the compared paths begin.
+        self.start = (0, self.pairs[0]) if 0 in self.pairs else (root_of_b, 0)
+        self.pairs[self.start[0]] = self.start[1]
+
+    def differences(self) -> Iterator[JointDifference]:
+        """Yield each difference that is larger than rounding; the links come in A's order."""
+        joints, links = self.trees[0].joints, self.trees[0].links
+        starts = [m.homes[link] for m, link in zip(self.mechanisms, self.start, strict=True)]
+        if not all(self.tolerance.holds(*pose_difference(IDENTITY, T)) for T in (self.base, *starts)):
+            yield JointDifference(f"link {links[self.start[0]]}", "base", None, "at another place")
+        compared = set[int]()
+        for link, other in sorted(self.pairs.items()):
+            if (link, other) == self.start:
+                continue
+            reference, path = self._reference_link(link)
+            paths = self._paths(0, reference, link), self._paths(1, self.pairs[reference], other)
+            yield from self._path_differences(link, paths)
+            compared.update(path)
+        for step in self.alignment.steps:
+            yield from self._rule_differences(step)
+            if step.a not in compared:
+                why = "carries no link that both models have"
+                yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
+
+    def _reference_link(self, link: int) -> tuple[int, list[int]]:
+        """Return the link's nearest ancestor in A that both models have, and the joints between the two.
+
+        Without such an ancestor, the result has the link at which all paths begin.
+        """
+        joints, path = self.trees[0].joints, list[int]()
+        while link:
+            path.insert(0, link - 1)
+            link = joints[link - 1].parent
+            if link in self.pairs:
+                return link, path
+        return self.start[0], path
+
+    def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
+        """Return the joints on the paths from the last common ancestor to two links."""
+        paths = self.trees[which].path(start), self.trees[which].path(end)
+        n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
+        return list(paths[0][n:]), list(paths[1][n:])
+
+    def _path_differences(
+        self, link: int, paths: Sequence[tuple[list[int], list[int]]]
+    ) -> Iterator[JointDifference]:
+        """Yield the differences on the paths of A and of B to the link P and to a common link."""
+        trees = self.trees
+        moving = [
+            [[i for i in path if tree.joints[i].kind.nv] for path in both]
+            for tree, both in zip(trees, paths, strict=True)
+        ]
+        steps = [self.steps.get(i) for i in moving[0][1]]
+        name = f"link {trees[0].links[link]}"
+        partners = [None if step is None or step.unlike else step.b for step in steps]
+        if moving[0][0] or moving[1][0] or partners != moving[1][1]:
+            yield JointDifference(name, "", None, "is carried by other joints in the other model")
+            return
+        # The joints paths[1][0] of B lie between the common ancestor and the reference link P.
+        if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
+            yield JointDifference(name, "", None, "is carried by joints without a common link between them")
+            return
+        if any(step is not None and step.kind in ("planar", "floating") for step in steps):
+            yield from self._free_joint_differences(name, [path for _, path in paths])
+            return
+        screws, poses, bounds = zip(
+            *(self._screws_and_pose(k, *both) for k, both in enumerate(paths)), strict=True
+        )
+        if not paths[0][0] and len(paths[0][1]) == 1:
+            name = f"joint {trees[0].joints[link - 1].name}"
+        origin = list(self._beyond_bound(name, "origin", *pose_difference(*poses), bounds[0] + bounds[1]))
+        yield from origin
+        for step in filter(None, steps):
+            joint = f"joint {trees[0].joints[step.a].name}"
+            pair, bound = zip(*(screws[k][i] for k, i in enumerate((step.a, step.b))), strict=True)
+            axis = list(
+                self._beyond_bound(joint, "axis", *self._axis_difference(step, *pair), bound[0] + bound[1])
+            )
+            # A shifted link origin also shifts the axis, so the axes are compared in the link's frame.
+            if axis and origin:
+                pair = tuple(screw.moved(inverse(T)) for screw, T in zip(pair, poses, strict=True))
+                axis = list(
+                    self._beyond_bound(
+                        joint, "axis", *self._axis_difference(step, *pair), sum(bound) + sum(bounds)
+                    )
+                )
+            yield from axis
+
+    def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
+        """Return the angle of two axes, and the distance of one axis' point from the other axis.
+
+        The point of an axis may lie anywhere on this axis.
+        """
+        ends = (axis, other) if self.errors[0].any() else (other, axis)
+        return smallest_motion(*ends, turns=step.kind == "turns")[1:]
+
+    def _screws_and_pose(
+        self, which: int, back: Sequence[int], path: Sequence[int]
+    ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
+        """Return a path's joint screws and the pose at its end, with bounds (m, rad) on their errors.
+
+        Both joint lists begin at the last common link. The list `back` has the fixed joints to the link P, in
+        whose frame the results are. `which` is 0 for A and 1 for B.
+        """
+        joints = self.trees[which].joints
+        T_common_P, P_errors = np.eye(4), np.zeros(2)
+        for i in back:
+            P_errors = self._errors_after(which, i, P_errors)
+            T_common_P = T_common_P @ joints[i].T_parent_joint
+        T, errors, T_P_common = np.eye(4), np.zeros(2), inverse(T_common_P)
+        screws: dict[int, tuple[Screw, FloatArray]] = {}
+
+        def errors_in_P() -> FloatArray:
+            lever = float(np.linalg.norm((T_P_common @ T)[:3, 3])) if back else 0.0
+            return np.asarray(errors + P_errors + np.array([P_errors[1] * lever, 0.0]))
+
+        for i in path:
+            errors, T = self._errors_after(which, i, errors), T @ joints[i].T_parent_joint
+            T_P_joint = T_P_common @ T
+            screws[i] = Screw(T_P_joint[:3, :3] @ joints[i].axis, T_P_joint[:3, 3]), errors_in_P()
+        return screws, T_P_common @ T, errors_in_P()
+
+    def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
+        """Return the error bounds (m, rad) after a joint; `errors` contains the bounds before the joint."""
+        metres, radians = self.errors[which][joint, :2]
+        lever = self.trees[which].joints[joint].length
+        return np.array([errors[0] + errors[1] * lever + metres, errors[1] + radians])
+
+    def _beyond_bound(
+        self, place: str, what: str, tilt: float, shift: float, bound: FloatArray
+    ) -> Iterator[JointDifference]:
+        """Yield a difference if the tilt (rad) or the shift (m) exceeds its bound (m, rad)."""
+        metres, radians = bound.tolist()
+        far, turned = shift > metres + self.tolerance.way, tilt > radians + self.tolerance.angle
+        if far or turned:
+            sizes = size_words(shift if far else 0.0, tilt if turned else 0.0)
+            explained = [length(metres)] * far + [angle(radians)] * turned if bound.any() else []
+            yield JointDifference(place, what, None, sizes, " and ".join(explained))
+
+    def _free_joint_differences(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
+        """Yield the differences of a planar or floating joint, which must be attached to the root body."""
+        ends = list(zip(self.mechanisms, paths, strict=True))
+        parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
+        bodies = [m.body_of[parent] for m, parent in zip(self.mechanisms, parents, strict=True)]
+        if any(bodies) or not all(len(path) == 1 for path in paths):  # the root body has the index 0
+            why = "follows a planar or floating joint that is not compared joint by joint"
+            yield JointDifference(name, "", None, why)
+            return
+        for T, other in (
+            [mechanism.homes[link] for (mechanism, _), link in zip(ends, parents, strict=True)],
+            [mechanism.homes[path[0] + 1] for mechanism, path in ends],
+        ):
+            if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
+                why = "follows a planar or floating joint with another frame"
+                yield JointDifference(name, "", None, why)
+
+    def _rule_differences(self, step: MatchedJoints) -> Iterator[JointDifference]:
+        a, b = self.trees[0].joints[step.a].mimic, self.trees[1].joints[step.b].mimic
+        place = f"joint {self.trees[0].joints[step.a].name}"
+        if a is None and b is None:
+            return
+        if a is None or b is None or self.alignment.names.get(a.leader) != b.leader:
+            yield JointDifference(place, "mimic joint", *(one.leader if one else "none" for one in (a, b)))
+            return
+        share = float(self.errors[0][step.a, 2] + self.errors[1][step.b, 2])
+        for what in ("multiplier", "offset"):
+            x, y = getattr(a, what), getattr(b, what)
+            size = max(abs(x), abs(y))
+            if abs(x - y) > share * size + self.tolerance.angle * max(1.0, size):
+                explained = f"{share * size:.2g}" if share else ""
+                yield JointDifference(place, f"mimic {what}", x, y, explained)

@@ -1,10 +1,10 @@
 """The acceleration of a frame as a sum of contributions, one for each joint and each kind of acceleration.
 
-This module follows sections 7.6 and 7.7. Consider joint k, and assume that all later joints are fixed. Then
-the frame's origin moves relative to link k-1. Its velocity u_k is v_k z x d for a revolute joint k, and v_k z
-for a prismatic joint k. Link k-1 itself rotates with the angular velocity w_{k-1}. The origin is thus a
-moving point in a moving frame, and equation 7.125 gives the terms of its acceleration. Equation 7.130 is the
-sum of these terms over all joints, from the last joint to the first:
+Sections 7.6 and 7.7. Consider joint k, and assume that all later joints are fixed. Then the frame's origin
+moves relative to link k-1. Its velocity u_k is v_k z x d for a revolute joint k, and v_k z for a prismatic
+joint k. Link k-1 itself rotates with the angular velocity w_{k-1}. The origin is thus a moving point in a
+moving frame, and equation 7.125 gives the terms of its acceleration. Equation 7.130 is the sum of these terms
+over all joints, from the last joint to the first:
 
 | kind | term | cause |
 |---|---|---|
@@ -13,9 +13,9 @@ sum of these terms over all joints, from the last joint to the first:
 | coriolis | 2 w_{k-1} x u_k | velocity of the joint while its link rotates |
 | sliding | a_k z | acceleration of a prismatic joint |
 
-The vector d leads from the joint's origin to the frame's origin. This vector d is computed as the sum of the
-interorigin vectors after the joint (equation 7.110). A difference of two positions in the world would lose
-digits if the robot is far from the world's origin or has a long link.
+The vector d from the joint's origin to the frame's origin is the sum of the interorigin vectors after the
+joint (equation 7.110). A difference of two positions in the world would lose digits if the robot is far from
+the world's origin or has a long link.
 
 The angular acceleration follows from equation 7.129. Its term a_k z is added to the transverse acceleration.
 Its term v_k w_{k-1} x z is added to the Coriolis acceleration. A planar or floating joint translates and
@@ -45,17 +45,13 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: The kinds of contribution, in the order of the array `terms`.
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
-
-
-#: This number of samples of a batch is displayed.
-_SHOWN = 2
+#: Maximum number of displayed samples of a batch.
+_MOST_SHOWN = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccelerationBreakdown(Displayable):
     """Contributions of the joints to a frame's acceleration.
-
-    The contribution of a joint is the sum of four kinds: transverse, centripetal, Coriolis and sliding.
 
     Attributes:
         joints: Names of the moving joints from the base to the frame.
@@ -85,11 +81,11 @@ class AccelerationBreakdown(Displayable):
         heads = ("joint", "kind", "lin x", "lin y", "lin z", "ang x", "ang y", "ang z")
         batch = self.base.shape[:-1]
         parts: list[str | Table] = ["m/s^2 and rad/s^2; the parts sum to the acceleration (7.125, 7.130)."]
-        for sample in list(np.ndindex(*batch))[:_SHOWN]:
+        for sample in list(np.ndindex(*batch))[:_MOST_SHOWN]:
             parts += [f"sample {list(sample)}"] if sample else []
             rows = [(joint, kind, *six.tolist()) for joint, kind, six in self.contributions(sample)]
             parts.append(Table(heads, [*rows, ("sum", "", *self.total[sample].tolist())], left=2))
-        if (more := math.prod(batch) - _SHOWN) > 0:
+        if (more := math.prod(batch) - _MOST_SHOWN) > 0:
             parts.append(f"... and {more} more samples")
         return TextDocument("Acceleration by joint and kind", parts)
 
@@ -133,25 +129,14 @@ def acceleration_breakdown(
 ) -> AccelerationBreakdown:
     """Return the contributions to the classical acceleration of a link's frame, with one leading axis n.
 
-    Args:
-        tree: The robot.
-        link: Index of the link that carries the frame.
-        q: (n, nq).
-        v: (n, nv).
-        a: (n, nv).
-        reference: The reference frame of the result.
-        base: (1 or n, 24) state of the base, see `BaseMotion.state`.
-        out: (n, joints, 4, 6) array for the terms.
-        threads: Largest number of threads; None for `evaluate.default_threads`.
-
-    Raises:
-        NotFiniteError: a number of q, v or a is not finite.
-        RangeError: a contribution exceeds the range of double precision.
+    `base` is the state of the base (1 or n, 24), see `BaseMotion.state`; `out` (n, joints, 4, 6) is an array
+    for the terms; `threads` is the largest number of threads. A number of q, v or a that is not finite raises
+    NotFiniteError; a contribution beyond the range of double precision raises RangeError.
     """
-    if not np.isfinite(a).all():  # The recursions that are called below check q and v.
+    if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # The frames are all links on the path.
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # All links on the path are frames.
     n = len(q)
     terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
@@ -177,8 +162,7 @@ def moving_joints(tree: KinematicTree, link: int) -> list[int]:
     return [i for i in tree.path(link) if tree.joints[i].kind.nv]
 
 
-# A result that is not finite raises an error at the end of this function.
-@np.errstate(over="ignore", under="ignore", invalid="ignore")
+@np.errstate(over="ignore", under="ignore", invalid="ignore")  # RangeError replaces these warnings.
 def _contributions(
     tree: KinematicTree,
     link: int,
@@ -254,7 +238,6 @@ def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) ->
 
 
 def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
-    """Return a joint's velocity or acceleration as vectors in world axes."""
     slide, turn = np.zeros((len(x), 3)), np.zeros((len(x), 3))
     if joint.kind is JointKind.PLANAR:
         slide[:, :2], turn[:, 2] = x[:, :2], x[:, 2]

@@ -41,9 +41,9 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Results with at least this number of bytes are written to memory, because the caches are too small.
+#: Least number of bytes of results that bypass the caches, because the caches are too small.
 _STREAMED = 2 << 20
-#: The buffer of results has at most this number of doubles, which fill half of the first-level cache.
+#: Maximum number of doubles in the buffer of results; they fill half of the first-level cache.
 _MOST_STAGED = 3072
 
 _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, KernelArgs.STRIDE_A
@@ -121,10 +121,7 @@ def jacobian_rates(
 def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[EvaluateOptions]
 ) -> FloatArray:
-    """Return Hessians (n, frames, 6, nv, nv).
-
-    [..., i, j] is the derivative of column i in the direction of the joint velocity j.
-    """
+    """Return Hessians (n, frames, 6, nv, nv); [..., i, j]: derivative of column i by joint coordinate j."""
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
@@ -167,7 +164,7 @@ def _compute(
     """
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
-    # An array with the stride 0 is one row that was broadcast to all rows.
+    # In an array with the stride 0, all rows are the same row of memory.
     inputs = [base, *(x[:1] if len(x) > 1 and x.strides[0] == 0 else x for x in inputs)]
     if (odd := _interpreted(name, program, reference, inputs, out, threads)) is None:
         odd = _compiled(name, program, reference, inputs, out, threads, staged=is_staged(out) and not read)
@@ -186,8 +183,8 @@ def _interpreted(
 ) -> int | None:
     """Compute a batch with Python numbers; return None, without a result, if a kernel is faster.
 
-    After a computation, return 1 if an input is nan, infinite or too large, and 0 otherwise. The function
-    measures the processor time of each configuration, and estimates from it whether a kernel is faster.
+    After a computation, return 1 if an input is nan, infinite or too large, and 0 otherwise. The measured
+    processor time of each configuration decides whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -237,9 +234,9 @@ def _compiled(
     core = preload.kernel(name)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
-        task, kept = task_of(program, reference, parts, part, staged=staged)
+        task, alive = task_of(program, reference, parts, part, staged=staged)
         outcome: int = core(address(task))
-        del kept
+        del alive
         return outcome
 
     return in_blocks(compute, inputs, out, threads)
@@ -248,8 +245,8 @@ def _compiled(
 def is_staged(out: FloatArray) -> bool:
     """Return whether results are collected in a buffer and then written to memory in whole cache lines.
 
-    A processor that writes a part of a cache line reads the whole line first. If the output is larger than
-    the cache, this read is slow.
+    A processor that writes a part of a cache line reads the whole line first. Reading is slow if the output
+    is larger than the cache.
     """
     return out.nbytes >= _STREAMED and LANES * out[0].size <= _MOST_STAGED
 
@@ -297,15 +294,13 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: By default, a batch with fewer configurations is computed with one thread.
-#: Starting a thread takes about ten microseconds.
+#: Least number of configurations for several threads; starting a thread takes about ten microseconds.
 _WORTH_THREADS = 4096
 
-#: NumPy computes this number of configurations at a time.
-#: The intermediate results then fit into the processor's cache.
+#: Number of configurations that NumPy computes at a time, so that intermediate results fit into the cache.
 PART = 2048
 
-#: The function computes the rows of its argument `out` from the rows of its argument `inputs`.
+#: A function that computes the rows of the argument `out` from the rows of the argument `inputs`.
 #: The function returns 1 if an input is nan, infinite or too large, else 0 (see `machine.memory.ordinary`).
 Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
@@ -316,7 +311,6 @@ def default_threads(n: int) -> int:
 
 
 def _processors() -> int:
-    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1  # macOS
@@ -337,16 +331,18 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         threads = min(threads, _processors())
     if threads <= 1:
         return compute(inputs, out)
-    parts = _parts(n, threads)
-    work = [_pool().submit(compute, _rows(inputs, n, *part), out[slice(*part)]) for part in parts]
+    work = [
+        _pool().submit(compute, [x[part] if len(x) == n else x for x in inputs], out[part])
+        for part in _parts(n, threads)
+    ]
     return max([future.result() for future in work])  # This waits until all threads have finished.
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
-    `compute` computes the rows of a slice. For an empty batch, it is called once, with an empty slice.
-    `threads` has the same meaning as in `in_blocks`.
+    `compute` computes the rows of a slice; for an empty batch, its only slice is empty. `threads` has the
+    same meaning as in `in_blocks`.
     """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
@@ -366,20 +362,15 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
     return None
 
 
-def _parts(n: int, threads: int) -> list[tuple[int, int]]:
+def _parts(n: int, threads: int) -> list[slice]:
     """Split `n` rows into at most `threads` parts of whole blocks; each part has at least one block."""
     blocks = n // LANES
     edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
-    return [(a, b) for a, b in pairwise(edges) if a < b]
-
-
-def _rows(inputs: Sequence[FloatArray], n: int, start: int, stop: int) -> list[FloatArray]:
-    return [x[start:stop] if len(x) == n else x for x in inputs]
+    return [slice(a, b) for a, b in pairwise(edges) if a < b]
 
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    """Return the thread pool of this process; a forked child process starts a new thread pool."""
     return ThreadPoolExecutor(_processors(), thread_name_prefix="urdfkin")
 
 

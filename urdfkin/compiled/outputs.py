@@ -1,8 +1,8 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-For each output (for example the velocity), a function `follow_...` selects the parts of a link's state that
-the output needs. A function `emit_...` writes the output of a frame. Jacobian columns are computed in world
-axes; for LOCAL they are rotated to the axes of the frame.
+For each output (for example the velocity), a function `mask_...` marks the vectors of a link's state that the
+output does not need. A function `emit_...` writes the output of a frame. Jacobian columns are computed in
+world axes; for LOCAL they are rotated to the axes of the frame.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: These are the scratch memory rows of a pose (16 numbers), and of a velocity or acceleration (six).
+#: Scratch memory rows of a pose (16 numbers), and of a velocity or acceleration (six).
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -29,17 +29,17 @@ def _unused_vector():
     return nothing(), nothing(), nothing()
 
 
-def follow_place(state):
+def mask_place(state):
     """Mark all vectors of a link's state as unused, except the rotation R and the position p."""
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
-def follow_velocity(state):
+def mask_velocity(state):
     """Mark the accelerations alpha and acc of a link's state as unused."""
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
-def follow_acceleration(state):
+def mask_acceleration(state):
     """Mark the linear velocity `vel` as unused: the acceleration (equation 7.130) does not depend on it."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
@@ -52,7 +52,6 @@ def _no_vector():
 
 
 def emit_place(m, s, program, place, sources, b, reference, state, to):
-    """Write the 4 by 4 pose of a frame to the output."""
     R, p = state[0], state[1]
     _pose_row(s, OUT_ROW, R[0], p[0])
     _pose_row(s, OUT_ROW + 4, R[1], p[1])
@@ -103,7 +102,7 @@ def emit_matrix(m, s, program, place, sources, b, reference, state, to):
 # -- columns ---------------------------------------------------------------------------------------------
 
 
-def keep_none(s, row, axis, state):
+def store_none(s, row, axis, state):
     """Do nothing, because this output has no Jacobian columns."""
 
 
@@ -111,7 +110,7 @@ def column_none(s, row, to, how, g, c, reference, state):
     """Do nothing, because this output has no Jacobian columns."""
 
 
-def keep_axis(s, row, axis, state):
+def store_axis(s, row, axis, state):
     """Store the axis z_{i-1} and the origin O_{i-1} of a joint in world axes, for equation 7.85."""
     R, p = state[0], state[1]
     if axis == 2:
@@ -123,9 +122,9 @@ def keep_axis(s, row, axis, state):
     put_vector(s, row + 3, p)
 
 
-def keep_moving_axis(s, row, axis, state):
+def store_moving_axis(s, row, axis, state):
     """Store a joint's axis and origin, and the velocities w and vel of the link that carries the axis."""
-    keep_axis(s, row, axis, state)
+    store_axis(s, row, axis, state)
     put_vector(s, row + 6, state[2])
     put_vector(s, row + 9, state[3])
 
@@ -142,10 +141,7 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 
 
 def column_rate(s, row, to, how, g, c, reference, state):
-    """Compute the time derivative of a Jacobian column (7.126).
-
-    For the reference frame LOCAL, this is the derivative of the column's components in the frame's own axes.
-    """
+    """Compute the time derivative of a Jacobian column (7.126), for LOCAL in the frame's moving axes."""
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
@@ -165,7 +161,7 @@ def column_rate(s, row, to, how, g, c, reference, state):
 
 
 def _end(reference, x):
-    """Return a Jacobian column's reference point: the frame's origin x, or for WORLD the world's origin."""
+    """Return the reference point of a Jacobian column: the frame's origin x, or 0 for WORLD."""
     if reference == _WORLD:
         nil = same(0.0)
         x = nil, nil, nil

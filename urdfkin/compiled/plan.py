@@ -7,10 +7,10 @@ the constant offsets between moving joints. A compiled tree contains only the jo
 frames.
 
 The program consists of the instructions for each block of configurations. The instructions are chosen once
-for each robot. There are special instructions for a translation along a coordinate axis and for a rotation
-about a coordinate axis. These instructions take a third of the time of the general instructions. A
-translation by zero needs no instruction. The state of a link stays in registers until the next link is
-computed. At a branch of the tree, the state is saved to memory and read again later.
+for each robot. Instructions for a translation along, or a rotation about, a coordinate axis take a third of
+the time of the general instructions. A translation by zero needs no instruction. The state of a link stays in
+registers until the next link is computed. At a branch of the tree, the state is saved to memory and read
+again later.
 
 `KernelArgs` names the arguments of a kernel. All arguments of a kernel are integers: memory addresses,
 lengths and options.
@@ -53,10 +53,9 @@ class JointMotion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Numbers that describe a joint in `CompiledTree.geometry`: rotation R, offset and mimic rule.
+    """Indices of the numbers of a joint in `CompiledTree.geometry`: rotation R, offset and mimic rule.
 
-    The offset leads from the previous moving joint to this joint; its components are in the previous joint's
-    axes.
+    The offset leads from the previous moving joint to this joint, in the previous joint's axes.
     """
 
     R = 0
@@ -66,7 +65,7 @@ class Geometry(IntEnum):
 
 
 class ColumnField(IntEnum):
-    """Integers that describe one Jacobian column (eq. 7.85): a row of `CompiledTree.columns`."""
+    """Columns of `CompiledTree.columns` (integers); a row describes a Jacobian column (eq. 7.85)."""
 
     STEP = 0
     AXIS = 1
@@ -82,8 +81,7 @@ _MOTION = {
     JointKind.FLOATING: JointMotion.FLOATING,
 }
 
-#: A planar joint, for example, has two translations and a rotation.
-#: A motion is the index of its axis in the joint's frame, and True for a rotation or False for a translation.
+#: Motions of each kind of joint: the index of the axis in the joint's frame, and True for a rotation.
 _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
     JointMotion.TURN: ((2, True),),
     JointMotion.SLIDE: ((2, False),),
@@ -109,20 +107,18 @@ class CompiledTree:
             sorted by the first integer.
         offsets: (frames, 12) rotation matrix (9 numbers) and translation (3 numbers) of each frame, relative
             to the frame of its last moving joint.
-        columns: (columns, 4) integers for each Jacobian column, see `ColumnField`. A planar joint has three
-            columns, and a floating joint has six.
-        multipliers: (columns,) the mimic multiplier of each column's joint; 1 for a joint that mimics no
-            other joint.
+        columns: (columns, 4) integers, columns `ColumnField`. A planar joint has three Jacobian columns, and
+            a floating joint has six.
+        multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
         leaders: (frames, columns) index of the column to which a column is added. The columns of a joint and
             of its mimic joints are added, because these joints have the same joint velocity. Their sum is
             stored in the first of these columns on the path to the frame. The index is -1 if the column's
             joint does not move the frame.
         places_q: Indices of the coordinates that the recursion needs.
-        parents: (steps,) for each moving joint: the index of the previous moving joint on the path from the
-            base, or -1.
+        parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
-            fixed joints. The first sums are from the previous moving joint to each moving joint. The other
-            sums are from the last moving joint to each frame, in the order of `frames`.
+            fixed joints: from the previous moving joint to each moving joint, then from the last moving joint
+            to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum of the angles `Joint.tilt`, rad, of these joints, in output order.
     """
@@ -152,8 +148,8 @@ class CompiledTree:
                 value.setflags(write=False)
 
     @cached_property
-    def made(self) -> dict[object, Any]:
-        """Cache of objects that are computed from this tree, such as programs and weights of error bounds."""
+    def cache(self) -> dict[object, Any]:
+        """Objects that are computed from this tree, such as programs and weights of error bounds."""
         return {}
 
     @cached_property
@@ -215,8 +211,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
     """Return the number of joints between the root and each link on the paths to the given links.
 
-    Each joint is visited once. A separate path for each link would take time proportional to the tree's
-    depth.
+    Each joint is visited once, so the time is not proportional to the number of links times the depth.
     """
     met = {0}
     for end in links:
@@ -308,7 +303,7 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 
 
 class Op(IntEnum):
-    """The instructions of a program; the suffix is the axis, and without a suffix the axis is arbitrary."""
+    """Instructions of a program; the suffix is the axis, and without a suffix the axis is arbitrary."""
 
     END = 0
     CARRY_X = 1  # translation along a rigid link
@@ -325,7 +320,7 @@ class Op(IntEnum):
     FLOATING = 12
     SAVE = 13
     RESUME = 14
-    KEEP = 15  # It stores the data that the joint's Jacobian column needs.
+    STORE = 15  # data that the Jacobian column of a joint needs
     COLUMN = 16
     EMIT = 17
 
@@ -348,23 +343,17 @@ class Head(IntEnum):
     BASE = 12  # first scratch row of the base's motion
 
 
-#: A row of scratch memory has one double for each of eight configurations.
+#: Number of doubles in a row of scratch memory, one for each of eight configurations.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: An instruction has five integers: the operation, three operands, and the index of its constants.
+#: Number of integers of an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Each joint angle has four integers; the first two are the scratch rows of the angle and of its sine.
-#: The third integer is the index of the mimic rule in the constants.
-#: The fourth integer is 1 if the joint is a mimic joint, else 0.
+#: Number of integers of a joint angle: scratch row, scratch row of the sine, mimic rule, whether it mimics.
 ANGLE_WIDTH = 4
-#: The first rows of scratch memory have fixed uses: `ZERO_ROW` contains 0, and `ONE_ROW` contains 1.
-#: The results of a frame begin at `OUT_ROW`, and `ANGLE_ROW` contains a joint angle.
-#: Other numbers begin at `FIRST_ROW`.
+#: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
-STATE_ROWS, KEPT_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Each Jacobian column of a Hessian has four integers.
-#: The first three are the scratch row of the column, its joint's index, and the index of its velocity in v.
-#: The fourth integer is the scratch row in which derivatives of the column are summed.
+STATE_ROWS, STORED_ROWS, COLUMN_ROWS = 24, 12, 6
+#: Number of integers of a Jacobian column of a Hessian: scratch row, joint, index in v, row of the sum.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -392,7 +381,7 @@ class KernelProgram:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """The memory addresses of `words` and `constants`, which are valid while the program exists."""
+        """Memory addresses of `words` and `constants`, which are valid while the program exists."""
         return address(self.words), address(self.constants)
 
     @cached_property
@@ -416,10 +405,10 @@ def program_of(
             computed from all pairs of Jacobian columns.
     """
     key = turned, columns, pairs
-    made: KernelProgram | None = plan.made.get(key)
-    if made is None:
-        made = plan.made[key] = _Writer(plan, *key).program()
-    return made
+    program: KernelProgram | None = plan.cache.get(key)
+    if program is None:
+        program = plan.cache[key] = _Writer(plan, *key).program()
+    return program
 
 
 class _Writer:
@@ -433,8 +422,8 @@ class _Writer:
         self.a = self.v + plan.nv
         self.base = self.a + plan.nv
         self.sines = self.base + STATE_ROWS
-        self.kept = self.sines + 2 * len(plan.steps)
-        self.results = self.kept + KEPT_ROWS * len(plan.columns) * columns
+        self.stored = self.sines + 2 * len(plan.steps)
+        self.results = self.stored + STORED_ROWS * len(plan.columns) * columns
         self.sums = self.results + COLUMN_ROWS * len(plan.columns) * columns
         self.saved = self.sums + COLUMN_ROWS * len(plan.columns) * pairs
         self.rules = [self._rule(i) for i in range(len(plan.steps))]
@@ -455,6 +444,7 @@ class _Writer:
     def _write(self) -> None:
         """Write the instructions for all joints and frames, from the base outwards."""
         events = list(self._events())
+        columns = self.plan.columns if self.columns else self.plan.columns[:0]
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
         now, c = -1, 0
         self._save(-1, last, 0)
@@ -464,16 +454,12 @@ class _Writer:
             if step is not None:
                 self._step(step)
                 now = step
-                while (
-                    self.columns
-                    and c < len(self.plan.columns)
-                    and self.plan.columns[c, ColumnField.STEP] == step
-                ):
-                    self._put(Op.KEEP, self.kept + KEPT_ROWS * c, int(self.plan.columns[c, ColumnField.AXIS]))
+                while c < len(columns) and columns[c, ColumnField.STEP] == step:
+                    self._put(Op.STORE, self.stored + STORED_ROWS * c, int(columns[c, ColumnField.AXIS]))
                     c += 1
                 self._save(step, last, k + 1)
             elif frame is not None and self._frame(frame):
-                now = -2  # The registers now contain the state of the frame, not of a joint.
+                now = -2  # The registers contain the state of the frame, not of a joint.
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
         """Yield the moving joints and frames in the order in which the recursion visits them.
@@ -490,7 +476,7 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """If the state after a joint is needed again later, write an instruction that saves the state.
+        """Write an instruction that saves the state after a joint, if a later event needs the state.
 
         `last[i]` is the index of the last event that uses the state after joint i. The event with index
         `following` comes next and uses the state in the registers, so only later events need the saved state.
@@ -566,7 +552,7 @@ class _Writer:
                 follows = 0 if multiplier == 1.0 else self._constants(multiplier)
                 to = c if self.pairs else leader
                 how = int(self.plan.columns[c, ColumnField.TURNS]) + 2 * (to != c)
-                rows = self.kept + KEPT_ROWS * c, self.results + COLUMN_ROWS * to
+                rows = self.stored + STORED_ROWS * c, self.results + COLUMN_ROWS * to
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
@@ -602,10 +588,9 @@ def _blocks(places: Sequence[int]) -> list[int]:
     return sorted({int(place) // 8 * 8 for place in places})
 
 
-#: A cache line of the processor has this number of bytes.
-#: If a vector is partly in one cache line and partly in the next, access to it takes twice as long.
+#: Number of bytes in a cache line; access to a vector in two cache lines takes twice as long.
 _LINE = 64
-#: A kernel represents the reference frames by these integers; another frame raises a KeyError.
+#: Integers of the reference frames in a kernel; another frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
@@ -614,11 +599,7 @@ REFERENCES = {
 class KernelArgs(IntEnum):
     """Indices of the integers of a kernel; those from CORE on are only for calls with one configuration."""
 
-    @staticmethod
-    def _generate_next_value_(name: str, start: int, count: int, last_values: list[int]) -> int:
-        return count
-
-    PROGRAM = auto()
+    PROGRAM = 0
     CONSTANTS = auto()
     SCRATCH = auto()
     REFERENCE = auto()
@@ -628,7 +609,7 @@ class KernelArgs(IntEnum):
     A = auto()
     #: Address of the base's state (rows of 24 numbers); 0 for a fixed base at the world's origin.
     BASE = auto()
-    #: A stride is the number of doubles between two configurations; 0 if all use the same numbers.
+    #: Number of doubles from one configuration to the next; 0 if all configurations use the same numbers.
     STRIDE_Q = auto()
     STRIDE_V = auto()
     STRIDE_A = auto()
@@ -636,7 +617,7 @@ class KernelArgs(IntEnum):
     OUT = auto()
     #: Number of output numbers for one configuration.
     WIDTH = auto()
-    #: The buffer at this address collects a block's results before they are written; 0 means no buffer.
+    #: Address of the buffer that collects a block's results before they are written; 0 without a buffer.
     STAGE = auto()
 
     CORE = auto()
@@ -651,10 +632,8 @@ class KernelArgs(IntEnum):
 
 
 def address(x: NDArray[Any]) -> int:
-    """Return the address of an array's first number."""
-    # `x.ctypes.data` is slower, because it runs Python code.
-    found: int = x.__array_interface__["data"][0]
-    return found
+    first: int = x.__array_interface__["data"][0]  # `x.ctypes.data` is slower, because it runs Python code.
+    return first
 
 
 def scratch(program: KernelProgram) -> FloatArray:

@@ -2,10 +2,13 @@
 
 A single configuration needs no kernel: Python computes exactly the same result in a millisecond. Importing
 Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this module
-measures how long Python has computed without each kernel. When this time exceeds `LOADING`, the kernel is
-read from disk. If the kernel is not on disk and the time exceeds `BESIDE`, a second process compiles the
-kernel. Until the second process has finished, Python computes. If computing with Python would take longer
-than `COMPILING`, this process compiles the kernel.
+measures how long Python has computed without each kernel.
+
+| time without a kernel | action |
+|---|---|
+| more than `LOADING` | read the kernel from disk |
+| more than `BESIDE`, no kernel on disk | compile the kernel in a second process; Python still computes |
+| more than `COMPILING`, no kernel on disk | compile the kernel in this process |
 """
 
 from __future__ import annotations
@@ -19,28 +22,24 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from urdfkin.compiled.kept import cache_folder, compiling
+from urdfkin.compiled.kernel_cache import cache_folder, compiling
 from urdfkin.system.locks import importing
 
 if TYPE_CHECKING:
     import subprocess
 
-#: These limits (s) apply to the time of computations without a kernel.
-#: Above the first limit, Numba is imported and the kernel is read from disk.
-#: Above the second limit, this process compiles a kernel that is not on disk.
-LOADING, COMPILING = 0.3, 3.0
-#: After this many seconds of computing without a kernel, a second process compiles the kernel.
-BESIDE = 1.0
-#: After the first kernel is loaded, this limit (s) is used instead of `LOADING`.
+#: Times (s) without a kernel after which the actions in the table of the module docstring follow.
+LOADING, BESIDE, COMPILING = 0.3, 1.0, 3.0
+#: Time (s) that replaces `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03
-#: The fast function saves this time (s) for each call with one configuration.
+#: Time (s) that the fast function saves in each call with one configuration.
 _SAVED = 5e-5
-#: After this time (s), the cache folder is searched again for a missing kernel.
+#: Time (s) after which the cache folder is searched again for a missing kernel.
 _AGAIN = 0.05
 
 #: Modules that contain the kernels.
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: One process compiles `_ONE_HALF`, another `_OTHER_HALF`; the compile times are about equal.
+#: Two processes compile one half of the kernels each; the compile times are about equal.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -57,10 +56,7 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """While the context is open, always compute with kernels, or always compute without kernels.
-
-    A test can thus compare results of Python numbers with results of kernels.
-    """
+    """Always compute in one way while the context is open, so that a test can compare both ways."""
     _only.append(way)
     try:
         yield
@@ -107,7 +103,6 @@ def single_pays(name: str) -> bool:
 
 
 def load(name: str, home: str = RECURSIONS) -> Any:
-    """Compile a kernel, or read the kernel from disk, and return it."""
     with compiling, importing:
         found = getattr(import_module(home), name)
     _ = found.compiled
@@ -128,7 +123,7 @@ def _on_disk(name: str) -> bool:
 
 # -- the second process ----------------------------------------------------------------------------------
 
-#: This code ends the second process when its standard input closes, that is, when this process ends.
+#: Code that ends the second process when its standard input closes, that is, when this process ends.
 _UNTIL_CLOSED = (
     "import os, sys, threading;"
     " threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start();"
@@ -137,18 +132,19 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Start a second process that compiles a kernel, and return whether such a process runs.
+    """Start a second process that compiles a kernel, and return whether a second process runs.
 
-    At most one such process runs at a time, and it is started at most once for each kernel. The function also
-    returns True while the second process compiles another kernel.
+    At most one second process runs at a time, and each kernel gets at most one. If the second process
+    compiles another kernel, the function also returns True.
     """
     if cache_folder() is None:
         return False
-    running = any(process.poll() is None for process in _beside.values())
-    if name not in _beside and not running:
-        _beside[name] = _compile_elsewhere((name,), home)
-        running = True
-    return running
+    if any(process.poll() is None for process in _beside.values()):
+        return True
+    if name in _beside:
+        return False
+    _beside[name] = _compile_elsewhere((name,), home)
+    return True
 
 
 def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
@@ -170,13 +166,9 @@ def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subproce
 
 def _end_beside() -> None:
     for process in _beside.values():
-        _end(process)
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
-    process.wait()
-    _close(process)
+        process.kill()
+        process.wait()
+        _close(process)
 
 
 def _close(process: subprocess.Popen[bytes]) -> None:
@@ -185,7 +177,7 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 
 def _forget_beside() -> None:
-    """Close the second process's standard input in a forked child, which must not keep it open."""
+    """Close the second process's standard input in a forked child, so that only the parent keeps it open."""
     for process in _beside.values():
         process.returncode = 0
         _close(process)
@@ -205,10 +197,10 @@ def are_on_disk() -> bool:
 
 
 def load_kernels() -> None:
-    """Compile every kernel, or read it from disk, before several processes need the kernels.
+    """Load every kernel before several processes start, because each of them would compile it.
 
-    Otherwise each of them would compile the kernels. A process compiles on one processor only, so a second
-    process compiles half of the kernels, and this process reads them from disk.
+    A process compiles on one processor only, so a second process compiles half of the kernels, and this
+    process reads them from disk.
     """
     missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
     helper = _compile_elsewhere(_OTHER_HALF) if missing else None

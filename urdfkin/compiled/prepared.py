@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from urdfkin.compiled import preload
-from urdfkin.compiled.kept import compiling
+from urdfkin.compiled.kernel_cache import compiling
 from urdfkin.compiled.plan import CompiledTree, KernelArgs
 from urdfkin.model.configuration import warn_of_degrees
 from urdfkin.model.configuration_like import Given
@@ -21,9 +21,8 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: A fast function is called as f(q, out), f(q, v, out) or f(q, v, a, out).
-#: It returns the result, or None for arguments that it does not support.
-#: If it returns None, `Robot` computes the result or raises the error.
+#: A function that is called as f(q, out), f(q, v, out) or f(q, v, a, out).
+#: It returns None for unsupported arguments; then `Robot` computes the result or raises the error.
 Fast = Callable[..., FloatArray | None]
 
 
@@ -87,7 +86,7 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether `Robot.prepare` created this object; its first call then compiles machine code.
+        #: Whether `Robot.prepare` created this object, so that the first call compiles machine code.
         self.wanted = False
         # At the first call of a quantity, `_first` replaces the quantity's attribute by a compiled function.
         self._placement: Fast = partial(self._first, "placement")
@@ -97,10 +96,8 @@ class PreparedFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., PreparedFrame], tuple[str, Reference]]:
-        # The object contains addresses of this process, so `Robot.prepare` creates the copy.
+        # The object contains addresses of this process, so unpickling calls `Robot.prepare`.
         return partial(self._robot.prepare, verify=self.verify), (self.frame, self.reference)
-
-    # The fast functions record in the ledger whether each result was checked.
 
     def placement(self, q: Given, out: FloatArray | None = None) -> FloatArray:
         """Return T_world_frame (4, 4) by eq. 7.77.
@@ -167,10 +164,10 @@ class PreparedFrame:
         )
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Create the fast function of a quantity and call it; return None if this does not save time."""
-        # The fast function does not normalise quaternions or check for overflow; `Robot` does.
-        robots = self._robot.tree.floating_joints or self._plan.is_large
-        if robots or not (isinstance(q, np.ndarray) and q.ndim == 1):
+        """Create the fast function of a quantity and call it; return None if the call does not save time."""
+        # Only `Robot` normalises quaternions and checks for overflow.
+        needs_robot = self._robot.tree.floating_joints or self._plan.is_large
+        if needs_robot or not (isinstance(q, np.ndarray) and q.ndim == 1):
             return None
         if not self.wanted and not preload.single_pays(f"{quantity}s"):
             return None

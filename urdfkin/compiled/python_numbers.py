@@ -12,14 +12,14 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: If all coordinates, velocities, lengths and multipliers are below this number, no result overflows.
+#: Bound on coordinates, velocities, lengths and multipliers below which no result overflows.
 #: For N joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2.
 #: An angular velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
 LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: If this constant is added to a number below 2^51, the sum is rounded to an integer.
+#: The sum of this constant and a number below 2^51 is rounded to an integer.
 #: The lowest bits of the sum's mantissa are the integer nearest to the number.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
@@ -59,7 +59,7 @@ def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[
     return fma
 
 
-#: Return x y + z, which is rounded only once.
+#: Function that returns x y + z, rounded only once.
 fma = _python_fma(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
 
 
@@ -200,7 +200,7 @@ def one() -> Known:
 
 
 def nothing() -> Known:
-    """Return the object that stands for a number that is not needed."""
+    """Return the object that stands for a number that no output needs; every result of it is `nothing()`."""
     return _NOTHING
 
 
@@ -222,7 +222,7 @@ def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
 
 
 def put(s: list[Number], row: int, x: Any) -> None:
-    """Write a number to a row of scratch memory; `nothing()` does not change the row."""
+    """Write a number to a row of scratch memory; `nothing()` leaves the row as it is."""
     if x is not _NOTHING:
         s[row] = x if type(x) is Number else Number(_double(x))
 
@@ -231,8 +231,7 @@ def constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-#: Return a double as a number.
-same = Number
+same = Number  # compiled code repeats a double for all configurations of a block
 
 
 def numbers_of(array: Any) -> Any:

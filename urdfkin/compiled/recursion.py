@@ -8,14 +8,24 @@ The state of a link consists of:
 | w, vel | angular velocity, velocity of the origin | world or link axes, as `axes` selects |
 | alpha, acc | angular acceleration, acceleration of the origin | world or link axes, as `axes` selects |
 
-A vector that a result does not need is `nothing()` and costs no time. This module and the modules `axes`,
-`outputs` and `recursions` contain plain functions that compute with the module `python_numbers`. The kernels
-are copies of these functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
+The textbook uses world axes. The rotation R of a link converts components in the link's axes to components in
+world axes. The joint axis and the interorigin vector have constant components in the link's axes.
+
+| `axes` | joint axis and interorigin vector | velocities and accelerations of the previous link |
+|---|---|---|
+| `world_axes` | rotated by R | unchanged |
+| `link_axes` | constant: (0, 0, 1) and a constant vector | rotated to the next link's axes |
+
+The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
+add the rounding errors of another rotation.
+
+A vector that a result does not need is `nothing()` and costs no time. This module and the modules `outputs`
+and `recursions` contain plain functions that compute with the module `python_numbers`. The kernels are copies
+of these functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
 """
 
 from __future__ import annotations
 
-from urdfkin.compiled.axes import seen, seen_after
 from urdfkin.compiled.plan import (
     ANGLE_ROW,
     ANGLE_WIDTH,
@@ -65,7 +75,31 @@ _ANGLES, _ANGLES_END = int(Head.ANGLES), int(Head.ANGLES_END)
 _END, _CARRY_X, _CARRY_Y, _CARRY_Z, _CARRY = map(int, (Op.END, Op.CARRY_X, Op.CARRY_Y, Op.CARRY_Z, Op.CARRY))
 _TURN_X, _TURN_Y, _TURN_Z, _TURN = map(int, (Op.TURN_X, Op.TURN_Y, Op.TURN_Z, Op.TURN))
 _REVOLUTE, _PRISMATIC, _PLANAR, _FLOATING = map(int, (Op.REVOLUTE, Op.PRISMATIC, Op.PLANAR, Op.FLOATING))
-_SAVE, _RESUME, _KEEP, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.KEEP, Op.COLUMN))
+_SAVE, _RESUME, _STORE, _COLUMN = map(int, (Op.SAVE, Op.RESUME, Op.STORE, Op.COLUMN))
+
+# -- axes -------------------------------------------------------------------------------------------
+
+
+def link_axes(own, world):
+    return own
+
+
+def world_axes(own, world):
+    return world
+
+
+def seen(axes, R, x):
+    """Return the components of x, given in the link's axes, in the axes of `link_axes` or `world_axes`."""
+    return axes(x, eq.rotate(R, x))
+
+
+def seen_after(axes, S, x):
+    """Return a link's velocity or acceleration x after the link's frame is rotated by S.
+
+    In world axes, the components of x do not change. In the link's axes, they are rotated.
+    """
+    return axes(eq.rotate(eq.transposed(S), x), x)
+
 
 # -- from one link to the next ------------------------------------------------------------------------
 
@@ -85,7 +119,7 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of a link after the axes of its frame are rotated by S; its motion does not change."""
+    """Return the state of a link after only the axes of the link's frame are rotated by S."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -154,12 +188,10 @@ def _rate(wanted, s, row, g, c, follows):
 
 
 def _vector_if(wanted, s, row):
-    """Return the vector in three consecutive scratch rows, or `nothing()` if `wanted` is `nothing()`."""
     return number_if(wanted[0], s, row), number_if(wanted[1], s, row + 1), number_if(wanted[2], s, row + 2)
 
 
 def _planar(axes, state, s, q, row, v, a):
-    """Compute the state after a planar joint, which translates along x and y and rotates about z."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), zero()))
     state = _turned_about_z(axes, state, s, row)
     w, alpha = state[2][0], state[4][0]
@@ -169,7 +201,6 @@ def _planar(axes, state, s, q, row, v, a):
 
 
 def _floating(axes, state, s, q, v, a):
-    """Compute the state after a floating joint, which translates along and rotates about all three axes."""
     state = carried(axes, state, (number(s, q), number(s, q + 1), number(s, q + 2)))
     x, y, z, w = number(s, q + 3), number(s, q + 4), number(s, q + 5), number(s, q + 6)
     state = turned(axes, state, eq.rotation_of_quaternion(x, y, z, w))
@@ -198,14 +229,12 @@ def _rotation(g, i):
 
 
 def put_vector(s, row, x):
-    """Write a vector to three consecutive rows of scratch memory."""
     put(s, row, x[0])
     put(s, row + 1, x[1])
     put(s, row + 2, x[2])
 
 
 def vector(s, row):
-    """Return the vector in three consecutive rows of scratch memory."""
     return number(s, row), number(s, row + 1), number(s, row + 2)
 
 
@@ -349,11 +378,11 @@ def _added(total, m, x, b, width, stride):
     return add_squares(total, x, b * stride, (m if stride else 1) * width)
 
 
-def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, column, emit):
+def _block(axes, m, task, program, g, s, b, reference, orders, mask, store, column, emit):
     """Run the recursion for the `m` configurations from index `b` on."""
     _read_inputs(m, task, program, s, b, orders)
     _sines_and_cosines(s, program, g)
-    state = follow(_start(axes, m, s, task, program[_ROW_BASE], b))
+    state = mask(_start(axes, m, s, task, program[_ROW_BASE], b))
     at, stage = program[_CODE], task[_STAGE]
     to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
     if task[_BASE] == 0 and _CARRY_X <= program[at] <= _CARRY:
@@ -371,8 +400,8 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
             _save(s, x, state)
         elif op == _RESUME:
             state = _resume(s, x, state)
-        elif op == _KEEP:
-            keep(s, x, y, state)
+        elif op == _STORE:
+            store(s, x, y, state)
         elif op == _COLUMN:
             column(s, x, y, z, g, c, reference, state)
         else:
@@ -382,15 +411,15 @@ def _block(axes, m, task, program, g, s, b, reference, orders, follow, keep, col
         stream(to, m * width, numbers_at(task[_OUT]), b * width, task[_OUT])
 
 
-def forward_recursion(address, axes, orders, follow, keep, column, emit):
+def forward_recursion(address, axes, orders, mask, store, column, emit):
     """Execute a program for every block; return 1 if an input is nan, infinite or too large, else 0.
 
     Args:
         address: Address of the kernel's arguments (`KernelArgs`).
         axes: `link_axes` or `world_axes`: the axes in which vectors are expressed.
         orders: Number of inputs that are read: 1 for q, 2 for q and v, 3 for q, v and a.
-        follow: Function that replaces the unused vectors of a link's state by `nothing()`.
-        keep: Function that stores what a joint's Jacobian column needs, for example the joint's axis.
+        mask: Function that replaces the unused vectors of a link's state by `nothing()`.
+        store: Function that stores what a joint's Jacobian column needs, for example the joint's axis.
         column: Function that computes a column of J or of J-dot.
         emit: Function that writes the result of a frame.
     """
@@ -404,7 +433,7 @@ def forward_recursion(address, axes, orders, follow, keep, column, emit):
     for first in range(0, n, m):
         b = min(first, n - m)  # The last block may overlap the block before it.
         total = _squares(total, m, task, program, b, orders)
-        _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, follow, keep, column, emit)
+        _block(axes, m, task, program, g, s, b, task[_REFERENCE], orders, mask, store, column, emit)
     if task[_STAGE]:
         all_written()
     return 0 if ordinary(total) else 1

@@ -6,7 +6,6 @@ instead of addresses. The result is 1 if an input is nan, infinite or too large,
 
 from __future__ import annotations
 
-from urdfkin.compiled.axes import link_axes, world_axes
 from urdfkin.compiled.outputs import (
     column_jacobian,
     column_none,
@@ -17,60 +16,60 @@ from urdfkin.compiled.outputs import (
     emit_pairs,
     emit_place,
     emit_velocity,
-    follow_acceleration,
-    follow_place,
-    follow_velocity,
-    keep_axis,
-    keep_moving_axis,
-    keep_none,
+    mask_acceleration,
+    mask_place,
+    mask_velocity,
+    store_axis,
+    store_moving_axis,
+    store_none,
 )
-from urdfkin.compiled.recursion import forward_recursion
+from urdfkin.compiled.recursion import forward_recursion, link_axes, world_axes
 
 
 def placements(task):
     """Compute placements of frames: the positions by equation 7.77, and the rotations."""
-    return forward_recursion(task, world_axes, 1, follow_place, keep_none, column_none, emit_place)
+    return forward_recursion(task, world_axes, 1, mask_place, store_none, column_none, emit_place)
 
 
 def velocities(task):
     """Compute velocities of frames (7.127 and 7.128) in the world's axes."""
-    return forward_recursion(task, world_axes, 2, follow_velocity, keep_none, column_none, emit_velocity)
+    return forward_recursion(task, world_axes, 2, mask_velocity, store_none, column_none, emit_velocity)
 
 
 def local_velocities(task):
     """Compute velocities of frames (7.127 and 7.128) in each frame's own axes."""
-    return forward_recursion(task, link_axes, 2, follow_velocity, keep_none, column_none, emit_velocity)
+    return forward_recursion(task, link_axes, 2, mask_velocity, store_none, column_none, emit_velocity)
 
 
 def accelerations(task):
     """Compute accelerations of frames (7.129 and 7.130) in the world's axes."""
     return forward_recursion(
-        task, world_axes, 3, follow_acceleration, keep_none, column_none, emit_acceleration
+        task, world_axes, 3, mask_acceleration, store_none, column_none, emit_acceleration
     )
 
 
 def local_accelerations(task):
     """Compute accelerations of frames (7.129 and 7.130) in each frame's own axes."""
     return forward_recursion(
-        task, link_axes, 3, follow_acceleration, keep_none, column_none, emit_acceleration
+        task, link_axes, 3, mask_acceleration, store_none, column_none, emit_acceleration
     )
 
 
 def jacobians(task):
     """Compute Jacobians of frames (7.85)."""
-    return forward_recursion(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_matrix)
+    return forward_recursion(task, world_axes, 1, mask_place, store_axis, column_jacobian, emit_matrix)
 
 
 def jacobian_rates(task):
     """Compute the time derivatives J-dot of the Jacobians by equation 7.126."""
-    return forward_recursion(task, world_axes, 2, follow_velocity, keep_moving_axis, column_rate, emit_matrix)
+    return forward_recursion(task, world_axes, 2, mask_velocity, store_moving_axis, column_rate, emit_matrix)
 
 
 def hessians(task):
     """Compute the derivative of each Jacobian column (7.85) with respect to each joint's motion."""
-    return forward_recursion(task, world_axes, 1, follow_place, keep_axis, column_jacobian, emit_pairs)
+    return forward_recursion(task, world_axes, 1, mask_place, store_axis, column_jacobian, emit_pairs)
 
 
 def imus(task):
     """Compute accelerometer and gyroscope readings (7.127, 7.129, 7.130) in each frame's own axes."""
-    return forward_recursion(task, link_axes, 3, follow_acceleration, keep_none, column_none, emit_imu)
+    return forward_recursion(task, link_axes, 3, mask_acceleration, store_none, column_none, emit_imu)

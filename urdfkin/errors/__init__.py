@@ -1,9 +1,8 @@
 """The exceptions that urdfkin raises.
 
-Every message has four parts: the problem, the place, the value found and the remedy. The same four parts are
-attributes of the exception, so a program does not have to parse the message. A message may end with a
-`QuestionsSection`: the command that prints a section of docs/questions.md. The function `nearest` suggests
-existing names for a misspelt name.
+Every message has four parts, which are also attributes of the exception: the problem, the place, the value
+found and the remedy. A message may end with the command that prints a section of docs/questions.md. The
+function `nearest` suggests existing names for a misspelt name.
 """
 
 from __future__ import annotations
@@ -18,21 +17,19 @@ from typing import Any, Self, TypeVar
 
 from urdfkin.errors.escape import log_line
 
-#: `nearest` compares at most this number of leading characters of a name.
+#: Maximum number of leading characters of a name that `nearest` compares.
 _COMPARED = 128
-
-#: By default, `nearest` compares at most this number of pairs of characters for one word.
-#: A name that is rejected without a comparison does not count.
+#: Maximum number of pairs of characters that `nearest` compares, by default.
 WORK = 1_000_000
-#: Largest number of suggested names.
+#: Maximum number of suggested names.
 _OFFERED = 3
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
     """Return up to three known names that look like `word`, the most similar first.
 
-    `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. After `work` compared
-    pairs of characters, the search ends with the names found so far.
+    `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends after
+    `work` compared pairs of characters.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']
@@ -55,9 +52,9 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
 class QuestionsSection(Enum):
     """A section of docs/questions.md, by the anchor of its heading.
 
-    If you print a question, you see the command that prints its section:
+    The text of a member is the command that prints the section:
 
-    >>> print(Question.MIMIC_JOINTS)
+    >>> print(QuestionsSection.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`
     """
 
@@ -87,7 +84,7 @@ class QuestionsSection(Enum):
 
 
 class DegreesWarning(UserWarning):
-    """Values of q look like degrees; urdfkin takes radians.
+    """Values of q look like degrees, but urdfkin expects radians.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.DegreesWarning, UserWarning)
@@ -111,12 +108,10 @@ class UrdfkinError(Exception):
 
     Attributes:
         what: The problem in one clause, without a full stop.
-        where: The location of the problem, for example a line of a file, a frame, or a sample; None if
-            unknown.
+        where: Place of the problem: a line of a file, a frame, or a sample; None: unknown.
         found: The wrong value, as the user wrote it.
         remedy: Instruction for the user.
-        question: A related section of docs/questions.md. The message ends with the command that prints this
-            section.
+        question: Section of docs/questions.md; the message ends with the command that prints the section.
         is_disagreement: True if urdfkin and Pinocchio disagree; False if the input is wrong.
 
     >>> error = UrdfkinError("a length is negative", where="arm.urdf:3", found="-1", remedy="remove the sign")
@@ -148,11 +143,11 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # A name from a file must not add lines or terminal commands to the output.
+        # The message may contain a name from a file, which must not add lines or terminal commands.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # `validate --jobs` pickles errors. Python's own `__reduce__` would lose the keyword arguments.
+        # Errors are pickled by `validate --jobs`; Python's `__reduce__` would lose the keyword arguments.
         return _rebuild, (type(self), self.__dict__)
 
 
@@ -245,8 +240,10 @@ class SourceError(UrdfkinError, OSError):
 class RepresentationSingularityError(InputError):
     """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
 
-    The motion itself is regular. `distance` is the difference in radians between the middle angle and its
-    value at the singularity. `sample` is the index of the worst sample of a batch, () for a single sample.
+    Attributes:
+        sequence: Name of the sequence of Euler angles.
+        distance: Difference between the middle angle and the middle angle at the singularity, rad.
+        sample: Index of the worst sample of a batch; () for a single sample.
     """
 
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:

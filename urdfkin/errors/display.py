@@ -1,7 +1,7 @@
 """Display of objects as text, HTML, Markdown and LaTeX.
 
-The method `_sheet` of a `Displayable` returns a `TextDocument`; `print` and notebooks display this document.
-Names come from files and may contain any characters, so each format escapes them.
+The method `_sheet` of a `Displayable` returns a `TextDocument`, which `print` and notebooks display. Names
+from files may contain any characters, so each format escapes names.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from html import escape
 
 from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_code, markdown_text, printable
 
-#: These characters draw the branches of a tree before a name. `ASCII` has their replacements.
+#: Characters that draw the branches of a tree before a name.
 LINES = "├│└ "
+#: ASCII characters that replace `LINES`.
 ASCII = str.maketrans("├│└", "+|`")
-#: A number below this fraction of a table's largest number is displayed as 0.
-#: Machine-readable output has all digits, and no check uses the displayed value.
+#: Fraction of a table's largest number below which a number is displayed as 0.
 NOISE = 1e-15
 
 
@@ -25,8 +25,10 @@ class Table:
     """A table of text and numbers; numbers are displayed with six digits.
 
     Attributes:
-        left: Number of the left-aligned columns, or their indices. These cells keep their leading blanks.
-        names: Indices of columns with names. Markdown displays names as code.
+        heads: Headings of the columns.
+        rows: Cells of each row.
+        left: Number of left-aligned columns, or their indices; cells in these columns keep leading blanks.
+        names: Indices of columns with names, which Markdown displays as code.
     """
 
     heads: Sequence[str]
@@ -44,7 +46,7 @@ class Table:
         ]
 
     def _split_cells(self) -> list[list[tuple[str, str]]]:
-        """Split each cell and heading into two texts: its leading characters such as `├─`, and the rest."""
+        """Split each heading and cell into two texts: leading characters such as `├─`, and the rest."""
         return [
             [(cell[: len(cell) - len(words)], words) for cell in row for words in (cell.lstrip(LINES),)]
             for row in (self.heads, *self.cells())
@@ -134,7 +136,7 @@ class Matrix:
 
 
 class Strong(str):
-    """A sentence with emphasis; `style` is its style on a terminal, such as "bold red"."""
+    """A sentence with emphasis, and with a style for terminals, such as "bold red"."""
 
     __slots__ = ("style",)
     style: str
@@ -153,9 +155,9 @@ class CodeLine(str):
 
 @dataclass(frozen=True, slots=True)
 class TextDocument:
-    """A title, and sentences, tables and matrices.
+    """A title, which may be empty, and sentences, tables and matrices.
 
-    The title may be empty. Plain text has a blank line for each empty string of `parts`.
+    An empty string in `parts` becomes a blank line in plain text.
     """
 
     title: str
@@ -222,7 +224,7 @@ def _html(words: str) -> str:
 
 
 def six_digits(value: float, noise: float = NOISE, digits: int = 6) -> str:
-    """Format a number with `digits` significant digits; return "0" if its absolute value is at most `noise`.
+    """Format a number with `digits` significant digits; absolute values up to `noise` become "0".
 
     >>> six_digits(0.1 + 0.2), six_digits(1e-16), six_digits(1e-16, noise=0.0)
     ('0.3', '0', '1e-16')

@@ -1,7 +1,7 @@
 """Escaping of names from files: one function for each output format.
 
 A name in a URDF may contain line ends, terminal escape sequences, bidirectional control characters, HTML or
-spreadsheet formulas. Each function replaces the active characters by readable escapes. No character is lost.
+spreadsheet formulas. Each function replaces such characters by readable escapes, without loss.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-#: A spreadsheet interprets a cell that begins with one of these characters as a formula.
+#: First characters of a spreadsheet cell that make the cell a formula.
 FORMULA = ("=", "+", "-", "@")
-#: This pattern matches a command of Azure or TeamCity, which may be anywhere in a line.
-#: Group 1 is the character to escape. JSON and TOML parsers turn the escape back into the character.
+#: Pattern of a command of Azure or TeamCity, anywhere in a line; group 1 is the character to escape.
 COMMAND_ANYWHERE = re.compile(r"##(?:vso|teamcity)?(\[)")
-#: A command of GitHub is at the beginning of a line.
+#: Patterns of the commands of all CI services; GitHub's commands are at the beginning of a line.
 COMMANDS = (re.compile(r"\A\s*:(:)"), COMMAND_ANYWHERE)
 _NUMBER = re.compile(r"[-+]?[0-9.]+(?:e[-+]?[0-9]+)?")
-#: An invisible character (word joiner) keeps Markdown from making a link, a mention or an issue number.
+#: Invisible character (word joiner) that keeps Markdown from making a link, a mention or an issue number.
 _JOINER = "&#8288;"
 
 
@@ -61,7 +60,7 @@ def markdown_text(words: str) -> str:
 
 
 def markdown_cell(words: str) -> str:
-    """Escape text for a cell of a Markdown table. A list or horizontal rule cannot begin in a cell."""
+    """Escape text for a cell of a Markdown table, in which no list or horizontal rule can begin."""
     flat = printable(re.sub(r"\s+", " ", words)).replace("&", "&amp;")
     flat = flat.replace("<", "&lt;").replace(">", "&gt;")
     flat = re.sub(r"([\\`*_{}\[\]()|~!#$])", r"\\\1", flat.strip())
@@ -120,7 +119,7 @@ def escape(c: str) -> str:
 def csv_cell(name: str) -> str:
     r"""Escape a name for a CSV cell: one line that no spreadsheet interprets as a formula.
 
-    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text. `from_csv_cell` removes it.
+    An apostrophe before `=`, `+`, `-` or `@` marks the cell as text; `from_csv_cell` removes the apostrophe.
 
     Example:
         >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
@@ -140,5 +139,5 @@ def csv_value(text: str) -> str:
 
 
 def from_csv_cell(cell: str) -> str:
-    """Return the name that `csv_cell` wrote. The result is exact if `csv_cell` escaped no character."""
+    """Return the name that `csv_cell` wrote, except for escaped characters."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA) else cell

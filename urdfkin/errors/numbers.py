@@ -1,7 +1,7 @@
 """Strict parsing of numbers, and of numbers with units.
 
 `parse_float` and `parse_int` accept finite numbers in decimal ASCII digits only: the grammar of `xs:double`
-without its special values. Python's `float` also accepts `1_0`, Arabic digits, `nan` and `infinity`.
+without NaN and infinity. Python's `float` also accepts `1_0`, Arabic digits, `nan` and `infinity`.
 `parse_quantity` parses a number with a unit: `30deg`, `pi/2`, `5 mm`, `-2*pi/3`, `90 deg/s`.
 """
 
@@ -11,13 +11,13 @@ import math
 import re
 from typing import NamedTuple
 
-#: Matching a decimal number takes time linear in the length of the text.
+#: Pattern of a decimal number; matching takes time linear in the length of the text.
 DECIMAL = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _WHOLE = re.compile(r"[+-]?[0-9]+")
-#: A number has at most this number of characters: Python converts long integers in quadratic time.
+#: Maximum number of characters of a number, because Python converts long integers in quadratic time.
 _LONGEST = 2000
 
-#: The first pattern that matches a text determines the remedy.
+#: Pairs of a pattern and a remedy; the first pattern that matches a text determines the remedy.
 _REMEDIES = (
     (r"", "the text is empty: write a number"),
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
@@ -58,7 +58,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: Each accepted name of a unit has a short name.
+#: Short name of a unit, by each accepted name.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),
@@ -75,7 +75,7 @@ _LONGEST_QUANTITY = 200
 
 
 class ParsedNumber(NamedTuple):
-    """A number in radians or metres if its text has a unit.
+    """A parsed number; a number with a unit is converted to radians or metres.
 
     Attributes:
         unit: "rad" or "m"; None without a unit. A multiple of pi without a unit is in radians.
@@ -93,8 +93,8 @@ def parse_quantity(text: str) -> ParsedNumber | None:
     >>> parse_quantity("30deg").value == math.pi / 6, parse_quantity("-pi/2").value == -math.pi / 2
     (True, True)
     >>> [parse_quantity(text) for text in ("5 mm", "2 rad/s^2", "0.3", "1-2", "1_0")]
-    [Measured(value=0.005, unit='m', per=0), Measured(value=2.0, unit='rad', per=2), \
-Measured(value=0.3, unit=None, per=0), None, None]
+    [ParsedNumber(value=0.005, unit='m', per=0), ParsedNumber(value=2.0, unit='rad', per=2), \
+ParsedNumber(value=0.3, unit=None, per=0), None, None]
     """
     plain = text.strip(" \t\r\n").lower()
     plain = plain.replace("°", "deg").replace("π", "pi").replace("²", "2")

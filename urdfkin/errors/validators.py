@@ -1,4 +1,4 @@
-"""Validators of arguments: each returns the value in its proper type or raises an InputError."""
+"""Validators of arguments; a validator returns the value in the proper type, or raises InputError."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def as_bool(value: object, name: str) -> bool:
 
 
 def safe_repr(value: object) -> str:
-    """Return the repr of a value for a message, at most 60 characters; it never raises."""
+    """Return the first 60 characters of a value's repr, or a description if the repr raises an exception."""
     try:
         return repr(value)[:60]
     except Exception:  # for example, the repr of an int with 5,000 digits raises ValueError

@@ -11,25 +11,21 @@ from urdfkin.export.seal import seal
 if TYPE_CHECKING:
     from urdfkin.export.code import FrameCode
 
-#: Each language has a module, a suffix of files, and a summary in one line.
-LANGUAGES: dict[str, tuple[str, str, str]] = {
-    "c": ("urdfkin.export.c", ".c", "C99, single or double precision, one configuration or a batch"),
-    "cpp": ("urdfkin.export.cpp", ".hpp", "C++11, a header of templates for any number type"),
-    "cuda": ("urdfkin.export.cpp", ".cuh", "CUDA, a header for host and device, with a kernel for batches"),
-    "numpy": ("urdfkin.export.python", "_numpy.py", "Python on NumPy, whole batches"),
-    "array": ("urdfkin.export.python", "_array.py", "Python on any array API namespace, whole batches"),
-    "numba": ("urdfkin.export.python", "_numba.py", "Python that Numba compiles"),
-    "jax": ("urdfkin.export.python", "_jax.py", "Python on JAX, for jit, vmap and grad"),
-    "torch": ("urdfkin.export.python", "_torch.py", "Python on PyTorch, a module and functions"),
-    "casadi": ("urdfkin.export.python", "_casadi.py", "Python on CasADi's SX, MX and DM"),
-    "sympy": ("urdfkin.export.python", "_sympy.py", "Python on SymPy's symbols"),
-    "sympy-exact": ("urdfkin.export.python", "_sympy_exact.py", "Python on SymPy's symbols, exact numbers"),
-    "matlab": ("urdfkin.export.matlab", "_kinematics.m", "MATLAB and Octave"),
-    "latex": ("urdfkin.export.latex", ".tex", "LaTeX formulas in the textbook's symbols"),
+#: Module and file suffix of each language
+LANGUAGES: dict[str, tuple[str, str]] = {
+    "c": ("urdfkin.export.c", ".c"),
+    "cpp": ("urdfkin.export.cpp", ".hpp"),
+    "cuda": ("urdfkin.export.cpp", ".cuh"),
+    **{
+        name: ("urdfkin.export.python", f"_{name.replace('-', '_')}.py")
+        for name in ("numpy", "array", "numba", "jax", "torch", "casadi", "sympy", "sympy-exact")
+    },
+    "matlab": ("urdfkin.export.matlab", "_kinematics.m"),
+    "latex": ("urdfkin.export.latex", ".tex"),
 }
-#: The argument `form` of `Robot.export` has these values.
-FORMS = {"tree": "the URDF's links", "dh": "its Denavit-Hartenberg table", "screws": "its screws"}
-#: Quantities that are exported by default.
+#: Values of the argument `form` of `Robot.export`
+FORMS = ("tree", "dh", "screws")
+#: Quantities that are exported by default
 QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
@@ -42,7 +38,7 @@ def code_in(code: FrameCode, to: str) -> FrameCode:
 
 
 def write(code: FrameCode, to: str) -> str:
-    """Return the text of a file in the language `to`, with its seal, or raise the error of `code_in`."""
+    """Return the text of a sealed file in the language `to`; raise VerificationError as `code_in` does."""
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
     return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))

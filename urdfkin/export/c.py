@@ -1,16 +1,15 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
-The exported code allocates no memory and has no global variables. Each function is straight-line code. In the
-arrays of a function, successive numbers of one configuration are `L` elements apart: 1 for one configuration,
-or the number of configurations that one call computes at the same time. A compiler then turns each line of
-code into one vector instruction. The parts of a file that do not depend on the robot are templates in
-`frames/`.
+The exported code allocates no memory and has no global variables. Each function is straight-line code. A call
+computes one configuration, or `LANES` configurations together. In its arrays, the numbers of one
+configuration are `L` elements apart, where `L` is 1 or `LANES`. A compiler then turns each line of code into
+one vector instruction. Code that does not depend on the robot is in the templates of the folder `frames/`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from urdfkin.export.code import FrameCode, Writer
@@ -19,35 +18,35 @@ from urdfkin.export.function import Function
 
 _FRAMES = Path(__file__).with_name("frames")
 _FAST = "-O3 -march=native -ffp-contract=fast -fno-math-errno"
-_PLACE = re.compile(r"@(\w+)@")
+_PLACEHOLDER = re.compile(r"@(\w+)@")
 
 
 def write(code: FrameCode, to: str = "c") -> str:
     """Return the text of a C file, which only declares its functions if `NAME_DECLARATIONS` is defined."""
-    return unit(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
+    return c_file(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
-def unit(code: FrameCode, head: str = "", main: str = "") -> str:
-    """Return the text of the C file: a header comment, the functions, and a program that checks them."""
-    return framed(
+def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
+    """Return the text of a C file: a header comment, the functions, and a program that checks them."""
+    return fill_template(
         "file.c",
         head=head,
         UP=code.name.upper(),
         declarations="\n".join(_declarations(code)),
-        sines=framed("sines.c") if any(function.angles for function in code.functions) else "",
+        sines=fill_template("sines.c") if any(function.angles for function in code.functions) else "",
         functions="".join(_function(code, function) for function in code.functions),
         main=main,
     )
 
 
-def framed(name: str, /, **parts: str | int) -> str:
-    """Return a template in which each `@name@` is replaced by `parts[name]`, but not in these texts."""
-    text = (_FRAMES / name).read_text(encoding="utf-8")
-    return _PLACE.sub(lambda found: str(parts[found[1]]), text)
+def fill_template(name: str, /, **texts: str | int) -> str:
+    """Return a template in which `texts[name]` replaces each placeholder `@name@`."""
+    template = (_FRAMES / name).read_text(encoding="utf-8")
+    return _PLACEHOLDER.sub(lambda found: str(texts[found[1]]), template)
 
 
 def literal(x: float) -> str:
-    """Return a constant as C text; it has the number type of the file."""
+    """Return a constant as C code, in the number type of the file."""
     return f"R({x!r})"
 
 
@@ -87,10 +86,10 @@ def parameters(function: Function, real: str) -> str:
 def _declarations(code: FrameCode) -> Iterator[str]:
     yield "/* `out` is written row by row. A batch has n configurations, one after the other. */"
     for function in code.functions:
-        given = parameters(function, f"{code.name.upper()}_REAL")
+        declared = parameters(function, f"{code.name.upper()}_REAL")
         yield f"/* {what(function)} */"
-        yield f"void {code.name}_{function.name}({given});"
-        yield f"void {code.name}_{function.name}_batch(size_t n, {given});"
+        yield f"void {code.name}_{function.name}({declared});"
+        yield f"void {code.name}_{function.name}_batch(size_t n, {declared});"
 
 
 # -- a function --------------------------------------------------------------------------------------------
@@ -98,37 +97,43 @@ def _declarations(code: FrameCode) -> Iterator[str]:
 
 def _function(code: FrameCode, function: Function) -> str:
     writer, layout = Writer(code, function, literal, sine=False), InputLayout(function)
-    count, widths = len(function.results), code.widths(function)
-    return framed(
+    widths = code.widths(function)
+
+    def lines(lines_: Iterable[str], indent: str = "    ") -> str:
+        return "\n".join(f"{indent}{line}" for line in lines_)
+
+    return fill_template(
         "function.c",
         name=function.name,
         title=code.name,
         operations=function.operations,
-        given=f"({parameters(function, 'real')})",
-        given_rest=f"{parameters(function, 'real')})",
-        count=count,
-        room=layout.room,
+        parameters=parameters(function, "real"),
+        count=len(function.results),
+        size=layout.size,
         inputs=", ".join(f"{x.op}[{x.of[0]}]" for x in layout.inputs) or "R(0.0)",
-        unasked="\n".join(f"    (void){x};" for x in widths),
-        lines="\n".join(f"    {line}" for line in _lines(writer, layout)),
-        sines="\n".join(f"    {line}" for line in _sines(writer, layout)),
-        reads="\n".join(f"    {line}" for line in _reads(layout, widths)),
-        lane_sines="\n".join(f"    {line}" for line in _lane_sines(writer, layout)),
-        spare=spare(code, function),
+        unused=lines(f"(void){x};" for x in widths),
+        lines=lines(_lines(writer, layout)),
+        sines=lines(_sines(writer, layout)),
+        reads=lines(_reads(layout, widths)),
+        lane_sines=lines(_lane_sines(writer, layout)),
+        reserve=reserve(code, function),
         passed=", ".join(widths),
         advance=advance(code, function),
-        advance_m="\n".join(f"        {x} += m * {width};" for x, width in widths.items()),
+        advance_m=lines((f"{x} += m * {width};" for x, width in widths.items()), " " * 8),
         copies=", ".join(f"own_{x}[LANES * {width} + 8] = {{R(0.0)}}" for x, width in widths.items()),
-        copy="\n".join(
-            f"        for (size_t i = 0; i < m * {width}; ++i) own_{x}[i] = {x}[i];"
-            for x, width in widths.items()
-            if width
+        copy=lines(
+            (
+                f"for (size_t i = 0; i < m * {width}; ++i) own_{x}[i] = {x}[i];"
+                for x, width in widths.items()
+                if width
+            ),
+            " " * 8,
         ),
         own=", ".join(f"own_{x}" for x in widths),
     )
 
 
-def spare(code: FrameCode, function: Function) -> int:
+def reserve(code: FrameCode, function: Function) -> int:
     """Return the smallest number of configurations for which every array has at least eight numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
@@ -140,35 +145,37 @@ def advance(code: FrameCode, function: Function) -> str:
 
 
 class InputLayout:
-    """The order in which the array `in` contains a function's inputs, angles, sines and cosines.
+    """Order of a function's array `in`: inputs, angles that are inputs, computed angles, sines, cosines.
 
-    All angles are adjacent: first the angles that are inputs, then the angles that are computed.
+    Attributes:
+        first: Index of the first angle.
+        size: Length of the array.
     """
 
     def __init__(self, function: Function) -> None:
-        given = [node for node in function.nodes if node.op in function.inputs]
-        turning = [node for node in given if node in function.angles]
-        self.inputs = [*(node for node in given if node not in turning), *turning]
-        self.made = [node for node in function.angles if node not in turning]
-        self.angles = [*turning, *self.made]
-        self.first = len(self.inputs) - len(turning)
-        self.room = max(1, self.first + 3 * len(self.angles))
+        inputs = [node for node in function.nodes if node.op in function.inputs]
+        input_angles = [node for node in inputs if node in function.angles]
+        self.inputs = [*(node for node in inputs if node not in input_angles), *input_angles]
+        self.computed_angles = [node for node in function.angles if node not in input_angles]
+        self.angles = [*input_angles, *self.computed_angles]
+        self.first = len(self.inputs) - len(input_angles)
+        self.size = max(1, self.first + 3 * len(self.angles))
 
-    def place(self, node: Node) -> int:
-        """Return the position in the array `in` of an input, an angle, or the sine or cosine of an angle."""
+    def index(self, node: Node) -> int:
+        """Return the index of an input, an angle, or the sine or cosine of an angle."""
         if node.op in ("sin", "cos"):
-            return self.place(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
+            return self.index(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
             return self.first + self.angles.index(node)
         return self.inputs.index(node)
 
 
 def _lines(writer: Writer, layout: InputLayout) -> Iterator[str]:
-    for node in writer.given:
-        yield f"const real {writer.words[node]} = in[{layout.place(node)} * L];"
+    for node in writer.inputs:
+        yield f"const real {writer.names[node]} = in[{layout.index(node)} * L];"
     for head, lines in writer.statements():
         yield f"/* {head} */"
-        yield from (f"const real {word} = {value};" for word, value in lines)
+        yield from (f"const real {name} = {value};" for name, value in lines)
     yield from (f"out[{k} * L] = {value};" for k, value in enumerate(writer.results()))
 
 
@@ -181,9 +188,9 @@ def _sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
 
 
 def _computed_angles(writer: Writer, layout: InputLayout, at: str) -> Iterator[str]:
-    for node in layout.made:
-        value = writer.whole(node, lambda x: at.format(layout.place(x)))
-        yield f"{at.format(layout.place(node))} = {value}"
+    for node in layout.computed_angles:
+        value = writer.expanded(node, lambda x: at.format(layout.index(x)))
+        yield f"{at.format(layout.index(node))} = {value}"
 
 
 def _reads(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
@@ -192,9 +199,8 @@ def _reads(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
             found = [node for node in layout.inputs if node.op == x and node.of[0] // 8 == first // 8]
             if found:
                 yield f"{{ eight x[8]; columns({x} + {first}, {width}, x);"
-                yield from (
-                    f"  put(in + {layout.place(node)} * LANES, x + {node.of[0] % 8});" for node in found
-                )
+                for node in found:
+                    yield f"  put(in + {layout.index(node)} * LANES, x + {node.of[0] % 8});"
                 yield "}"
         yield f"(void){x};"
     yield "(void)in;"
@@ -202,24 +208,22 @@ def _reads(layout: InputLayout, widths: dict[str, int]) -> Iterator[str]:
 
 def _lane_sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
     if count := len(layout.angles):
-        for made in _computed_angles(writer, layout, "in[{} * LANES + k]"):
-            yield f"for (int k = 0; k < LANES; ++k) {made};"
-        places = (f"in + {layout.first + k * count} * LANES" for k in range(3))
-        yield f"sines_cosines({', '.join(places)}, {count});"
+        for assignment in _computed_angles(writer, layout, "in[{} * LANES + k]"):
+            yield f"for (int k = 0; k < LANES; ++k) {assignment};"
+        arrays = (f"in + {layout.first + k * count} * LANES" for k in range(3))
+        yield f"sines_cosines({', '.join(arrays)}, {count});"
 
 
 # -- the test vectors of a function ------------------------------------------------------------------------
 
 
 def vectors(code: FrameCode) -> Iterator[str]:
-    """Yield C arrays with the test vectors: their inputs, the true values and the tolerances."""
+    """Yield C arrays with the test vectors: inputs, true values and tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
     yield "/* True values at fifty digits; the tolerances in double and single precision, in eps. */"
-    for k, (letter, width) in enumerate(
-        code.widths(max(code.functions, key=lambda f: len(f.inputs))).items()
-    ):
+    for k, letter in enumerate(code.inputs):
         rows = [[repr(x) for x in vector.inputs[k]] or ["0.0"] for vector in found]
-        yield _array(f"given_{letter}[{n}][{max(1, width)}]", rows)
+        yield _array(f"given_{letter}[{n}][{len(rows[0])}]", rows)
     for function in code.functions:
         size = f"{function.name}[{n}][{len(function.results)}]"
         yield _array(f"true_{size}", [vector.results[function.name] for vector in found])
@@ -245,30 +249,32 @@ def _numbers(values: Sequence[str]) -> str:
 def main(code: FrameCode, *frames: str) -> str:
     """Return a program that runs the test vectors with the templates `frames`, for example "check_one.c"."""
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
-    return framed("check.c", checks="".join(checks))
+    return fill_template("check.c", checks="".join(checks))
 
 
 def _check(code: FrameCode, function: Function, frame: str) -> str:
     widths, n = code.widths(function), len(code.proof.vectors)
-    return framed(
+    sizes = {x: max(1, width) for x, width in widths.items()}
+
+    def fill(element: str, vector: str) -> str:
+        return "\n".join(
+            f"            for (int i = 0; i < {size}; ++i) {x}{element} = R(given_{x}[{vector}][i]);"
+            for x, size in sizes.items()
+        )
+
+    return fill_template(
         frame,
         title=code.name,
         UP=code.name.upper(),
         name=function.name,
         n=n,
         count=len(function.results),
-        arrays=", ".join(f"{x}[N][{max(1, width)}]" for x, width in widths.items()),
-        fill="\n".join(
-            f"            for (int i = 0; i < {max(1, width)}; ++i) {x}[k][i] = R(given_{x}[k % {n}][i]);"
-            for x, width in widths.items()
-        ),
-        fill_one="\n".join(
-            f"            for (int i = 0; i < {max(1, width)}; ++i) {x}[i] = R(given_{x}[k][i]);"
-            for x, width in widths.items()
-        ),
+        arrays=", ".join(f"{x}[N][{size}]" for x, size in sizes.items()),
+        fill=fill("[k][i]", f"k % {n}"),
+        fill_one=fill("[i]", "k"),
         passed=", ".join(widths),
         all=", ".join(f"&{x}[0][0]" for x in widths),
-        each_array=", ".join(f"{x}[{max(1, width)}]" for x, width in widths.items()),
+        each_array=", ".join(f"{x}[{size}]" for x, size in sizes.items()),
         each=", ".join(f"{x}[k]" for x in widths),
         on_device=", ".join(f"device_{x}(&{x}[0][0], sizeof {x})" for x in widths),
         device=", ".join(f"device_{x}.at" for x in widths),

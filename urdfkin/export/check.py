@@ -1,4 +1,4 @@
-"""Check an exported file: compile or import it, and run its test vectors.
+"""Check an exported file: compile or import the file, and run its test vectors.
 
 The check runs the file as code. Before you check a file from another person, consider whether you would run
 that person's programs. The check runs a copy of the file in a separate folder, so that the copy cannot import
@@ -20,27 +20,27 @@ from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
 from urdfkin.system.processes import own_python
 
-#: The first lines of every exported file contain this text.
+#: Text in the first lines of every exported file
 _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
-#: Compiler and options for each suffix.
+#: Compiler and its options for each suffix
 _COMPILE = {
     ".c": ("cc", "-std=c99", "-x", "c", *_STRICT),
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: This command compiles a CUDA file for the GPU.
+#: Compiler and its options for a CUDA file that runs on a GPU
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: This number of characters at the start of a file is searched for `_MARK` and the word UNVERIFIED.
+#: Number of characters at the start of a file that are searched for `_MARK` and the word UNVERIFIED
 _HEAD = 2000
-#: A command ends after this time (s). The code of a robot with a thousand joints compiles in one minute.
+#: Maximum time (s) of a command; the code of a robot with a thousand joints compiles in one minute
 _TIME_LIMIT = 600.0
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
+class FileCheck:
     """The result of a check.
 
     Attributes:
@@ -59,34 +59,27 @@ class Checked:
         return not self.doubts
 
 
-def check(file: Path) -> Checked:
-    """Compile or import a file that the command `export` wrote, and run the test vectors in the file.
+def check(file: Path) -> FileCheck:
+    """Compile or import an exported file, and run the test vectors in the file.
 
     Raise InputError if the file is not an export or does not run here, and SourceError if it cannot be read.
     """
     text = read_text(file)
-    head = text[:_HEAD]
-    if _MARK not in head:
+    if _MARK not in text[:_HEAD]:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))
+    runs = {**dict.fromkeys(_COMPILE, _run_compiled), ".py": _run_imported, ".m": _run_octave}
+    if (run := runs.get(file.suffix)) is None:
+        raise InputError(
+            "a file of this kind cannot be run",
+            where=str(file),
+            found=file.suffix or "no suffix",
+            remedy=f"check a file with the suffix {', '.join(runs)}",
+        )
     with tempfile.TemporaryDirectory() as folder:
-        runs = {
-            ".c": _run_compiled,
-            ".hpp": _run_compiled,
-            ".cuh": _run_compiled,
-            ".py": _run_imported,
-            ".m": _run_octave,
-        }
-        if (run := runs.get(file.suffix)) is None:
-            raise InputError(
-                "a file of this kind cannot be run",
-                where=str(file),
-                found=file.suffix or "no suffix",
-                remedy=f"check a file with the suffix {', '.join(runs)}",
-            )
-        lines = tuple(line for words in run(file, text, Path(folder)) for line in words)
+        lines = tuple(run(file, text, Path(folder)))
     if not lines:
         raise InputError("the file has no test vectors", where=str(file))
-    return Checked(lines, all(line.startswith("good ") for line in lines), tuple(_doubts(text)))
+    return FileCheck(lines, all(line.startswith("good ") for line in lines), tuple(_doubts(text)))
 
 
 def _doubts(text: str) -> Iterator[str]:
@@ -106,42 +99,44 @@ def _has_gpu() -> bool:
     return shutil.which("nvcc") is not None and Path("/dev/nvidia0").exists()
 
 
-def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    """Compile and run a file of C, C++ or CUDA, in single and in double precision, with warnings as errors.
+def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
+    """Compile and run a file of C, C++ or CUDA, in double and in single precision, with warnings as errors.
 
-    CUDA's kernels run if there is a GPU. Without a GPU, only the functions for the processor are checked.
+    Without a GPU, only the functions of a CUDA file for the processor are checked.
     """
-    found = _MAIN.search(text)
-    if found is None:
-        raise InputError("the file has no test vectors", where=str(file))
+    name = _name_of_program(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")
     command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]
     compiler = _program(command[0], file)
     for real in ("double", "float"):
-        macros = [f"-D{found[1]}_MAIN", f"-D{found[1]}_REAL={real}"]
-        built = folder / real
-        _run([compiler, *command[1:], "-O1", *macros, str(copy), "-o", str(built), "-lm"], file)
-        yield [f"{line} ({real})" for line in _run([str(built)], file)]
+        macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
+        program = folder / real
+        _run([compiler, *command[1:], "-O1", *macros, str(copy), "-o", str(program), "-lm"], file)
+        yield from (f"{line} ({real})" for line in _run([str(program)], file))
 
 
-def _run_imported(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
+def _run_imported(file: Path, text: str, folder: Path) -> Iterator[str]:
     copy = _copy(text, folder / "checked.py")
     code = f"import runpy; runpy.run_path({str(copy)!r}, run_name='__main__')"
-    yield _run(own_python(code), file, cwd=folder)
+    yield from _run(own_python(code), file, cwd=folder)
 
 
-def _run_octave(file: Path, text: str, folder: Path) -> Iterator[list[str]]:
-    found = _FUNCTION.search(text)
-    if found is None:
-        raise InputError("the file has no test vectors", where=str(file))
-    _copy(text, folder / f"{found[1]}.m")
+def _run_octave(file: Path, text: str, folder: Path) -> Iterator[str]:
+    name = _name_of_program(_FUNCTION, text, file)
+    _copy(text, folder / f"{name}.m")
     octave = [_program("octave-cli", file), "--no-init-file", "--no-site-file"]
-    yield _run([*octave, "--eval", f"{found[1]}().check();"], file, cwd=folder)
+    yield from _run([*octave, "--eval", f"{name}().check();"], file, cwd=folder)
 
 
-def _copy(text: str, place: Path) -> Path:
-    place.write_text(text, encoding="utf-8")
-    return place
+def _name_of_program(pattern: re.Pattern[str], text: str, file: Path) -> str:
+    if (found := pattern.search(text)) is None:
+        raise InputError("the file has no test vectors", where=str(file))
+    return found[1]
+
+
+def _copy(text: str, path: Path) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 def _program(name: str, file: Path) -> str:
@@ -151,7 +146,7 @@ def _program(name: str, file: Path) -> str:
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """Run a command, and return the lines of its output that begin with "good" or "WRONG"."""
+    """Run a command; return the lines of its output that begin with "good" or "WRONG"."""
     try:
         done = subprocess.run(
             command,
@@ -166,9 +161,7 @@ def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[st
         raise InputError("the file does not run", where=str(file), found=str(error)) from None
     lines = [line for line in done.stdout.splitlines() if line.startswith(("good ", "WRONG "))]
     if done.returncode != 0 and not any(line.startswith("WRONG ") for line in lines):
-        words = (done.stderr.strip() or done.stdout.strip()).splitlines()
-        first = next((line for line in words if "error" in line.lower()), "")
-        raise InputError(
-            "the file does not run", where=str(file), found=first or (words or ["no output"])[-1]
-        )
+        output = (done.stderr.strip() or done.stdout.strip() or "no output").splitlines()
+        found = next((line for line in output if "error" in line.lower()), output[-1])
+        raise InputError("the file does not run", where=str(file), found=found)
     return lines

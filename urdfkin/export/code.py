@@ -1,4 +1,4 @@
-"""The exported functions of one frame, before they are written in a programming language."""
+"""Define the functions of one frame that are exported, and how their expressions become text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urdfkin.errors.validators import as_names, as_str
 from urdfkin.export import recursion
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
-from urdfkin.export.naming import all_safe, quiet, shown, title
+from urdfkin.export.naming import all_safe, comment_name, comment_text, title
 from urdfkin.export.proof import Proof, prove
 from urdfkin.export.seal import SEAL
 from urdfkin.model.configuration import coordinate_names, rate_names
@@ -21,9 +21,9 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: A sum has the lowest precedence. An operand that needs no brackets has the highest precedence.
-_SUM, _SIGN, _PRODUCT, _ATOM = range(4)
-_LEVEL = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
+#: Precedences of operators, the lowest first
+_SUM, _SIGN, _PRODUCT = range(3)
+_PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class FrameCode:
 
     Attributes:
         name: Prefix of the names of functions.
-        coordinates: Names of the coordinates of q.
-        rates: Names of the coordinates of v and a.
+        coordinates: Names of the entries of q.
+        rates: Names of the entries of v and a.
         joints: Names of the path's moving joints.
-        words: Identifiers in the exported code, by "q", "v" and "a" for the numbers of the input, and by "s"
-            for the path's joints.
-        about: Lines of the file's header that contain the Denavit-Hartenberg table or the screws; empty for
-            code from a URDF's joints.
-        vouched: The comparison with Pinocchio and the test vectors; None for code that urdfkin compiles for
-            its own use.
+        identifiers: Identifiers in the exported code: for the entries of "q", "v" and "a", and for the path's
+            joints ("s").
+        about: Lines of the file's header with the Denavit-Hartenberg table or the screws; empty for code that
+            follows the URDF's joints.
+        maybe_proof: The comparison with Pinocchio, and the test vectors; None for code that urdfkin compiles
+            for its own use.
         exact: Function that returns this code with fractions instead of doubles as constants. None if there
             is no such code, or if the constants are already exact.
     """
@@ -53,17 +53,21 @@ class FrameCode:
     coordinates: tuple[str, ...]
     rates: tuple[str, ...]
     joints: tuple[str, ...]
-    words: dict[str, list[str]]
+    identifiers: dict[str, list[str]]
     about: tuple[str, ...] = ()
-    vouched: Proof | None = None
+    maybe_proof: Proof | None = None
     exact: Callable[[], FrameCode] | None = None
 
     @property
     def proof(self) -> Proof:
-        """The comparison of the functions with Pinocchio, and the test vectors."""
-        if self.vouched is None:
+        if self.maybe_proof is None:
             raise ValueError("code that was not verified is not exported")
-        return self.vouched
+        return self.maybe_proof
+
+    @property
+    def inputs(self) -> str:
+        """Letters of the inputs of all functions: "q", "qv" or "qva"."""
+        return max((function.inputs for function in self.functions), key=len)
 
     @property
     def nq(self) -> int:
@@ -78,19 +82,23 @@ class FrameCode:
 
     @property
     def head(self) -> list[str]:
-        """The lines of a file's header, without comment marks; the first may say UNVERIFIED."""
+        """Lines of a file's header, without comment marks; the first line states that code is unverified."""
         verdict, *rest = self.proof.lines
-        lines = [verdict] if not self.proof.certificate.verified else []
-        lines += [
-            f"Kinematics of {self.robot}, frame {self.frame}: straight-line code for this robot and frame."
+        subject = f"{self.robot}, frame {self.frame}"
+        about = f"Kinematics of {subject}: straight-line code for this robot and frame."
+        verified = self.proof.certificate.verified
+        lines = [
+            *([about, "", verdict] if verified else [verdict, about, ""]),
+            *rest,
+            SEAL,
+            "",
+            "Units are metres, radians and seconds. Results are written row by row.",
+            "Six-vectors and the rows of a Jacobian are [linear; angular] in the reference frame",
+            f"{self.reference.name}. Accelerations are classical, without gravity.",
+            "Numbers such as 7.130 are equations of the textbook: urdfkin explain 7.130",
+            "",
+            *(f"q[{i}] {name}" for i, name in enumerate(self.coordinates)),
         ]
-        lines += ["", *([verdict] if not lines[0].startswith("UNVERIFIED") else []), *rest, SEAL, ""]
-        lines += [
-            "Metres, radians, seconds. Results are row by row; six-vectors and Jacobian rows are [linear;"
-        ]
-        lines += [f"angular] in {self.reference.name}; accelerations are classical, without gravity."]
-        lines += ["Numbers such as 7.130 are equations of the textbook: urdfkin explain 7.130", ""]
-        lines += [f"q[{i}] {name}" for i, name in enumerate(self.coordinates)]
         if self.rates != self.coordinates:
             lines += [f"v[{i}], a[{i}] {name}" for i, name in enumerate(self.rates)]
         return [*lines, *([""] if self.about else []), *self.about]
@@ -107,11 +115,11 @@ def code_of(
     verify: bool | None,
     about: str = "",
 ) -> FrameCode:
-    """Return the code of a frame with test vectors and with the result of the comparison with Pinocchio.
+    """Return the code of a frame, with test vectors and the result of the comparison with Pinocchio.
 
-    `plan_of` returns the compiled tree of the joints that move the given links. By default, the prefix `name`
-    of the functions consists of the names of the robot and the frame. `about` is a text for the file's
-    header: the Denavit-Hartenberg table or the screws.
+    `plan_of` returns the compiled tree of the joints that move given links. By default, the prefix `name` of
+    the functions consists of the names of the robot and of the frame. `about` is text for the file's header:
+    the Denavit-Hartenberg table or the screws.
 
     Raises:
         UnknownNameError: the frame, a quantity or the reference is unknown.
@@ -120,7 +128,7 @@ def code_of(
     """
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
-    rows = _rows(quantities)
+    rows = _exported_quantities(quantities)
     if not tree.nv and any(row.columns for row in rows):
         raise InputError(
             "the Jacobian has no columns",
@@ -128,22 +136,23 @@ def code_of(
             found="no moving joint",
             remedy="export the placement instead",
         )
-    code = bare(tree, plan, frame, rows, reference, title("", name) if name else title(tree.name, frame))
+    prefix = title("", name) if name else title(tree.name, frame)
+    code = unverified_code(tree, plan, frame, rows, reference, prefix)
     proof = prove(verifier, plan_of, frame, reference, code.functions, verify)
-    code = replace(code, vouched=proof, about=tuple(map(quiet, about.splitlines())))
+    code = replace(code, maybe_proof=proof, about=tuple(map(comment_text, about.splitlines())))
 
     def exact() -> FrameCode:
         from urdfkin.export.exact import exact_functions
 
-        functions, vouched = exact_functions(
+        functions, exact_proof = exact_functions(
             verifier, plan_of, frame, reference, code.functions, proof, verify
         )
-        return replace(code, functions=functions, vouched=vouched, exact=None)
+        return replace(code, functions=functions, maybe_proof=exact_proof, exact=None)
 
     return replace(code, exact=exact)
 
 
-def bare(
+def unverified_code(
     tree: KinematicTree,
     plan: CompiledTree,
     frame: str,
@@ -153,16 +162,17 @@ def bare(
 ) -> FrameCode:
     coordinates, rates = coordinate_names(tree), rate_names(tree)
     joints = tuple(tree.joints[i].name for i in plan.joints)
+    names = {"q": coordinates, "v": rates, "a": rates, "s": joints}
     return FrameCode(
         name=name,
-        robot=shown(tree.name),
-        frame=shown(frame),
+        robot=comment_name(tree.name),
+        frame=comment_name(frame),
         reference=reference,
         functions=tuple(function_of(plan, row, reference) for row in rows),
-        coordinates=tuple(map(shown, coordinates)),
-        rates=tuple(map(shown, rates)),
-        joints=tuple(map(shown, joints)),
-        words={"q": all_safe(coordinates), "v": all_safe(rates), "a": all_safe(rates), "s": all_safe(joints)},
+        coordinates=tuple(map(comment_name, coordinates)),
+        rates=tuple(map(comment_name, rates)),
+        joints=tuple(map(comment_name, joints)),
+        identifiers={letter: all_safe(found) for letter, found in names.items()},
     )
 
 
@@ -170,24 +180,20 @@ def exported() -> list[Quantity]:
     return [row for row in recursive_quantities() if row.name in recursion.QUANTITIES]
 
 
-def _rows(names: Collection[str]) -> list[Quantity]:
-    named = [as_str(name, "each of quantities") for name in as_names(names, "quantities")]
-    rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(named)]
+def _exported_quantities(names: Collection[str]) -> list[Quantity]:
+    checked = [as_str(name, "each of quantities") for name in as_names(names, "quantities")]
+    rows = [quantity(name.replace("_", " ")) for name in dict.fromkeys(checked)]
+    possible = ", ".join(row.method for row in exported())
     if not rows:
-        raise InputError(
-            "no quantity to export", remedy=f"name some of {', '.join(x.method for x in exported())}"
-        )
+        raise InputError("no quantity to export", remedy=f"name some of {possible}")
     for row in rows:
         if row not in exported():
-            raise InputError(
-                f"the {row.name} cannot be exported",
-                remedy=f"choose among {', '.join(x.method for x in exported())}",
-            )
+            raise InputError(f"the {row.name} cannot be exported", remedy=f"choose among {possible}")
     return rows
 
 
 class Writer:
-    """Writes a function's expressions in a language in which a sum is written as a + b.
+    """Writes the expressions of a function in a language in which a sum is written as a + b.
 
     `literal` writes a constant. Without `sine`, sines and cosines are inputs of the written code.
     """
@@ -201,33 +207,33 @@ class Writer:
         sine: bool = True,
     ) -> None:
         self.code, self.function, self.literal = code, function, literal
-        self.own = set(function.statements)
+        self.variables = set(function.statements)
         self.leaves = () if sine else ("sin", "cos")
-        self.inside = function.within(self.leaves)
-        self.words = {node: self._word(node, k) for k, node in enumerate(function.nodes)}
+        self.needed = function.needed_without(self.leaves)
+        self.names = {node: self._name(node, k) for k, node in enumerate(function.nodes)}
 
-    def _word(self, node: Node, k: int) -> str:
-        words = self.code.words
-        if node.op in words:
-            return f"{node.op}_{words[node.op][node.of[0]]}"
+    def _name(self, node: Node, k: int) -> str:
+        identifiers = self.code.identifiers
+        if node.op in identifiers:
+            return f"{node.op}_{identifiers[node.op][node.of[0]]}"
         if node.op in ("sin", "cos") and node.place >= 0:
-            return f"{node.op[0]}_{words['s'][node.place]}"
+            return f"{node.op[0]}_{identifiers['s'][node.place]}"
         return node.name or f"t{k}"
 
     @property
-    def given(self) -> list[Node]:
-        """The needed numbers of q, v and a, and the sines and cosines if they are inputs."""
-        leaves = (*self.code.words, *self.leaves)
-        return [node for node in self.function.nodes if node.op in leaves and node in self.inside]
+    def inputs(self) -> list[Node]:
+        """The needed numbers of q, v and a; without `sine`, also the sines and cosines."""
+        leaves = (*self.code.identifiers, *self.leaves)
+        return [node for node in self.function.nodes if node.op in leaves and node in self.needed]
 
     def statements(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
         """For each joint of the path, yield a comment and a list of assignments (name, value)."""
-        nodes = [x for x in self.function.statements if x in self.inside and x.op not in self.leaves]
+        nodes = [x for x in self.function.statements if x in self.needed and x.op not in self.leaves]
         for place, group in groupby(nodes, key=lambda node: node.place):
-            found = list(group)
-            numbers = dict.fromkeys(n for x in found for n in x.equation.split(", ") if n)
-            lines = [(self.words[node], self.defined(node)) for node in found]
-            yield ": ".join(filter(None, (self._place(place), ", ".join(numbers)))), lines
+            assigned = list(group)
+            equations = dict.fromkeys(n for x in assigned for n in x.equation.split(", ") if n)
+            lines = [(self.names[node], self.value(node)) for node in assigned]
+            yield ": ".join(filter(None, (self._place(place), ", ".join(equations)))), lines
 
     def _place(self, place: int) -> str:
         joints, steps = self.code.joints, self.function.plan.steps
@@ -241,36 +247,35 @@ class Writer:
     def results(self) -> list[str]:
         return [self.text(x) for x in self.function.results]
 
-    def text(self, x: Number, level: int = _SUM) -> str:
-        """Return an expression as text, in brackets if the precedence of its operator is below `level`."""
+    def text(self, x: Number, precedence: int = _SUM) -> str:
+        """Return an expression as text, in brackets if the precedence of its operator is lower."""
         if not isinstance(x, Node):
             return self.literal(float(x) if isinstance(x, int) else x)
-        if x in self.own or x.op in self.code.words:
-            return self.words[x]
-        return self.defined(x, level)
+        if x in self.variables or x.op in self.code.identifiers:
+            return self.names[x]
+        return self.value(x, precedence)
 
-    def defined(self, x: Node, level: int = _SUM) -> str:
-        """Return the text of an expression, as on the right-hand side of an assignment."""
+    def value(self, x: Node, precedence: int = _SUM) -> str:
+        """Return the right-hand side of the assignment of an expression to a variable."""
         if x.op in ("sin", "cos", "sqrt"):
             return f"{x.op}({self.text(x.of[0])})"
-        if x.op == "neg":
-            text, own = f"-{self.text(x.of[0], _PRODUCT)}", _SIGN
-        else:
-            own = _LEVEL[x.op]
-            left, right = x.of
-            # The brackets of a + (b + c) keep the order of the check with Pinocchio.
-            text = f"{self.text(left, own)} {x.op} {self.text(right, own + 1)}"
-        return text if own >= level else f"({text})"
+        return _arithmetic(x, self.text, precedence)
 
-    def whole(self, x: Number, given: Callable[[Node], str], level: int = _SUM) -> str:
-        """Return an expression, such as an angle, as a text that contains only inputs and constants."""
+    def expanded(self, x: Number, input_text: Callable[[Node], str], precedence: int = _SUM) -> str:
+        """Return an expression, such as an angle, as text with inputs and constants but without variables."""
         if not isinstance(x, Node):
             return self.literal(float(x))
-        if x.op in self.code.words:
-            return given(x)
-        own = _LEVEL.get(x.op, _SIGN)
-        if x.op == "neg":
-            text = f"-{self.whole(x.of[0], given, _PRODUCT)}"
-        else:
-            text = f"{self.whole(x.of[0], given, own)} {x.op} {self.whole(x.of[1], given, own + 1)}"
-        return text if own >= level else f"({text})"
+        if x.op in self.code.identifiers:
+            return input_text(x)
+        return _arithmetic(x, lambda y, level: self.expanded(y, input_text, level), precedence)
+
+
+def _arithmetic(x: Node, text: Callable[[Number, int], str], precedence: int) -> str:
+    """Return a sum, difference, product, quotient or negation; `text` writes the operands."""
+    if x.op == "neg":
+        own, result = _SIGN, f"-{text(x.of[0], _PRODUCT)}"
+    else:
+        own = _PRECEDENCE[x.op]
+        # Brackets as in a + (b + c) keep the order of operations that was compared with Pinocchio.
+        result = f"{text(x.of[0], own)} {x.op} {text(x.of[1], own + 1)}"
+    return result if own >= precedence else f"({result})"

@@ -1,7 +1,8 @@
-"""Compile the kinematics of one frame to machine code. This is the fastest way to compute in urdfkin.
+"""Compile the kinematics of one frame to machine code, the fastest way to compute in urdfkin.
 
-The first call of a quantity exports C code and compiles it with the system's compiler. The result is compared
-with Pinocchio before it is used. Without a C compiler, the forward recursion that Numba compiles is used.
+The first call of a quantity exports C code, compiles the code with the system's compiler, and compares the
+results of the machine code with Pinocchio. Without a C compiler, the forward recursion that Numba compiles is
+used.
 
 The machine code is stored in a cache with checksums. The key consists of the C code, the compiler and the
 processor. The code is loaded from memory, because a file could be changed after its checksum was tested.
@@ -25,44 +26,45 @@ from typing import Any, Protocol, TypeGuard
 import numpy as np
 
 from urdfkin.compiled.evaluate import in_blocks, is_staged
-from urdfkin.compiled.kept import compiling
+from urdfkin.compiled.kernel_cache import compiling
 from urdfkin.compiled.plan import LANES, CompiledTree, KernelArgs, address, lines
 from urdfkin.compiled.prepared import Fast
 from urdfkin.errors import NotFiniteError, RangeError
-from urdfkin.export.c import InputLayout, advance, framed, spare, unit
-from urdfkin.export.code import FrameCode, bare
+from urdfkin.export.c import InputLayout, advance, c_file, fill_template, reserve
+from urdfkin.export.code import FrameCode, unverified_code
+from urdfkin.export.proof import CHECKED
 from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.system.cache import get, kept_folder, put
+from urdfkin.system.cache import cache_folder, get, put
 from urdfkin.system.locks import importing, lock_over_forks
 from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: By default, GCC uses half of the width of vector registers on many processors.
+#: Options for the whole width of vector registers; by default, GCC uses only half of it on many processors
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
 
 
 class NoCompilerError(Exception):
-    """There is no C compiler, or the compiler rejects the code; the message is the compiler's."""
+    """There is no C compiler, or the compiler rejects the code."""
 
 
 def library(code: FrameCode) -> ctypes.CDLL:
     """Compile code that consists of one function, and load it as a library, or raise NoCompilerError.
 
-    The library's entry point `task` takes an array with the fields of `KernelArgs`. It returns 0, or 1 if an
-    input is not finite.
+    The argument of the library's entry point `task` is an array with the fields of `KernelArgs`. The result
+    is 0, or 1 if an input is not finite.
     """
     if (compiler := shutil.which("cc")) is None:
         raise NoCompilerError("cc is not installed")
-    text = unit(code) + _entrance(code)
+    text = c_file(code) + _entry_point(code)
     flags = (*_FLAGS, *_WHOLE_REGISTERS.get(platform.machine(), ()))
-    folder = kept_folder("library", [], text, *flags, _version(compiler), _processor())
+    folder = cache_folder("library", [], text, *flags, _version(compiler), _processor())
     data = get(folder / "machine.code") if folder else None
     if data is None:
         data = _compile(text, [compiler, *flags])
@@ -71,48 +73,48 @@ def library(code: FrameCode) -> ctypes.CDLL:
     return _load(data)
 
 
-def _entrance(code: FrameCode) -> str:
+def _entry_point(code: FrameCode) -> str:
     (function,) = code.functions
     widths, layout = code.widths(function), InputLayout(function)
     spread = (
-        f"    for (int k = 0; k < LANES; ++k) in[{at} * LANES + k] = {x.op}[{x.of[0]}];"
-        for at, x in enumerate(layout.inputs)
+        f"    for (int k = 0; k < LANES; ++k) in[{i} * LANES + k] = {x.op}[{x.of[0]}];"
+        for i, x in enumerate(layout.inputs)
     )
     lines = {
-        "inputs": "    const double *{x} = (const double *)(uintptr_t)places[{place}];",
+        "inputs": "    const double *{x} = (const double *)(uintptr_t)places[{index}];",
         "look": "        look({width}, {x}, bad);",
         "look_left": "    for (size_t i = 0; i < n * {width}; ++i) bad[0][0] += 0.0 * {x}[i];",
     }
-    parts = {
-        part: "\n".join(
-            line.format(x=x, width=width, place=int(KernelArgs[x.upper()])) for x, width in widths.items()
+    texts = {
+        name: "\n".join(
+            line.format(x=x, width=width, index=int(KernelArgs[x.upper()])) for x, width in widths.items()
         )
-        for part, line in lines.items()
+        for name, line in lines.items()
     }
-    return framed(
+    return fill_template(
         "library.c",
         N=int(KernelArgs.N),
         OUT=int(KernelArgs.OUT),
+        STAGE=int(KernelArgs.STAGE),
         title=code.name,
         name=function.name,
         passed=", ".join(widths),
-        given=", ".join(f"const double *{x}" for x in widths),
-        room=layout.room,
+        inputs_of_one=", ".join(f"const double *{x}" for x in widths),
+        size=layout.size,
         spread="\n".join([*(f"    (void){x};" for x in widths), *spread]),
         count=len(function.results),
-        STAGE=int(KernelArgs.STAGE),
-        spare=spare(code, function),
+        reserve=reserve(code, function),
         advance=advance(code, function),
-        **parts,
+        **texts,
     )
 
 
 def _compile(text: str, command: list[str]) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        source, made = Path(folder, "robot.c"), Path(folder, "robot.so")
+        source, library = Path(folder, "robot.c"), Path(folder, "robot.so")
         source.write_text(text, encoding="utf-8")
         done = subprocess.run(
-            [*command, str(source), "-o", str(made), "-lm"],
+            [*command, str(source), "-o", str(library), "-lm"],
             capture_output=True,
             text=True,
             errors="replace",
@@ -123,11 +125,11 @@ def _compile(text: str, command: list[str]) -> bytes:
             raise NoCompilerError(
                 next(iter(done.stderr.splitlines()), f"{command[0]} ended with {done.returncode}")
             )
-        return made.read_bytes()
+        return library.read_bytes()
 
 
 def _load(data: bytes) -> ctypes.CDLL:
-    if not hasattr(os, "memfd_create"):  # macOS needs a file
+    if not hasattr(os, "memfd_create"):  # macOS cannot load a library from memory
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder, f"robot{next(_names)}.so")
             library.write_bytes(data)
@@ -136,7 +138,7 @@ def _load(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its name.
+        # The loader identifies a library by its path, so each path has another number of "./".
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
 
 
@@ -150,7 +152,7 @@ def _version(compiler: str) -> str:
 
 @cache
 def _processor() -> str:
-    """Return the processor's features, which decide the meaning of `-march=native`."""
+    """Return the processor's features, on which the option `-march=native` depends."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -158,15 +160,13 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: This number of random configurations, the neutral one and the limits are compared with Pinocchio.
-CHECKED = 100
-#: With at most this number of results, eight configurations need at most half a megabyte of the stack.
+#: Maximum number of results, so that eight configurations need at most half a megabyte of the stack
 _MOST_RESULTS = 8192
-# An index that is a plain integer is several times as fast as a member of an enumeration.
-_N, _OUT, _STAGE, *_PLACES = map(
+# Plain integers are several times as fast as members of an enumeration.
+_N, _OUT, _STAGE, *_INPUTS = map(
     int, (KernelArgs.N, KernelArgs.OUT, KernelArgs.STAGE, KernelArgs.Q, KernelArgs.V, KernelArgs.A)
 )
-_Task = ctypes.c_int64 * len(KernelArgs)
+_Arguments = ctypes.c_int64 * len(KernelArgs)
 _DOUBLE = np.dtype(np.float64)
 _compiling = lock_over_forks()
 
@@ -196,11 +196,11 @@ class _ExportedRobot(Protocol):
 class CompiledFrame:
     """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
 
-    Results agree with the results of `Robot` within the error bound, but not to the last bit. A configuration
-    has exactly the same result in a batch and in a single call. Inputs are checked: a wrong shape or a number
-    that is not finite is an error. The machine code is compared with Pinocchio once, on a hundred
-    configurations, unless the robot is loaded with `verify=False`. The results of later calls are not
-    compared, and `Robot.certificate` reports them as unchecked.
+    Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
+    exactly the same result in a batch and in a single call. A wrong shape of an input, or a number that is
+    not finite, is an error. The machine code is compared with Pinocchio once, on a hundred configurations,
+    unless the robot is loaded with `verify=False`. The results of later calls are not compared, and
+    `Robot.certificate` reports them as unchecked.
 
     Attributes:
         frame: The frame's name.
@@ -218,7 +218,7 @@ class CompiledFrame:
         self._robot, self._tree = robot, robot.verifier.tree
         self._plan = robot.plan([self._tree.frame_link(frame)])
         self._batches: dict[str, Callable[[int], int] | None] = {}
-        # The first call of each function compiles it or reads it from the cache.
+        # The first call of each function compiles the machine code, or reads it from the cache.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
@@ -227,7 +227,7 @@ class CompiledFrame:
         self._acceleration: Fast = partial(self._first, "acceleration")
 
     def __reduce__(self) -> tuple[Callable[..., CompiledFrame], tuple[str, Reference]]:
-        # The object contains memory addresses, so unpickling creates it again.
+        # Memory addresses are not valid in another process, so unpickling creates a new object.
         return self._robot.compiled, (self.frame, self.reference)
 
     def placement(self, q: Given, out: FloatArray | None = None, *, threads: int | None = None) -> FloatArray:
@@ -314,15 +314,13 @@ class CompiledFrame:
             return one
         return self._compute_batch("acceleration", (q, v, a), out, threads)
 
-    # -- inside --------------------------------------------------------------------------------------------
-
     def _first(self, name: str, q: Given, *others: object) -> FloatArray | None:
         with compiling, importing:
             from urdfkin.compiled.machine.single import arrays_are_known, called
 
-        # The norm of a quaternion or the range of the results must be checked.
-        own = self._tree.floating_joints or self._plan.is_large
-        if own or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
+        # The fast function checks neither the norm of a quaternion nor the range of the results.
+        needs_checks = self._tree.floating_joints or self._plan.is_large
+        if needs_checks or not (isinstance(q, np.ndarray) and q.ndim == 1 and arrays_are_known()):
             return None
         row = QUANTITIES[name]
         if (core := self._machine_code(row)) is None:
@@ -331,7 +329,7 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # later calls stay fast without this check
+            warn_of_degrees(self._tree, q)  # only the first call warns, so that later calls stay fast
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
@@ -343,20 +341,19 @@ class CompiledFrame:
 
     def _make(self, row: Quantity) -> Any:
         verifier = self._robot.verifier
-        code = bare(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
+        code = unverified_code(verifier.tree, self._plan, self.frame, [row], self.reference, "robot")
         if not 0 < len(code.functions[0].results) <= _MOST_RESULTS:
             return None
         try:
-            made = library(code).task
+            task = library(code).task
         except NoCompilerError:
             return None
-        made.argtypes, made.restype = [ctypes.c_void_p], ctypes.c_int64
+        task.argtypes, task.restype = [ctypes.c_void_p], ctypes.c_int64
         drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
         call = self._call((drawn.q, drawn.v, drawn.a)[: len(row.inputs)])
-        verifier.check(
-            row, call, call.in_shape(self._run_call(made, row, call, None, 1)), verifier.wanted(None)
-        )
-        return made
+        result = call.in_shape(self._run_call(task, row, call, None, 1))
+        verifier.check(row, call, result, verifier.policy_of_call(None))
+        return task
 
     def _call(self, inputs: Sequence[Given]) -> Call:
         return Call(self._tree, self._robot.plan, self.frame, self.reference, None, inputs)
@@ -365,30 +362,30 @@ class CompiledFrame:
         self, name: str, inputs: Sequence[Given], out: FloatArray | None, threads: int | None
     ) -> FloatArray:
         row = QUANTITIES[name]
-        if (made := self._machine_code(row)) is None:
+        if (task := self._machine_code(row)) is None:
             return self._robot.compute(
                 name, inputs, self.frame, self.reference, out=out, threads=threads, verify=False
             )
         if out is not None and self._are_plain(inputs, row, out):
-            # For an input that is not finite, the code below raises an error with its position.
+            # For an input that is not finite, the code below raises an error with the input's position.
             with suppress(NotFiniteError):
-                self._run(made, row, inputs, out, threads)
+                self._run(task, row, inputs, out, threads)
                 warn_of_degrees(self._tree, inputs[0])
                 self._robot.verifier.ledger.unchecked(name, len(out))
                 return out
         call = self._call(inputs)
         to = call.flat(out, row.own_shape(self._tree.nv))
-        found = call.compute(self._run_call, made, row, call, to, threads)
+        result = call.compute(self._run_call, task, row, call, to, threads)
         self._robot.verifier.ledger.unchecked(name, call.results)
-        return call.in_shape(found) if out is None else out
+        return call.in_shape(result) if out is None else out
 
     def _are_plain(
         self, inputs: Sequence[Given], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        For such arrays the general conversion of arguments (`Call`) is skipped. It would take a tenth of the
-        time of 100,000 accelerations, because each large batch removes its code from the processor's caches.
+        Such arrays need no conversion of arguments (`Call`), which would take a tenth of the time of 100,000
+        accelerations, because each large batch removes the conversion's code from the processor's caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
@@ -401,27 +398,27 @@ class CompiledFrame:
         return plain and out.flags.writeable
 
     def _run_call(
-        self, made: Any, row: Quantity, call: Call, out: FloatArray | None, threads: int | None
+        self, task: Any, row: Quantity, call: Call, out: FloatArray | None, threads: int | None
     ) -> FloatArray:
         inputs = [np.ascontiguousarray(x) for x in (call.q, *call.rates)]
-        found = np.empty((call.n, 1, *row.own_shape(self._tree.nv))) if out is None else out
-        self._run(made, row, inputs, found, threads)
-        if self._plan.is_large and not np.isfinite(found).all():
+        result = np.empty((call.n, 1, *row.own_shape(self._tree.nv))) if out is None else out
+        self._run(task, row, inputs, result, threads)
+        if self._plan.is_large and not np.isfinite(result).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
-        return found
+        return result
 
     def _run(
-        self, made: Any, row: Quantity, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None
+        self, task: Any, row: Quantity, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None
     ) -> None:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
-            task = _Task()
-            task[_N], task[_OUT] = len(part), address(part)
+            arguments = _Arguments()
+            arguments[_N], arguments[_OUT] = len(part), address(part)
             # If the last row is shorter than a vector register, the code writes past the end of the row.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
-            task[_STAGE] = 0 if stage is None else address(stage)
-            for place, x in zip(_PLACES, parts, strict=False):
-                task[place] = address(x)
-            return int(made(task))
+            arguments[_STAGE] = 0 if stage is None else address(stage)
+            for index, x in zip(_INPUTS, parts, strict=False):
+                arguments[index] = address(x)
+            return int(task(arguments))
 
         if in_blocks(compute, inputs, out, threads):
             raise NotFiniteError("q, v and a must be finite")

@@ -1,13 +1,14 @@
 """Make exported functions with exact constants, for computer algebra.
 
-The constants are the URDF's decimals as fractions. For example, the angle 1.5707963267948966 becomes pi/2. An
-angle becomes a multiple of pi/12 if rounding this multiple to a double gives the same number as rounding the
-angle. Irrational square roots, sines and cosines remain expressions.
+The constants are the URDF's decimals as fractions. An angle becomes a multiple of pi/12 if both have the same
+nearest double: 1.5707963267948966 becomes pi/2. Irrational square roots, sines and cosines remain
+expressions.
 """
 
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -19,17 +20,17 @@ from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry
 from urdfkin.dh.units import fraction_text, pi_fraction
 from urdfkin.export.expression import Graph, Node, Number
 from urdfkin.export.function import INPUTS, Function, function_of
-from urdfkin.export.proof import Proof, compared
+from urdfkin.export.proof import Proof, compare
 from urdfkin.model.recursion import IDENTITY, ZERO, Matrix, Vector
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.exact.numbers import DIGITS, NumberType, enough_digits, exact, precision, read_exact
 from urdfkin.verify.verifier import Verifier
 
-#: Largest angle (rad) that is replaced by a multiple of pi.
-#: Doubles below this angle are far closer to each other than multiples of pi/12.
+#: Maximum angle (rad) that is replaced by a multiple of pi.
+#: Up to this angle, doubles are far closer to each other than multiples of pi/12.
 _LARGEST = 100.0
-#: Sine and cosine of 0, pi/2, pi and 3 pi/2.
+#: Sine and cosine of 0, pi/2, pi and 3 pi/2
 _RIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
 
@@ -46,13 +47,13 @@ class PiMultiple:
         return self.factor < other
 
     def __radd__(self, other: Number) -> Number:
-        return other.graph.sum(other, self) if isinstance(other, Node) else self  # the constant is 0
+        return other.graph.sum(other, self) if isinstance(other, Node) else self  # other is 0
 
 
 class ExactGraph(Graph):
     """The expressions of a function whose constants are exact numbers, not doubles.
 
-    `recognised` contains the URDF's angles that were replaced by multiples of pi, and these multiples.
+    `recognised` maps the URDF's angles that were replaced to multiples of pi.
     """
 
     zero = 0
@@ -93,10 +94,7 @@ class ExactGraph(Graph):
 def exact_plan(
     graph: ExactGraph, text: str, tree: KinematicTree, plan: CompiledTree, link: int
 ) -> CompiledTree:
-    """Return a link's compiled tree with the exact constants of the URDF text.
-
-    The joints of `tree` were read from the URDF text.
-    """
+    """Return a link's compiled tree `plan` with the exact constants of the URDF text of `tree`."""
     graph.place = -1
     eq, path = graph.chapter, tree.path(link)
     joints = read_exact(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
@@ -129,47 +127,47 @@ def _aligning(axis: Vector, z: float) -> Matrix:
 
 
 def ball(x: Number) -> Number:
-    """Return an exact constant as an interval, which consists of a midpoint and a radius."""
+    """Return an exact constant as an interval (midpoint and radius)."""
     if isinstance(x, PiMultiple):
         return exact(0).pi() * ball(x.factor)
     return exact(x.numerator) / x.denominator if isinstance(x, Fraction) else exact(x)
 
 
-#: The operations on intervals.
+#: Operations on intervals
 _OPERATIONS: dict[str, Callable[..., Number]] = {
-    "+": lambda x, y: x + y,
-    "-": lambda x, y: x - y,
-    "*": lambda x, y: x * y,
-    "/": lambda x, y: x / y,
-    "neg": lambda x: -x,
-    "sin": lambda x: x.sin(),
-    "cos": lambda x: x.cos(),
-    "sqrt": lambda x: x.sqrt(),
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "neg": operator.neg,
+    "sin": operator.methodcaller("sin"),
+    "cos": operator.methodcaller("cos"),
+    "sqrt": operator.methodcaller("sqrt"),
 }
 
 
 def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
     """Return the results of a function with exact constants, for one configuration, as intervals."""
-    value: dict[Any, Number] = {}
+    values: dict[Any, Number] = {}
 
-    def of(x: Number) -> Number:
-        return value[x] if isinstance(x, Node) else ball(x)
+    def value(x: Number) -> Number:
+        return values[x] if isinstance(x, Node) else ball(x)
 
     for node in function.nodes:
         if node.op in INPUTS:
-            value[node] = exact(inputs[INPUTS.index(node.op)][node.of[0]])
+            values[node] = exact(inputs[INPUTS.index(node.op)][node.of[0]])
         else:
-            value[node] = _OPERATIONS[node.op](*map(of, node.of))
-    return [of(x) for x in function.results]
+            values[node] = _OPERATIONS[node.op](*map(value, node.of))
+    return list(map(value, function.results))
 
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """The checks of an exported file with exact constants: test vectors and the comparison with Pinocchio.
+    """The checks of an exported file with exact constants.
 
     Attributes:
         angles: Number of different angles of the URDF that were replaced by multiples of pi.
-        most: Largest difference between one of these angles and its multiple of pi, rad.
+        most: Maximum change of an angle by this replacement, rad.
     """
 
     angles: int = 0
@@ -198,9 +196,9 @@ def exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Return functions with exact constants, and the result of their comparison with Pinocchio.
 
-    The expressions are evaluated at fifty digits and compared with Pinocchio; `proof` has the test vectors of
-    the same functions with constants in double precision. Raise VerificationError if Pinocchio computes
-    another result.
+    The functions are evaluated at fifty digits. The test vectors are those of `proof`, the proof of the same
+    functions with constants in double precision. Raise VerificationError if Pinocchio computes another
+    result.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
@@ -210,7 +208,7 @@ def exact_functions(
             found.append(function_of(plan, other.quantity, reference, graph))
             angles |= graph.recognised
         most = max((float(abs(ball(x) - ball(y)).upper()) for x, y in angles.items()), default=0.0)
-    certificate = compared(verifier, plan_of, frame, reference, found, _evaluated, verify)
+    certificate = compare(verifier, plan_of, frame, reference, found, _evaluated, verify)
     fields = {name: getattr(proof, name) for name in ("sha256", "urdfkin", "vectors", "lock")}
     return tuple(found), ExactProof(
         **fields, certificate=certificate, single={}, angles=len(angles), most=most
@@ -227,7 +225,7 @@ def _evaluated(function: Function, inputs: Sequence[FloatArray]) -> FloatArray:
 
 
 def literal(x: Number) -> str:
-    """Return a constant as SymPy writes it: `2`, `Rational(17, 40)`, `pi/2`."""
+    """Return a constant as code for SymPy: `2`, `Rational(17, 40)`, `pi/2`."""
     if isinstance(x, PiMultiple):
         text = fraction_text(abs(x.factor)).replace("pi", "*pi").removeprefix("*")
         return text if x.factor > 0 else f"(-{text})"

@@ -1,10 +1,10 @@
 """Define symbolic numbers, whose arithmetic creates a graph of expressions for exported code.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each expression when it is created. Constants are Python floats, so an operation on
-constants is computed and not stored in the graph. Products with 0 and 1 and sums with 0 are removed. A
-product (-x) y becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions are the same
-node, so the sine and the cosine of each joint occur once.
+The graph simplifies each expression when the expression is created. Constants are Python floats, so an
+operation on constants is computed and not stored in the graph. Products with 0 and 1 and sums with 0 are
+removed. A product (-x) y becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions
+are the same node, so the sine and the cosine of each joint occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import wraps
 from typing import Any
 
@@ -32,12 +32,11 @@ class Node:
 
     Attributes:
         op: "q", "v" or "a" for an input; "+", "-", "*", "/", "neg", "sin", "cos" or "sqrt".
-        of: The operands, which are nodes and constants. For an input such as q[3], `of` contains the index 3.
-        index: Number of the expression in the order of creation; the operands have smaller numbers.
-        place: Number of the joint on the path at which the recursion created this expression.
-        equation: Numbers of the textbook's equation that this expression belongs to, for example "7.127"; ""
-            if there is no number.
-        name: Name in the code; "" for no name.
+        of: The operands, which are nodes and constants; for an input such as q[3], the index 3.
+        index: Number of the expression in the order of creation; operands have smaller numbers.
+        place: Index of the joint on the path at which the recursion created this expression.
+        equation: Numbers of the textbook's equation of this expression, for example "7.127"; "" without one.
+        name: Name of the variable in the code; "" if the variable has no name of its own.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "of", "op", "place")
@@ -87,19 +86,19 @@ class Graph:
         chapter: The textbook's equations as functions that record their equation numbers in new nodes.
     """
 
-    #: This constant replaces expressions such as 0 x and x - x.
+    #: Constant that replaces expressions such as 0 x and x - x
     zero: float = 0.0
 
     def __init__(self) -> None:
         self._made: dict[tuple[Any, ...], Node] = {}
         self.place, self.equation = 0, ""
-        self.chapter: Any = bound(made=self._record_numbers)
+        self.chapter: Any = bound(decorate=self._record_numbers)
 
     def input(self, letter: str, place: int) -> Node:
         return self.made(letter, place)
 
     def made(self, op: str, *of: Any) -> Node:
-        """Return the node of an operation. Two equal operations with the same operands have the same node."""
+        """Return the node of an operation; equal operations on the same operands have the same node."""
         key = (op, *of)
         if (node := self._made.get(key)) is None:
             node = self._made[key] = Node(self, op, of, len(self._made))
@@ -148,9 +147,9 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function that computes an equation and stores its number in each new expression.
+        """Return a function that computes an equation, and stores its number in each new expression.
 
-        If one equation calls another, each new expression stores the number of the calling equation.
+        If an equation calls another one, the new expressions store the number of the calling equation.
         """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
@@ -182,15 +181,16 @@ def _without_minus(x: Number) -> Number:
 
 
 def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
-    """Return constants, then nodes in the order of creation: x + y and y + x are the same node."""
+    """Return operands in a fixed order (constants, then nodes), so that x + y and y + x are the same node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 
 
-def needed(results: Sequence[Number]) -> list[Node]:
+def needed(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
+    """Return the expressions that results need; the operands of operations in `leaves` are not needed."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:
             seen.add(node)
-            waiting += node.operands
+            waiting += [] if node.op in leaves else node.operands
     return sorted(seen, key=lambda node: node.index)

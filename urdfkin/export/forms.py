@@ -1,7 +1,6 @@
-"""Export a chain as code that follows the URDF's joints, the rows of a Denavit-Hartenberg table, or screws.
+"""Export code that follows a URDF's joints, the rows of a Denavit-Hartenberg table, or screws.
 
-`urdfkin.load` converts a table or a product of exponentials to a robot, with one joint for each row or screw.
-The code is generated from this robot.
+A table or a product of exponentials is first converted to a robot with one joint for each row or screw.
 """
 
 from __future__ import annotations
@@ -38,12 +37,12 @@ def code_of_robot(
     """Return the exported code of a robot's frame; the arguments and errors are those of `Robot.export`."""
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
-    verify = bool(robot.verifier.wanted(verify))
+    verify = bool(robot.verifier.policy_of_call(verify))
     if form == "tree":
         return code_of(robot.verifier, robot.plan, frame, quantities, reference, name=name, verify=verify)
     chain = robot.dh(frame, verify=verify) if form == "dh" else robot.screws(frame, verify=verify)
     code = code_of_chain(chain, quantities, reference, name=name, verify=verify)
-    return replace(code, vouched=code.vouched and replace(code.vouched, lock=robot.origin.lock))
+    return replace(code, maybe_proof=replace(code.proof, lock=robot.origin.lock))
 
 
 def code_of_chain(
@@ -54,22 +53,17 @@ def code_of_chain(
     name: str | None = None,
     verify: bool = True,
 ) -> FrameCode:
-    """Return the exported code of a chain's last frame, with test vectors and the comparison with Pinocchio.
+    """Return the exported code of the last frame of a table or of a product of exponentials.
 
-    The code has one step for each row of the table, or for each screw. Results are in the axes of the chain's
-    base. The arguments are those of `Robot.export`. By default, a chain without moving joints exports only
-    the placement.
-
-    Raises:
-        InputError: a quantity cannot be exported.
-        VerificationError: Pinocchio computes another result.
+    Results are in the axes of the chain's base. The arguments and errors are those of `Robot.export`. By
+    default, a chain without moving joints exports only the placement.
     """
     if isinstance(chain, DHTable):
         text, chain = document(chain, Units()).text(), _with_safe_names(chain)
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)  # the user does not see this URDF
+        warnings.simplefilter("ignore", UrdfWarning)  # warnings about a URDF that the user does not know
         robot = hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))
@@ -89,11 +83,15 @@ def code_of_chain(
 
 def _with_safe_names(table: DHTable) -> DHTable:
     """Replace the names of joints and frames that a URDF cannot contain."""
-    names = [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
-    to = dict(zip(dict.fromkeys(names), all_safe(dict.fromkeys(names)), strict=True))
+    names = dict.fromkeys(
+        [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
+    )
+    new = dict(zip(names, all_safe(names), strict=True))
     rows = tuple(
-        replace(row, joint=to[row.joint], mimic=row.mimic and replace(row.mimic, leader=to[row.mimic.leader]))
+        replace(
+            row, joint=new[row.joint], mimic=row.mimic and replace(row.mimic, leader=new[row.mimic.leader])
+        )
         for row in table.rows
     )
-    base, tip = to[table.base_frame], to[table.tip_frame]
+    base, tip = new[table.base_frame], new[table.tip_frame]
     return replace(table, robot=safe(table.robot), base_frame=base, tip_frame=tip, rows=rows)

@@ -1,8 +1,8 @@
 """Define a function of the exported code, which computes one quantity of one frame.
 
-The exported code assigns an expression to a variable if it is used more than once, or if it is a number of a
-link's state. Sines, cosines, roots and quotients are also assigned to variables. A long expression is split
-into several assignments. All other expressions are written where they are used.
+The exported code assigns an expression to a variable if the expression is used more than once, is a number of
+a link's state (pose, velocity, acceleration), or is a sine, cosine, root or quotient. A long expression is
+split into several assignments. All other expressions are written where they are used.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
-#: Letters of the inputs.
+#: Letters of the inputs
 INPUTS = ("q", "v", "a")
-#: The exported code always assigns the result of these operations to a variable.
+#: Operations whose result is always assigned to a variable
 _ALWAYS = ("sin", "cos", "sqrt", "/")
-#: Largest number of operations in a statement.
+#: Maximum number of operations in a statement
 _LONGEST = 12
 
 
@@ -37,7 +37,7 @@ class Function:
 
     Attributes:
         plan: The compiled tree of the joints from the base to the frame.
-        results: The numbers of the result, row by row. Each number is a constant or an expression.
+        results: The numbers of the result, row by row; each number is a constant or an expression.
     """
 
     quantity: Quantity
@@ -60,12 +60,12 @@ class Function:
 
     @cached_property
     def nodes(self) -> list[Node]:
-        """All expressions that the results need. An expression comes after its operands."""
+        """All expressions that the results need; an expression comes after its operands."""
         return needed(self.results)
 
     @cached_property
     def operations(self) -> int:
-        """The number of arithmetic operations in the function; a change of sign does not count."""
+        """Number of arithmetic operations in the function; a change of sign does not count."""
         return sum(node.op not in (*INPUTS, "neg") for node in self.nodes)
 
     @cached_property
@@ -92,22 +92,17 @@ class Function:
                 length[node] = 0
         return found
 
-    def within(self, leaves: Collection[str]) -> set[Node]:
-        """Return the expressions that the results need, without the operands of operations in `leaves`."""
-        waiting, found = [x for x in self.results if isinstance(x, Node)], set[Node]()
-        while waiting:
-            if (node := waiting.pop()) not in found:
-                found.add(node)
-                waiting += [] if node.op in leaves else node.operands
-        return found
+    def needed_without(self, leaves: Collection[str]) -> set[Node]:
+        """Return the expressions that the results need if operations in `leaves` are inputs."""
+        return set(needed(self.results, leaves))
 
     def values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
         """Return the value (n,) of each expression for q (n, nq), v and a (n, nv), computed with NumPy."""
         value: dict[Node, Any] = {}
-        given = dict(zip(INPUTS, inputs, strict=False))
+        arrays = dict(zip(INPUTS, inputs, strict=False))
         for node in self.nodes:
-            if node.op in given:
-                value[node] = given[node.op][:, node.of[0]]
+            if node.op in arrays:
+                value[node] = arrays[node.op][:, node.of[0]]
             else:
                 value[node] = _OPERATIONS[node.op](*(value[x] if isinstance(x, Node) else x for x in node.of))
         return value
@@ -134,7 +129,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return x for an expression -x, which is never assigned to a variable; return others unchanged."""
+    """Return x for an expression -x, which is not assigned to a variable; return others unchanged."""
     return node.of[0] if node.op == "neg" else node
 
 
@@ -143,15 +138,15 @@ def function_of(
 ) -> Function:
     """Return the function that computes a quantity for the only frame of a compiled tree.
 
-    The compiled tree contains the joints from the base to the frame. `graph` is the graph in which the tree's
-    exact constants were created. Without it, the constants are doubles.
+    The compiled tree contains the joints from the base to the frame. If its constants are exact, `graph` is
+    the graph in which they were created.
     """
     graph = graph or Graph()
 
-    def entering(place: int) -> None:
+    def begin_step(place: int) -> None:
         graph.place = place
 
-    kind = recursion.NumberKind(graph.chapter, graph.sine_cosine, graph.root, entering, _name)
+    kind = recursion.NumberKind(graph.chapter, graph.sine_cosine, graph.root, begin_step, _name)
     inputs = [
         [graph.input(letter, i) for i in range(plan.nq if letter == "q" else plan.nv)]
         if letter in quantity.inputs

@@ -1,13 +1,13 @@
 r"""Write a LaTeX document with the formulas of the straight-line code, in the textbook's symbols.
 
-Symbols such as s_2 and R^(2) belong to the joint with this number on the path. A list at the beginning of the
-document contains the joints' names.
+The number in a symbol such as s_2 or R^(2) is the number of a joint on the path. A list at the beginning of
+the document contains the joints' names.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
-#: The textbook's symbols of a link's state.
+#: The textbook's symbols for a link's pose, velocity and acceleration
 _LETTERS = {
     "R": "R",
     "p": "p",
@@ -38,21 +38,23 @@ _RESULTS = {
 
 
 def write(code: FrameCode, to: str = "latex") -> str:
-    lines = [f"% {line}".rstrip() for line in code.head]
-    lines += [
+    joints, coordinates, rates = (
+        enumerate(map(latex_text, names), 1) for names in (code.joints, code.coordinates, code.rates)
+    )
+    lines = [
+        *(f"% {line}".rstrip() for line in code.head),
         r"\documentclass{article}",
         r"\usepackage{amsmath}",
         r"\allowdisplaybreaks",
         r"\begin{document}",
+        rf"\section*{{{latex_text(code.robot)}, frame {latex_text(code.frame)}}}",
+        r"\begin{itemize}",
+        r"\item In metres, radians and seconds.",
+        *(rf"\item joint {k} of the path: {name}" for k, name in joints),
+        *(rf"\item $q_{{{k}}}$: {name}" for k, name in coordinates),
+        *(rf"\item $v_{{{k}}}$, $a_{{{k}}}$: {name}" for k, name in rates),
+        r"\end{itemize}",
     ]
-    lines += [rf"\section*{{{latex_text(code.robot)}, frame {latex_text(code.frame)}}}", r"\begin{itemize}"]
-    lines += [r"\item In metres, radians and seconds."]
-    lines += [rf"\item joint {k + 1} of the path: {latex_text(name)}" for k, name in enumerate(code.joints)]
-    lines += [rf"\item $q_{{{k + 1}}}$: {latex_text(name)}" for k, name in enumerate(code.coordinates)]
-    lines += [
-        rf"\item $v_{{{k + 1}}}$, $a_{{{k + 1}}}$: {latex_text(name)}" for k, name in enumerate(code.rates)
-    ]
-    lines += [r"\end{itemize}"]
     for function in code.functions:
         lines += _function(code, function)
     return "\n".join([*lines, r"\end{document}", ""])
@@ -60,33 +62,33 @@ def write(code: FrameCode, to: str = "latex") -> str:
 
 def _function(code: FrameCode, function: Function) -> Iterator[str]:
     writer = Writer(code, function, _literal)
-    writer.words = {node: _symbol(node, word) for node, word in writer.words.items()}
+    writer.names = {node: _symbol(node, name) for node, name in writer.names.items()}
     yield rf"\subsection*{{{function.quantity.title}, eq. {', '.join(function.quantity.equations)}}}"
     for head, lines in writer.statements():
-        place, _, numbers = head.partition(": ")
-        yield rf"{latex_text(place)}{f' ({numbers})' if numbers else ''}:"
-        yield from _aligned((word, value) for word, value in lines)
+        place, _, equations = head.partition(": ")
+        yield rf"{latex_text(place)}{f' ({equations})' if equations else ''}:"
+        yield from _aligned(lines)
     letter = _RESULTS[function.name]
     yield from _aligned(
-        (f"{letter}_{{{','.join(str(i + 1) for i in place)}}}", value)
-        for place, value in zip(np.ndindex(function.shape), writer.results(), strict=True)
+        (f"{letter}_{{{','.join(str(i + 1) for i in indices)}}}", value)
+        for indices, value in zip(np.ndindex(function.shape), writer.results(), strict=True)
     )
 
 
-def _aligned(lines: Iterator[tuple[str, str]]) -> Iterator[str]:
+def _aligned(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
     yield r"\begin{align*}"
-    yield " \\\\\n".join(f"{word} &= {_formula(value)}" for word, value in lines)
+    yield " \\\\\n".join(f"{symbol} &= {_formula(value)}" for symbol, value in lines)
     yield r"\end{align*}"
 
 
-def _symbol(node: Node, word: str) -> str:
+def _symbol(node: Node, name: str) -> str:
     if node.op in ("q", "v", "a"):
         return f"{node.op}_{{{node.of[0] + 1}}}"
     if node.op in ("sin", "cos"):
         return f"{node.op[0]}_{{{node.place + 1}}}"
-    if found := _NAME.fullmatch(word):
+    if found := _NAME.fullmatch(name):
         return f"{_LETTERS[found[1]]}^{{({found[2]})}}_{{{found[3]}}}"
-    return f"t_{{{word[1:]}}}"
+    return f"t_{{{name[1:]}}}"
 
 
 def _formula(text: str) -> str:

@@ -1,4 +1,4 @@
-"""Write a file for MATLAB and Octave. Its main function returns all other functions, including the check."""
+"""Write a file for MATLAB and Octave, whose main function returns all other functions and the check."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urdfkin.export.function import Function
 _CHECK = """
 function check()
 % For each function the largest error as a share of its tolerance: at most 1.
-{given}
+{inputs}
 {functions}
 end
 
@@ -53,41 +53,38 @@ def _function(code: FrameCode, function: Function) -> Iterator[str]:
     yield f"% {' x '.join(map(str, shape))}, eq. {numbers}; {function.operations} operations."
     for x, width in code.widths(function).items():
         yield f"if numel({x}) ~= {width}, error('{x} needs {width} numbers: found %d', numel({x})), end"
-    for node in writer.given:
-        yield f"{writer.words[node]} = {node.op}({node.of[0] + 1});"
+    for node in writer.inputs:
+        yield f"{writer.names[node]} = {node.op}({node.of[0] + 1});"
     for head, lines in writer.statements():
         yield f"% {head}"
-        yield from (f"{word} = {value};" for word, value in lines)
+        yield from (f"{name} = {value};" for name, value in lines)
     yield f"out = zeros({', '.join(map(str, shape))});"
-    for place, value in zip(np.ndindex(shape), writer.results(), strict=True):
-        yield f"out({', '.join(str(i + 1) for i in place)}) = {value};"
+    for indices, value in zip(np.ndindex(shape), writer.results(), strict=True):
+        yield f"out({', '.join(str(i + 1) for i in indices)}) = {value};"
     yield "end"
 
 
 def _check(code: FrameCode) -> str:
-    found = code.proof.vectors
-    most = max((function.inputs for function in code.functions), key=len)
-    given = [
-        f"{letter} = {_matrix([list(map(repr, v.inputs[k])) for v in found])}"
-        for k, letter in enumerate(most)
+    vectors = code.proof.vectors
+    inputs = [
+        f"{letter} = {_matrix([list(map(repr, vector.inputs[k])) for vector in vectors])}"
+        for k, letter in enumerate(code.inputs)
     ]
     checks = []
     for function in code.functions:
         name = function.name
-        rows = [v.results[name] for v in found]
-        allowed = [v.within[name] for v in found]
-        inputs = ", ".join(f"{letter}(k, :)" for letter in function.inputs)
+        arguments = ", ".join(f"{letter}(k, :)" for letter in function.inputs)
         checks += [
-            f"right = {_matrix(rows)}",
-            f"within = {_matrix(allowed)}",
+            f"right = {_matrix([vector.results[name] for vector in vectors])}",
+            f"within = {_matrix([vector.within[name] for vector in vectors])}",
             "found = zeros(size(right));",
-            f"for k = 1:{len(found)}",
-            f"    x = {name}({inputs});",
+            f"for k = 1:{len(vectors)}",
+            f"    x = {name}({arguments});",
             "    found(k, :) = reshape(permute(x, ndims(x):-1:1), 1, []);",
             "end",
             f"report('{name}', found, right, within);",
         ]
-    return _CHECK.format(given="\n".join(given), functions="\n".join(checks), n=len(found))
+    return _CHECK.format(inputs="\n".join(inputs), functions="\n".join(checks), n=len(vectors))
 
 
 def _matrix(rows: Sequence[Sequence[str]]) -> str:

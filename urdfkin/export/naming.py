@@ -1,4 +1,4 @@
-"""Convert names of a URDF to identifiers and to text for comments that are valid in every language.
+"""Convert names of a URDF to identifiers, and to text for comments, that are valid in every language.
 
 Identifiers are short, ASCII and unique. The exported code adds a prefix such as `s_` or `q_`, so that no
 identifier is a keyword.
@@ -11,9 +11,10 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import plain
 
-#: An identifier has at most this length without a prefix. With a prefix, MATLAB allows 63 characters.
+#: Maximum length of an identifier without a prefix; MATLAB allows 63 characters with the prefix
 _LONGEST = 40
-_LONGEST_SHOWN = 80
+#: Maximum length of a name in a comment
+_LONGEST_IN_COMMENT = 80
 
 
 def safe(name: str) -> str:
@@ -27,25 +28,24 @@ def safe(name: str) -> str:
 
 
 def all_safe(names: Iterable[str]) -> list[str]:
-    """Return a different identifier for each name, even for a language that ignores case.
+    """Return an identifier for each name; they differ, even for a language that ignores case.
 
     >>> all_safe(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']
     """
-    found, taken = list[str](), set[str]()
+    found: dict[str, str] = {}
     for name in names:
         word, k = safe(name), 1
-        candidate = word
-        while candidate.lower() in taken:
+        identifier = word
+        while identifier.lower() in found:
             k += 1
-            candidate = f"{word}_{k}"
-        taken.add(candidate.lower())
-        found.append(candidate)
-    return found
+            identifier = f"{word}_{k}"
+        found[identifier.lower()] = identifier
+    return list(found.values())
 
 
 def title(robot: str, frame: str) -> str:
-    """Return the name of the exported code for a frame. The name begins with a letter; callers add a suffix.
+    """Return the prefix of the exported functions of a frame; it begins with a letter.
 
     >>> title("panda", "panda_hand"), title("ur5", "tool0"), title("2", "x"), title("", "my arm")
     ('panda_hand', 'ur5_tool0', 'robot_2_x', 'my_arm')
@@ -55,17 +55,17 @@ def title(robot: str, frame: str) -> str:
     return word if word[0].isalpha() else f"robot_{word}"
 
 
-def shown(name: str) -> str:
+def comment_name(name: str) -> str:
     """Return a name as text for a comment in any language, shortened to 80 characters."""
-    return quiet(name if len(name) <= _LONGEST_SHOWN else f"{name[:_LONGEST_SHOWN]}...")
+    return comment_text(name if len(name) <= _LONGEST_IN_COMMENT else f"{name[:_LONGEST_IN_COMMENT]}...")
 
 
-def quiet(text: str) -> str:
-    r"""Return the text as printable ASCII that cannot end a comment in any language.
+def comment_text(text: str) -> str:
+    r"""Return a text as printable ASCII that does not end a comment in any language.
 
-    C's trigraphs, such as ??/, are removed too.
+    Question marks are replaced too, because C's trigraphs, such as ??/, contain them.
 
-    >>> quiet("*/ int x; ??/")
+    >>> comment_text("*/ int x; ??/")
     '_/ int x; __/'
     """
     return plain(text).replace("?", "_")

@@ -1,8 +1,8 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
-When a user runs the file, its test vectors check the file and also the user's compiler, language version and
-libraries. The test vectors contain true values at fifty digits, computed from the URDF's decimals. For each
-true value they also contain a bound on the rounding errors of a correct computation, in eps of the file's
+The test vectors check the file, and also the user's compiler, language version and libraries. A test vector
+contains inputs and true values at fifty digits, which are computed from the URDF's decimals. For each true
+value, it also contains a bound on the rounding errors of a correct computation, in eps of the file's
 precision. The inputs are single-precision numbers, so they are equal in single and in double precision.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export.function import Function
-from urdfkin.export.naming import quiet, shown
+from urdfkin.export.naming import comment_name, comment_text
 from urdfkin.export.single import single_bounds
 from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST
 from urdfkin.model.configuration import draw
@@ -40,22 +40,22 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.verifier import Verifier
 
-#: This number of random configurations, the neutral one and the limits are compared with Pinocchio.
+#: Number of random configurations that are compared with Pinocchio, besides the neutral one and the limits
 CHECKED = 100
-#: Number of test vectors.
+#: Number of test vectors
 VECTORS = 4
 
 
 @dataclass(frozen=True)
 class Vector:
-    """A test vector: one configuration and the true result of each function.
+    """A test vector: one configuration, and the true result of each function.
 
     Attributes:
         inputs: q, v and a.
-        results: The true values of each quantity as decimal numbers, row by row.
-        within: The error bound of each number, in eps, by quantity.
-        single: The same in single precision, in eps = 2^-23; 0.0 if a number is beyond the range of single
-            precision.
+        results: For each quantity, the true values as decimal numbers, row by row.
+        within: For each quantity, the error bounds in double precision, in eps = 2^-52.
+        single: For each quantity, the error bounds in single precision, in eps = 2^-23; 0.0 if a number is
+            beyond the range of single precision.
     """
 
     inputs: tuple[list[float], ...]
@@ -71,8 +71,8 @@ class Proof:
     Attributes:
         sha256: SHA-256 of the URDF's text.
         urdfkin: Version of urdfkin.
-        single: The largest bound of each quantity in single precision, in multiples of eps * scale; inf if a
-            number is beyond the range of single precision.
+        single: For each quantity, the largest error bound in single precision, in multiples of eps * scale;
+            inf if a number is beyond the range of single precision.
         lock: Name and value of each locked joint.
     """
 
@@ -89,14 +89,14 @@ class Proof:
 
     @property
     def constants(self) -> str:
-        """Description of exact constants; "" for constants in double precision."""
+        """Sentence about exact constants; "" for constants in double precision."""
         return ""
 
     @property
     def lines(self) -> list[str]:
-        oracle = quiet(self.certificate.oracle)
+        oracle = comment_text(self.certificate.oracle)
         if not self.certificate.verified:
-            reasons = quiet("; ".join(self.certificate.not_verified)) or "nothing was checked"
+            reasons = comment_text("; ".join(self.certificate.not_verified)) or "nothing was checked"
             verdict = [f"UNVERIFIED by {oracle}: {reasons}"]
         else:
             verdict = [f"Verified by {oracle}, the expressions below evaluated {self.evaluated}:"] + [
@@ -108,7 +108,7 @@ class Proof:
             *verdict,
             *self._single_lines,
             f"URDF sha256 {self.sha256}",
-            *(f"Joint {shown(name)} is locked at {value!r}" for name, value in self.lock),
+            *(f"Joint {comment_name(name)} is locked at {value!r}" for name, value in self.lock),
             f"Written by urdfkin {self.urdfkin}; {len(self.vectors)} test vectors at {DIGITS} digits below",
             *([self.constants] if self.constants else []),
         ]
@@ -118,7 +118,7 @@ class Proof:
         beyond = [name for name, k in self.single.items() if not np.isfinite(k)]
         bounds = ", ".join(f"{name} {k:.3g}" for name, k in self.single.items() if name not in beyond)
         lines = [
-            "Bounds in single precision, in eps*scale with eps = 2^-23, the constants' rounding included:",
+            "Error bounds in single precision, with the rounding of constants, in eps*scale (eps = 2^-23):",
             f"  {bounds}",
         ]
         return [
@@ -135,8 +135,8 @@ def prove(
     functions: Sequence[Function],
     verify: bool | None,
 ) -> Proof:
-    """Compare functions with Pinocchio, and compute test vectors; raise VerificationError if they differ."""
-    certificate = compared(verifier, plan_of, frame, reference, functions, Function.evaluated, verify)
+    """Compare functions with Pinocchio, and make test vectors; raise VerificationError if results differ."""
+    certificate = compare(verifier, plan_of, frame, reference, functions, Function.evaluated, verify)
     vectors, single = _vectors(verifier, plan_of, frame, reference, functions)
     return Proof(
         sha256=hashlib.sha256(verifier.text.encode()).hexdigest(),
@@ -148,7 +148,7 @@ def prove(
     )
 
 
-def compared(
+def compare(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
     frame: str,
@@ -158,13 +158,13 @@ def compared(
     verify: bool | None,
 ) -> Certificate:
     """Compare the results of `evaluate` with Pinocchio, or raise VerificationError."""
-    checker = copy(verifier)  # the copy has a separate ledger
+    checker = copy(verifier)  # the copy has its own record of checks
     drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
         found = evaluate(function, (call.q, *call.rates))
-        checker.check(function.quantity, call, found, bool(checker.wanted(verify)))
+        checker.check(function.quantity, call, found, bool(checker.policy_of_call(verify)))
     return checker.certificate()
 
 
@@ -179,17 +179,16 @@ def _vectors(
     tree = verifier.tree
     link = tree.frame_link(frame)
     drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
-    inputs = tuple(_single(x) for x in (drawn.q, drawn.v, drawn.a))
-    whole = Call(tree, plan_of, frame, reference, None, inputs)
-    part = whole.part(slice(0, VECTORS))
-    within, single, most = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
+    inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (drawn.q, drawn.v, drawn.a))
+    part = Call(tree, plan_of, frame, reference, None, inputs).part(slice(0, VECTORS))
+    within, single, largest = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()
     path, found = tree.path(link), []
     errors = conversion(verifier.text, tree, path, part.q)
     for f in functions:
         within[f.name], scale = _within(f, part, errors)
         single[f.name] = single_bounds(f, inputs) + EPS / SINGLE_EPS * within[f.name]
         shares = np.divide(single[f.name], scale, out=np.zeros_like(scale), where=scale > 0.0)
-        most[f.name] = float(shares.max(initial=0.0))
+        largest[f.name] = float(shares.max(initial=0.0))
     with precision(DIGITS + enough_digits(len(path))):
         joints = read_exact(verifier.text, tree, path)
         for k in range(VECTORS):
@@ -203,18 +202,11 @@ def _vectors(
                     {name: [_rounded_up(x) for x in values[k]] for name, values in single.items()},
                 )
             )
-    return tuple(found), most
-
-
-def _single(x: FloatArray) -> FloatArray:
-    return x.astype(np.float32).astype(np.float64)
+    return tuple(found), largest
 
 
 def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
-    """Return the error bounds k * scale of a function's results, in eps, and the scales.
-
-    Both arrays have the shape (n, numbers).
-    """
+    """Return the error bounds k * scale of a function's results (n, numbers), in eps, and the scales."""
     v, a = (*part.rates, None, None)[:2]
     size = against_true_values(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
@@ -225,7 +217,7 @@ def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[Floa
 
 
 def decimal(x: Number) -> str:
-    """Return fifty decimal digits of an interval without zeros at the end; 0 if the interval contains 0."""
+    """Return fifty digits of an interval, without zeros at the end; 0.0 if the interval contains 0."""
     ball = exact(x)
     if ball.contains(0):
         return "0.0"
@@ -235,21 +227,20 @@ def decimal(x: Number) -> str:
 
 
 def _rounded_down(x: float) -> str:
-    """Return x with six digits, rounded down; 0.0 for an x that is not finite."""
+    """Return a bound with six digits, rounded down."""
     return _rounded(x, 6, ROUND_FLOOR)
 
 
 def _rounded_up(x: float) -> str:
-    """Return x with seven digits, rounded up; 0.0 for an x that is not finite.
+    """Return a bound with seven digits, rounded up.
 
-    With the bound 0.0, only equal numbers are accepted. The bound must not be rounded down, because the error
-    of a constant in single precision can be equal to its bound.
+    The error of a constant in single precision can be equal to its bound, which must not be rounded down.
     """
     return _rounded(x, 7, ROUND_CEILING)
 
 
-def _rounded(x: float, digits: int, towards: str) -> str:
+def _rounded(x: float, digits: int, rounding: str) -> str:
     if not np.isfinite(x):
-        return "0.0"
-    with localcontext(prec=digits, rounding=towards):
+        return "0.0"  # with this bound, only equal numbers are accepted
+    with localcontext(prec=digits, rounding=rounding):
         return f"{float(+Decimal(x)):.{digits}g}"

@@ -1,7 +1,6 @@
 """Write Python code for NumPy, any array API namespace, Numba, JAX, PyTorch, CasADi or SymPy.
 
-The expressions are the same for all libraries. The code for JAX and PyTorch resembles the code for any array
-API namespace, but it calls the functions of JAX or PyTorch.
+The expressions are the same for all libraries; a `Dialect` describes the code around them.
 """
 
 from __future__ import annotations
@@ -23,23 +22,23 @@ from urdfkin.verify.bounds import column_weights
 
 @dataclass(frozen=True)
 class Dialect:
-    """The parts of an exported file that differ between the Python libraries.
+    """The code for one Python library.
 
     Attributes:
         about: Description of a function's inputs and results.
-        imports: Import lines. The placeholder `{}` is replaced by the functions `cos`, `sin` and `sqrt` that
-            the code uses. Lines with a placeholder are removed from code without these functions.
-        result: Yields the last lines of an exported function, which return its results.
-        values: Body of the function `_values(function, inputs)` of the exported file, which returns the
-            results of an exported function for a list of configurations.
-        decorator: Line with the decorator of each exported function; "" for no decorator.
-        entering: Returns the first lines of an exported function, for example the checks of its inputs.
-        helpers: Code of helper functions that the exported functions call.
-        index: Pattern for one number of an input. The default gives, for example, `q[0]`.
-        given: Parameter of the exported file's self-test, with a default value; "" for no parameter.
+        imports: Import lines. In place of `{}`, the code imports those of the functions `cos`, `sin` and
+            `sqrt` that it uses; if it uses none of them, the line is left out.
+        result: Function that yields the last lines of an exported function, which return the result.
+        values: Body of the exported file's function `_values(function, inputs)`, which returns the results
+            of an exported function for a list of configurations.
+        decorator: Decorator of each exported function; "" for no decorator.
+        first_lines: Function that returns the first lines of an exported function, such as checks of inputs.
+        helpers: Code of the functions that exported functions call.
+        index: Pattern for one number of an input, such as `q[0]`.
+        check_parameter: Parameter of the exported function `check`, with its default; "" for none.
         single: Whether the functions also compute in single precision.
-        closing: Returns further code, which follows the exported functions in the file.
-        after: Last lines of the exported file's self-test.
+        more_code: Function that returns code that follows the exported functions.
+        more_checks: Last lines of the program that runs the test vectors.
         exact: Whether constants are exact.
     """
 
@@ -48,13 +47,13 @@ class Dialect:
     result: Callable[[Writer], Iterator[str]]
     values: str
     decorator: str = ""
-    entering: Callable[[Writer], list[str]] = lambda writer: []
+    first_lines: Callable[[Writer], list[str]] = lambda writer: []
     helpers: str = ""
     index: str = "{}[{}]"
-    given: str = ""
+    check_parameter: str = ""
     single: bool = False
-    closing: Callable[[FrameCode], str] = lambda code: ""
-    after: str = ""
+    more_code: Callable[[FrameCode], str] = lambda code: ""
+    more_checks: str = ""
     exact: bool = False
 
 
@@ -63,23 +62,20 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which assigns each result to an element of an array."""
+    """Return a `Dialect.result` that assigns each number to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
         yield f"out = {create.format(shape, ', '.join(map(str, shape)))}"
-        for place, value in zip(np.ndindex(shape), writer.results(), strict=True):
-            yield f"out[{index}{', '.join(map(str, place))}] = {value}"
+        for indices, value in zip(np.ndindex(shape), writer.results(), strict=True):
+            yield f"out[{index}{', '.join(map(str, indices))}] = {value}"
         yield "return out"
 
     return result
 
 
 def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields the code `return matrix([[...], ...])`, with a list for each row.
-
-    The rows of a Hessian (6, nv, nv) are written as one matrix.
-    """
+    """Return a `Dialect.result` that returns a matrix of rows; a Hessian (6, nv, nv) becomes one matrix."""
 
     def result(writer: Writer) -> Iterator[str]:
         values, shape = writer.results(), writer.function.shape
@@ -98,17 +94,20 @@ def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer],
 
 def _shapes(writer: Writer) -> list[str]:
     inputs = writer.function.inputs
-    lines = [f"{x} = np.asarray({x})" for x in inputs] + _demands(writer)
-    lines += [f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs]
     shapes = ", ".join(f"{x}.shape[:-1]" for x in inputs)
-    return [*lines, f"shape = np.broadcast_shapes({shapes})"]
+    return [
+        *(f"{x} = np.asarray({x})" for x in inputs),
+        *_demands(writer),
+        *(f"{x} = np.asarray({x}, dtype=np.float64)" for x in inputs),
+        f"shape = np.broadcast_shapes({shapes})",
+    ]
 
 
 # -- array API ---------------------------------------------------------------------------------------------
 
 
 def _zero(writer: Writer, xp: str) -> str:
-    """Return the line that creates zeros with the batch shape, the type and the device of the inputs."""
+    """Return code for zeros with the batch shape, the type and the device of the inputs."""
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
@@ -121,18 +120,18 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
 
 
 def _lengths(text: str) -> Callable[[Writer], list[str]]:
-    """Return a function that returns code which checks the lengths of one configuration's inputs.
+    """Return a `Dialect.first_lines` that checks the lengths of the inputs of one configuration.
 
     `text` is a format of ValueError's argument, for an input `x` that needs `width` numbers.
     """
 
-    def lines(writer: Writer) -> list[str]:
-        made = list[str]()
+    def first_lines(writer: Writer) -> list[str]:
+        lines = list[str]()
         for x, width in writer.code.widths(writer.function).items():
-            made += [f"if len({x}) != {width}:", f"    raise ValueError({text.format(x=x, width=width)})"]
-        return made
+            lines += [f"if len({x}) != {width}:", f"    raise ValueError({text.format(x=x, width=width)})"]
+        return lines
 
-    return lines
+    return first_lines
 
 
 def _in_any_namespace(writer: Writer) -> list[str]:
@@ -142,7 +141,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a function that yields code which stacks all results, for libraries with immutable arrays."""
+    """Return a `Dialect.result` that stacks all numbers, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -188,11 +187,11 @@ _IS_ARRAY = """    if not {is_array}:
 def _demand(
     wrong: str, given: str = "", numbers: str = "a floating type", array: str = "an array", is_array: str = ""
 ) -> str:
-    """Return the code of a function that checks an input.
+    """Return the code of the function `_demand`, which checks an input.
 
-    The expression `wrong` is true if the numbers have another type, and `is_array` tests for the container
-    ("" if the input is always one). `given` are further arguments of the function. `numbers` and `array` name
-    the accepted types and container.
+    `wrong` is code that is true for numbers of a wrong type; `numbers` describes the accepted numbers.
+    `is_array` is code that is true for an accepted container ("" for no test), which `array` describes.
+    `given` are further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -200,7 +199,7 @@ def _demand(
 
 _STACKED = '''
 def _stacked({given}values, zero, shape):
-    """Return numbers of the batch shape of `zero`, or of one that broadcasts, as an array (..., *shape)."""
+    """Stack numbers, whose batch shapes broadcast to that of `zero`, as an array (..., *shape)."""
     batch = tuple(zero.shape)
     values = [{xp}.broadcast_to(x, batch) for x in values]
     return {xp}.reshape({xp}.stack(values, {axis}=-1), batch + shape)
@@ -242,7 +241,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module(code: FrameCode) -> str:
-    """Return code of a `torch.nn.Module` with the functions, and of their check by `gradcheck`."""
+    """Return the code of a `torch.nn.Module` with the functions, and of a check of their derivatives."""
     # The method `forward` computes the function with the fewest inputs, usually a function of q.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
@@ -255,21 +254,22 @@ def _torch_module(code: FrameCode) -> str:
 
 
 def _rate(plan: CompiledTree) -> float:
-    """Return a bound, at least 1, on the rotation (rad) of any vector when a coordinate changes by 1 rad.
+    """Return an upper bound on the rotation (rad) of any vector when a coordinate changes by 1 rad.
 
-    The bound is the sum of the multipliers of all revolute joints whose values depend on the coordinate.
+    The bound is never below 1. It is the largest sum of the multipliers of all revolute joints whose values
+    depend on the same coordinate.
 
-    The bound for floating joints is at least 3. If one number of a unit quaternion changes by t, the body
-    rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the change. The
-    derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a product of
-    F rotated vectors, the third derivative is at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
+    With a floating joint, the bound is never below 3. If one number of a unit quaternion changes by t, the
+    body rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the
+    change. The derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a
+    product of F rotated vectors, the third derivative is at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))
 
 
 def _all(code: FrameCode) -> str:
-    """Return the names of all functions as the elements of a tuple."""
+    """Return the names of all functions as code for the elements of a tuple."""
     return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
 
 
@@ -286,25 +286,25 @@ _ONE_BY_ONE = "return [{} for one in zip(*inputs)]"
 
 DIALECTS = {
     "numpy": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}), which broadcast; so do results.",
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}), whose batch axes broadcast.",
         imports="import numpy as np\nfrom numpy import {}",
         helpers=_demand('x.dtype.kind not in "biuf"', numbers="real numbers"),
-        entering=_shapes,
+        first_lines=_shapes,
         index="{}[..., {}]",
         result=_in_array("np.empty((*shape, {1}))", "..., "),
         values="return np.reshape(function(*map(np.array, inputs)), (len(inputs[0]), -1)).tolist()",
     ),
     "array": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and device;\n"
-        "they broadcast. PyTorch's tensors need array-api-compat. No array is written in place.\n"
-        "check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any array API namespace, type and\n"
+        "device, whose batch axes broadcast. PyTorch's tensors need the package array-api-compat. No array\n"
+        "is changed in place. check(xp) runs the test vectors in a namespace, for example check(jax.numpy).",
         imports="import numpy",
         helpers=_NAMESPACE
         + "\n"
         + _demand('not xp.isdtype(x.dtype, "real floating")', "xp, ", is_array='hasattr(x, "ndim")')
         + "\n"
         + _STACKED.format(given="xp, ", xp="xp", axis="axis"),
-        entering=_in_any_namespace,
+        first_lines=_in_any_namespace,
         index="{}[..., {}]",
         result=_stacked("xp, "),
         values="arrays = [xp.asarray(x, dtype=getattr(xp, kind)) for x in inputs]\n"
@@ -314,27 +314,28 @@ DIALECTS = {
         "    found = function(*arrays)\n"
         "    found = xp.reshape(found, (len(inputs[0]), -1))\n"
         "    return [[float(found[i, k]) for k in range(found.shape[1])] for i in range(found.shape[0])]",
-        given="xp=numpy",
+        check_parameter="xp=numpy",
         single=True,
     ),
     "numba": Dialect(
-        about="One configuration, float64 arrays q ({nq},), v and a ({nv},); compiled when first called.",
+        about="Arguments are float64 arrays of one configuration: q ({nq},), v and a ({nv},).\n"
+        "The first call of a function compiles the function.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
-        entering=_lengths('"{x} needs {width} numbers"'),  # Numba needs a constant text
+        first_lines=_lengths('"{x} needs {width} numbers"'),  # Numba supports only constant messages
         result=_in_array("np.empty({0})", ""),
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
     "jax": Dialect(
-        about="Arrays q (..., {nq}), v and a (..., {nv}) of any precision, which broadcast; for jit, vmap\n"
-        "and grad.\n"
-        "XLA's fusion pass takes minutes to compile long chains; this disables it:\n"
+        about="Arguments are arrays q (..., {nq}), v and a (..., {nv}) of any precision, whose batch axes\n"
+        "broadcast. The functions support jit, vmap and grad.\n"
+        "XLA's fusion pass takes minutes to compile long chains; this line disables the pass:\n"
         'jax.jit(function, compiler_options={{"xla_disable_hlo_passes": "fusion"}})',
         imports="import jax\nimport jax.numpy as jnp\nfrom jax.numpy import {}",
         helpers=_demand("not jnp.issubdtype(x.dtype, jnp.floating)")
         + "\n"
         + _STACKED.format(given="", xp="jnp", axis="axis"),
-        entering=lambda writer: [
+        first_lines=lambda writer: [
             *(f"{x} = jnp.asarray({x})" for x in writer.function.inputs),
             *_demands(writer),
             _zero(writer, "jnp"),
@@ -352,48 +353,50 @@ DIALECTS = {
         single=True,
     ),
     "torch": Dialect(
-        about="Tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device, which broadcast;\n"
-        "for autograd, torch.func, vmap and compile. Kinematics() has the functions as a module.",
+        about="Arguments are tensors q (..., {nq}), v and a (..., {nv}) of any floating type and device,\n"
+        "whose batch axes broadcast. The functions support autograd, torch.func, vmap and compile.\n"
+        "Kinematics() is a torch.nn.Module with these functions.",
         imports="import torch\nfrom torch import {}",
         helpers=_demand("not x.is_floating_point()", array="a tensor", is_array="isinstance(x, torch.Tensor)")
         + "\n"
         + _STACKED.format(given="", xp="torch", axis="dim"),
-        entering=lambda writer: [*_demands(writer), _zero(writer, "torch")],
+        first_lines=lambda writer: [*_demands(writer), _zero(writer, "torch")],
         index="{}[..., {}]",
         result=_stacked(""),
         values="tensors = [torch.tensor(x, dtype=getattr(torch, kind), device=device) for x in inputs]\n"
         "    return function(*tensors).reshape(len(inputs[0]), -1).tolist()",
-        given='device="cpu"',
+        check_parameter='device="cpu"',
         single=True,
-        closing=_torch_module,
-        after="    for name, good in gradients().items():\n"
+        more_code=_torch_module,
+        more_checks="    for name, good in gradients().items():\n"
         "        wrong |= not good\n"
         '        print("good" if good else "WRONG", f"{name}: derivatives by gradcheck (float64)")\n',
     ),
     "casadi": Dialect(
-        about="Columns SX, MX or DM: q ({nq}), v and a ({nv}); a Hessian has {nv} times 6 rows.",
+        about="Arguments are columns SX, MX or DM: q ({nq}), v and a ({nv}).\n"
+        "A Hessian has {nv} times 6 rows.",
         imports="import casadi\nfrom casadi import {}",
         helpers=_VECTOR,
-        entering=_demands,
+        first_lines=_demands,
         result=_nested("casadi.vertcat(", ")", "casadi.horzcat({})"),
         values=_ONE_BY_ONE.format(
             "[float(x) for row in casadi.DM(function(*map(casadi.DM, one))).full().tolist() for x in row]"
         ),
     ),
     "sympy": Dialect(
-        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}). Each result is a Matrix. A Hessian has"
-        " {nv} times 6 rows and {nv} columns.",
+        about="Arguments are lists of symbols or numbers: q ({nq}), v and a ({nv}).\n"
+        "Each result is a Matrix. A Hessian has {nv} times 6 rows and {nv} columns.",
         imports="import sympy\nfrom sympy import {}",
-        entering=_lengths(_FOUND),
+        first_lines=_lengths(_FOUND),
         result=_nested("sympy.Matrix([", "])"),
         values=_ONE_BY_ONE.format("[float(x) for x in function(*one)]"),
     ),
     "sympy-exact": Dialect(
-        about="Lists of symbols or numbers: q ({nq}), v and a ({nv}). Each result is a Matrix of exact\n"
-        "numbers. A Hessian has {nv} times 6 rows and {nv} columns.\n"
+        about="Arguments are lists of symbols or numbers: q ({nq}), v and a ({nv}).\n"
+        "Each result is a Matrix of exact numbers. A Hessian has {nv} times 6 rows and {nv} columns.\n"
         "For example: placement(sympy.symbols('q:{nq}'))",
         imports="import types\n\nimport mpmath\nfrom sympy import Matrix, Rational, pi\nfrom sympy import {}",
-        entering=_lengths(_FOUND),
+        first_lines=_lengths(_FOUND),
         result=_nested("Matrix([", "])"),
         # SymPy simplifies large expressions slowly, so the check runs the same code with mpmath's numbers.
         values='numbers = {name: getattr(mpmath, name) for name in ("cos", "sin", "sqrt", "pi")}\n'
@@ -433,26 +436,23 @@ def _imports(code: FrameCode, dialect: Dialect) -> str:
     return "\n".join(lines).strip().format(used)
 
 
-def _exact(x: Number) -> str:
-    from urdfkin.export.exact import literal
-
-    return literal(x)
-
-
 def _function(code: FrameCode, function: Function, dialect: Dialect) -> Iterator[str]:
-    writer = Writer(code, function, _exact if dialect.exact else repr)
+    literal: Callable[[Number], str] = repr
+    if dialect.exact:
+        from urdfkin.export.exact import literal
+    writer = Writer(code, function, literal)
     if dialect.decorator:
         yield dialect.decorator
     yield f"def {function.name}({', '.join(function.inputs)}):"
     size = ", ".join(map(str, function.shape)) + ("," if len(function.shape) == 1 else "")
     numbers = ", ".join(function.quantity.equations)
     yield f'    """({size}), eq. {numbers}; {function.operations} operations."""'
-    yield from (f"    {line}" for line in dialect.entering(writer))
-    for node in writer.given:
-        yield f"    {writer.words[node]} = {dialect.index.format(node.op, node.of[0])}"
+    yield from (f"    {line}" for line in dialect.first_lines(writer))
+    for node in writer.inputs:
+        yield f"    {writer.names[node]} = {dialect.index.format(node.op, node.of[0])}"
     for head, lines in writer.statements():
         yield f"    # {head}"
-        yield from (f"    {word} = {value}" for word, value in lines)
+        yield from (f"    {name} = {value}" for name, value in lines)
     yield from (f"    {line}" for line in dialect.result(writer))
 
 
@@ -496,14 +496,13 @@ _BOTH = '[("float64", 2.0**-52, WITHIN), ("float32", 2.0**-23, SINGLE)]'
 
 
 def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
-    yield "\n# Configurations, true values at fifty digits, and tolerances in eps = 2^-52."
+    yield "\n# Test vectors: inputs, true values at fifty digits, and tolerances in eps = 2^-52."
     if dialect.single:
-        yield "# SINGLE: tolerances in single precision, in eps = 2^-23."
+        yield "# SINGLE contains tolerances in single precision, in eps = 2^-23."
     vectors = code.proof.vectors
-    most = max((function.inputs for function in code.functions), key=len)
     yield "INPUTS = {" + ", ".join(f'"{f.name}": "{f.inputs}"' for f in code.functions) + "}"
     yield "GIVEN = {"
-    for k, letter in enumerate(most):
+    for k, letter in enumerate(code.inputs):
         yield f'    "{letter}": ['
         yield from (f"        {v.inputs[k]!r}," for v in vectors)
         yield "    ],"
@@ -515,10 +514,9 @@ def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
             yield f'    "{function.name}": ['
             for vector in vectors:
                 yield "        ["
-                found = [form.format(x) for x in getattr(vector, of)[function.name]]
-                yield from (
-                    f"            {', '.join(row)}," for row in _rows(found, 2 if what == "TRUE" else 4)
-                )
+                values = [form.format(x) for x in getattr(vector, of)[function.name]]
+                for row in _rows(values, 2 if what == "TRUE" else 4):
+                    yield f"            {', '.join(row)},"
                 yield "        ],"
             yield "    ],"
         yield "}"
@@ -526,11 +524,11 @@ def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
         values=dialect.values,
         kinds=_BOTH if dialect.single else _DOUBLE,
         told=" ({kind})" if dialect.single else "",
-        given=dialect.given,
-        more=f", {dialect.given.partition('=')[0]}" if dialect.given else "",
+        given=dialect.check_parameter,
+        more=f", {dialect.check_parameter.partition('=')[0]}" if dialect.check_parameter else "",
         functions=_all(code),
-        classes=dialect.closing(code),
-        after=dialect.after,
+        classes=dialect.more_code(code),
+        after=dialect.more_checks,
     ).rstrip()
 
 

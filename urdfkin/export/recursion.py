@@ -1,13 +1,11 @@
 """Compute the forward recursion of the textbook's section 7.7 for one path, for any type of number.
 
-At each joint, the recursion translates along the rigid link, applies a constant rotation, and then applies
-the motion of the joint about or along z. Placements and Jacobians are computed in the axes of the world
-frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame, where
-joint axes are (0, 0, 1) and link vectors are constant. If a result is needed in the axes of the world frame,
-it is then rotated joint by joint. To rotate the result needs a third fewer operations than to compute the
-rotation matrix R.
-
-`urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree.
+`urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree. At each joint,
+the recursion translates along the rigid link, applies a constant rotation, and then applies the motion of the
+joint about or along z. Placements and Jacobians are computed in the axes of the world frame, as in the
+textbook. Velocities and accelerations are computed in the axes of each link's frame, where joint axes are
+(0, 0, 1) and link vectors are constant. A result in the axes of the world frame is then rotated joint by
+joint, which needs a third fewer operations than the computation of the rotation matrix R.
 """
 
 from __future__ import annotations
@@ -26,34 +24,34 @@ _Z: Vector = (0, 0, 1)
 
 @dataclass(frozen=True)
 class NumberKind:
-    """A kind of number.
+    """A kind of number, and callbacks of the recursion.
 
     Attributes:
         chapter: A module with the textbook's equations as functions that accept numbers of this kind.
-        entering: The recursion calls this function at each joint, at the final frame, and before the results,
+        begin_step: Function that is called before each joint, before the final frame and before the results,
             with the number of earlier calls.
-        reached: The recursion calls this function after each joint and after the final frame, with the number
-            of earlier calls and the new state.
+        end_step: Function that is called after each joint and after the final frame, with the number of
+            earlier calls and the new state.
     """
 
     chapter: Any
     sine_cosine: Callable[[Number], tuple[Number, Number]]
     root: Callable[[Number], Number]
-    entering: Callable[[int], None] = lambda place: None
-    reached: Callable[[int, State], None] = lambda place, state: None
+    begin_step: Callable[[int], None] = lambda place: None
+    end_step: Callable[[int, State], None] = lambda place, state: None
 
 
 class TreeRecursion(Recursion):
     """The forward recursion along one path.
 
     The inputs are q, v and a; an input that is not needed consists of zeros. With `own`, the motion of each
-    link is computed in the axes of the link's own frame.
+    link is computed in the axes of the link's own frame, otherwise in the axes of the world frame.
 
     Attributes:
-        states: The state after each step.
+        states: The state after each joint.
         end: The state of the frame.
-        turns: Rotation matrices from the axes of each frame to the axes of the previous frame. The first
-            matrix belongs to the frame next to the base.
+        turns: Rotation matrices from the axes of each frame to the axes of the previous frame, starting at
+            the base.
     """
 
     def __init__(
@@ -65,17 +63,17 @@ class TreeRecursion(Recursion):
         self.states: list[State] = []
         state = State()
         for i in range(len(plan.steps)):
-            kind.entering(i)
+            kind.begin_step(i)
             state = self._move(i, self._carry(state, plan.geometry[i].tolist()))
             self.states.append(state)
-            kind.reached(i, state)
-        kind.entering(len(self.states))
+            kind.end_step(i, state)
+        kind.begin_step(len(self.states))
         self.end = self._carry(state, plan.offsets[0].tolist())
-        kind.reached(len(self.states), self.end)
-        kind.entering(len(self.states) + 1)
+        kind.end_step(len(self.states), self.end)
+        kind.begin_step(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Rotate the axes of a link's frame by S, and add the rotation to the list `turns`."""
+        """Rotate the axes of a link's frame by S, and append S to `turns`."""
         self.turns.append(S)
         return super().turned(s, S)
 
@@ -124,11 +122,11 @@ class TreeRecursion(Recursion):
 
 
 def _without_rounding(x: Sequence[float]) -> Vector:
-    """Return a constant vector in which entries below the rounding of the largest entry are replaced by 0.
+    """Return a constant vector, with 0 for entries below the rounding error of the largest entry.
 
-    For example, the cosine of the double nearest to pi/2 is 6e-17. Without this function, the exported code
-    would contain useless products with such numbers. The error bounds of `urdfkin.kinematics.roundings`
-    include the error that this replacement causes. Exact constants have no rounding.
+    For example, the cosine of the double nearest to pi/2 is 6e-17. Products with such numbers would make the
+    exported code longer. The error bounds of `urdfkin.kinematics.roundings` include the error of this
+    replacement. A vector of exact constants is returned unchanged.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]
@@ -202,7 +200,7 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: Each quantity has a function that computes it.
+#: Functions that compute the quantities
 QUANTITIES: dict[str, Callable[[CompiledTree, NumberKind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

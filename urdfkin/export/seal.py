@@ -1,7 +1,7 @@
-"""Write and check the digest in the header of an exported file.
+"""Write and check the seal of an exported file: the digest of the text, in the file's header.
 
-The digest of the whole text is called the seal. It shows whether numbers, test vectors or statements of the
-file were changed. A seal is no signature, so it does not prove who wrote the file.
+The seal shows whether numbers, test vectors or statements of the file were changed. A seal is not a
+signature, so it does not prove who wrote the file.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import hashlib
 import re
 
 _ZEROS = "0" * 64
-#: `seal` replaces the zeros in this line of the header by the digest.
+#: Line of the header in which `seal` replaces the zeros by the digest
 SEAL = f"Seal sha256 {_ZEROS}"
 _LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 
@@ -21,7 +21,7 @@ def seal(text: str) -> str:
 
 
 def is_sealed(text: str) -> bool | None:
-    """Return whether the digest in a file's header is correct for any line ends; None without a digest."""
+    """Return whether the digest in a file's header is correct, whatever the line ends; None without one."""
     text = text.replace("\r\n", "\n")
     if (found := _LINE.search(text)) is None:
         return None

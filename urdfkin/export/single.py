@@ -1,10 +1,9 @@
 """Bound the rounding errors of an exported function in single precision, for each number of its result.
 
 Each operation and each constant of the code has a rounding error, which `urdfkin.kinematics.roundings`
-derives. To first order in eps, the error of a result is a sum over the operations and constants. The error of
-the result caused by one operation is the operation's rounding error times the derivative of the result with
-respect to the operation. The same is true for a constant. The bound is the sum of the absolute values of
-these products. One backward pass over the operations computes the derivatives of all results.
+derives. To first order in eps, the error of a result is the sum of the rounding errors, each multiplied by
+the derivative of the result with respect to the operation or constant. The bound is the sum of the absolute
+values of these products. One backward pass over the operations computes the derivatives of all results.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ from urdfkin.kinematics.roundings import (
 )
 from urdfkin.model.tree import FloatArray
 
-#: One backward pass computes the derivatives of at most this number of results, which limits the memory.
-_TOGETHER = 512
-#: These functions return the derivatives of an operation's value with respect to its operands.
+#: Maximum number of results whose derivatives one backward pass computes; this number limits the memory
+_MOST_RESULTS = 512
+#: Functions that return the derivatives of an operation's value with respect to its operands
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
     "+": lambda value, x, y: (1.0, 1.0),
     "-": lambda value, x, y: (1.0, -1.0),
@@ -44,22 +43,24 @@ def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArra
     """Return the bounds (n, results) on the errors in single precision, in eps = 2^-23.
 
     The inputs q (n, nq), v and a (n, nv) are single-precision numbers. The bounds do not include the rounding
-    errors of the code's constants in double precision. A bound is inf if a number that the code computes is
-    beyond the range of single precision.
+    errors of the code's constants in double precision. A bound is inf if the code computes a number beyond
+    the range of single precision.
     """
     value = function.values(inputs)
-    found = np.zeros((len(inputs[0]), len(function.results)))
-    for first in range(0, found.shape[1], _TOGETHER):
-        part = slice(first, first + _TOGETHER)
-        found[:, part] = _part(function, value, function.results[part], len(found))
-    return found
+    bounds = np.zeros((len(inputs[0]), len(function.results)))
+    for first in range(0, bounds.shape[1], _MOST_RESULTS):
+        part = slice(first, first + _MOST_RESULTS)
+        bounds[:, part] = _bounds(function, value, function.results[part], len(bounds))
+    return bounds
 
 
-def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[Number], n: int) -> FloatArray:
+def _bounds(
+    function: Function, value: dict[Node, FloatArray], results: Sequence[Number], n: int
+) -> FloatArray:
     """Return the bounds (n, len(results)) of some results of a function."""
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
-    def reach(x: Number, slope: FloatArray, columns: slice | int) -> None:
+    def propagate(x: Number, slope: FloatArray, columns: slice | int) -> None:
         """Add `slope` to the derivatives of the results `columns` with respect to x.
 
         For a constant x, add its rounding error, multiplied by `slope`, to the bounds of these results.
@@ -73,19 +74,19 @@ def _part(function: Function, value: dict[Node, FloatArray], results: Sequence[N
             slopes[x][:, columns] = slope
 
     for k, x in enumerate(results):
-        reach(x, np.ones(n), k)
+        propagate(x, np.ones(n), k)
     for node in reversed(function.nodes):
         if (slope := slopes.pop(node, None)) is None:
             continue
-        bound += np.abs(slope) * _own(node, value[node])[:, np.newaxis]
+        bound += np.abs(slope) * _operation(node, value[node])[:, np.newaxis]
         if node.op not in INPUTS:
             of = [value[x] if isinstance(x, Node) else x for x in node.of]
             for x, factor in zip(node.of, _SLOPES[node.op](value[node], *of), strict=True):
-                reach(x, slope * np.reshape(factor, (-1, 1)), slice(None))
+                propagate(x, slope * np.reshape(factor, (-1, 1)), slice(None))
     return np.where(np.isnan(bound), np.inf, bound)
 
 
-def _own(node: Node, x: FloatArray) -> FloatArray:
+def _operation(node: Node, x: FloatArray) -> FloatArray:
     """Return the rounding error (n,) of one operation with exact operands and results x (n,), in eps."""
     size = np.abs(x)
     if node.op in INPUTS:
@@ -98,12 +99,12 @@ def _own(node: Node, x: FloatArray) -> FloatArray:
 
 
 def _constant(x: float) -> float:
-    """Return the error, in eps, of a constant that is rounded to single precision."""
+    """Return the error of a constant that is rounded to single precision, in eps."""
     size = np.abs(x)
     return float(_in_range(np.abs(float(np.float32(x)) - x) / SINGLE_EPS, size))
 
 
 def _in_range(error: FloatArray, size: FloatArray) -> FloatArray:
-    """Add an error for each number that underflows, and return inf for each number that overflows."""
+    """Add the error of each number that underflows; return inf for each number that overflows."""
     small = np.where((size > 0.0) & (size < 2.0 * SINGLE_SMALLEST), SINGLE_SMALLEST / SINGLE_EPS, 0.0)
     return np.where(size <= SINGLE_LARGEST, error + small, np.inf)

@@ -1,6 +1,6 @@
 """Copies of the equations that use different basic operations, for example for NumPy arrays or LaTeX.
 
-The functions of `urdfkin.kinematics.equations` compute with vectors that are triples of numbers. Their copies
+The functions of `urdfkin.kinematics.equations` compute with triples of numbers. Copies of these functions
 compute with NumPy arrays, write LaTeX, or compute bounds. This module does not import NumPy.
 """
 
@@ -12,31 +12,31 @@ from typing import Any
 
 from urdfkin.kinematics import equations
 
-#: All other functions are composed of these basic operations on vectors.
+#: Basic operations on vectors, of which all equations are composed.
 VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 
 def bound(
-    *, made: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
+    *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Return a namespace with a copy of each function of `equations`; the copies use other basic operations.
+    """Return a namespace with a copy of each function of `equations` that uses other basic operations.
 
-    Each copy passes through the decorator `made`. `vectors` are the basic operations by name.
+    The function `decorate` is applied to each copy. `vectors` are the basic operations by name.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
     7.0
     """
-    return SimpleNamespace(**rebound(equations, made=made, others=vectors))
+    return SimpleNamespace(**rebound(equations, decorate=decorate, others=vectors))
 
 
 def rebound(
-    *modules: ModuleType, made: Callable[[Callable[..., Any]], Any], others: Mapping[str, Any]
+    *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], others: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls other copies instead of the original functions, and those of `others` instead of functions or
-    modules of the same name. Each copy passes through the decorator `made`, for example that of a compiler. A
+    A copy calls other copies instead of the original functions. An object of `others` replaces each function
+    or module of the same name. The function `decorate`, for example a compiler, is applied to each copy. A
     module may use functions of the modules that are listed before it.
     """
     copies: dict[str, Any] = {}
@@ -47,5 +47,5 @@ def rebound(
             if isinstance(function, FunctionType) and function.__module__ == module.__name__:
                 copy = FunctionType(function.__code__, names, name, function.__defaults__)
                 copy.__doc__, copy.__module__ = function.__doc__, function.__module__
-                names[name] = copies[name] = others.get(name) or made(copy)
+                names[name] = copies[name] = others.get(name) or decorate(copy)
     return copies

@@ -9,21 +9,30 @@
 | the tool and the last frame | 7.4.8 | 7.115 |
 | the analytical Jacobian | 7.5 | 7.116 to 7.122 |
 
-`p_1`, `v_1` and `a_1` are position, velocity and acceleration of a point as an observer in frame 1 measures
-them, expressed in frame 1. Results are relative to frame 0 and expressed in frame 0. Vectors are (..., 3),
-rotations (..., 3, 3), angles and rates (...), with any leading batch shape. Six-vectors (..., 6) are [linear;
-angular]. Units are metres, radians and seconds. `z` is a joint's unit axis z_{i-1} in frame 0; `turns` is
-True for a rotary joint and False for a prismatic one; `rate` is the joint's velocity.
+| Argument | Shape | Meaning |
+|---|---|---|
+| `p_1`, `v_1`, `a_1` | (..., 3) | position, velocity and acceleration of a point in frame 1 |
+| `z` | (..., 3) | a joint's unit axis z_{i-1}, in frame 0 |
+| `theta`, `rate` | (...) | a joint's angle in rad; the joint's velocity in rad/s or m/s |
+| `turns` | | True for a rotary joint, False for a prismatic joint |
+| `velocity` | (..., 6) | [linear; angular] velocity of a frame, in frame 0 |
+| `R` | (..., 3, 3) | orientation of the end frame in frame 0 |
+| `representation` | | SciPy's name of an Euler sequence, or "quaternion" |
+| `nearest` | | least allowed distance from the singularity of Euler angles, rad |
+
+Results are relative to frame 0 and expressed in frame 0. Arguments and results have any leading batch shape;
+six-vectors are [linear; angular]; units are metres, radians and seconds.
 
 There are two Jacobians; the textbook warns that they are often confused. The velocity Jacobian J_v (..., 6,
 n) gives the linear and the angular velocity. The manipulator (or analytical) Jacobian J gives the time
 derivatives of x = (position, orientation). For three Euler angles in any sequence (the textbook uses "ZYZ"),
-J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), J is (..., 7, n).
+x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J
+is (..., 7, n).
 
 Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
 raise it for an axis that is not of unit length and for a matrix that is not a rotation. An unknown
-`representation` raises UnknownNameError. Near the singularity of Euler angles, Omega cannot be inverted. If
-the distance is `nearest` radians or less, RepresentationSingularityError with this distance is raised.
+`representation` raises UnknownNameError. If Euler angles are within `nearest` of their singularity, where
+Omega cannot be inverted, functions with this argument raise RepresentationSingularityError.
 """
 
 from __future__ import annotations
@@ -72,20 +81,12 @@ class MovingFrame:
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
-    The motion is computed from the motion of frame 1 relative to frame 0 and the motion of frame 2 relative
-    to frame 1.
-
     The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
     angular velocity of frame 2 is w_01 + w_12 (7.49). The angular acceleration is the time derivative of w_01
     + w_12, which contains the term w_01 x w_12.
 
-    Args:
-        outer: Motion of frame 1 relative to frame 0.
-        inner: Motion of frame 2 relative to frame 1, expressed in frame 1. In this argument, for
-            example, `d_0_1` is the vector from O_1 to O_2.
-
-    Returns:
-        Motion of frame 2 relative to frame 0.
+    `outer` is the motion of frame 1 relative to frame 0. `inner` is the motion of frame 2 relative to frame
+    1, in frame 1; for example, `inner.d_0_1` is the vector from O_1 to O_2.
     """
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
@@ -103,7 +104,7 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
     """Return the motion of the last frame relative to frame 0 (7.50, 7.61).
 
-    Entry i is the motion of frame i + 1 relative to frame i. Without frames, the result is no motion.
+    Entry i of `frames` is the motion of frame i + 1 relative to frame i. Without frames, nothing moves.
     """
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
@@ -123,7 +124,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """The terms of a point's velocity, m/s in frame 0 (7.124).
+    """Terms of a point's velocity (7.124), (..., 3), m/s in frame 0.
 
     Attributes:
         rotation: w x p, from the rotation of the frame.
@@ -142,7 +143,7 @@ class VelocityParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """The terms of a point's acceleration, m/s^2 in frame 0 (7.125).
+    """Terms of a point's acceleration (7.125), (..., 3), m/s^2 in frame 0.
 
     Attributes:
         transverse: alpha x p.
@@ -164,36 +165,13 @@ class AccelerationParts:
 
 
 def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
-    """Return p_0 = d_01 + R p_1 (7.58).
-
-    Args:
-        frame: Frame 1 in frame 0.
-        p_1: (..., 3) position of the point in frame 1, metres.
-
-    Returns:
-        (..., 3) position of the point in frame 0, metres.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return p_0 = d_01 + R p_1, the position (..., 3) of a point of frame 1 in frame 0 (7.58)."""
     p_0: FloatArray = eq.point_position(frame.d_0_1, frame.R_0_1, vectors(p_1, "p_1"))
     return p_0
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
-    """Return p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if the point is fixed in frame 1).
-
-    Args:
-        frame: Frame 1 in frame 0.
-        p_1: (..., 3) position of the point in frame 1, metres.
-        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
-
-    Returns:
-        The terms; `.total` is the velocity, (..., 3) m/s in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return the terms of p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; for v_1 = 0, it is 7.59)."""
     p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
     relative = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
@@ -203,21 +181,9 @@ def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -
 def point_acceleration(
     frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO, a_1: ArrayLike = _ZERO
 ) -> AccelerationParts:
-    """Return p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
+    """Return the terms of p-dot-dot_0 = alpha x p + w x (w x p) + 2 w x R v_1 + R a_1 + d-dot-dot (7.125).
 
-    For a point that is fixed in frame 1, the result is equation 7.123.
-
-    Args:
-        frame: Frame 1 in frame 0.
-        p_1: (..., 3) position of the point in frame 1, metres.
-        v_1: (..., 3) velocity of the point in frame 1, m/s; by default 0.
-        a_1: (..., 3) acceleration of the point in frame 1, m/s^2; by default 0.
-
-    Returns:
-        The terms; `.total` is the acceleration, (..., 3) m/s^2 in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
+    For a point that is fixed in frame 1, the sum of the terms is equation 7.123.
     """
     p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
     v_0 = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
@@ -228,23 +194,12 @@ def point_acceleration(
 
 
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
-    """Return the interorigin vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+    """Return the interorigin vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64), in the frame of `z` and `x`.
 
-    Args:
-        d: (...) offset d_i along the joint's axis, metres.
-        z: (..., 3) unit axis z_{i-1}.
-        a: (...) length a_i of the common normal, metres.
-        x: (..., 3) unit vector x_i along the common normal.
+    The offset d_i is along the joint's axis z_{i-1}, and the length a_i along the common normal x_i.
 
-    Returns:
-        (..., 3) metres, in the frame of `z` and `x`.
-
-    Raises:
-        InputError: a wrong shape, or a vector that is not of unit length.
-
-    Example:
-        >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
-        array([0.5, 0. , 0.3])
+    >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
+    array([0.5, 0. , 0.3])
     """
     vector: FloatArray = eq.interorigin_vector(
         scalars(d, "d"), unit_vectors(z, "z"), scalars(a, "a"), unit_vectors(x, "x")
@@ -253,21 +208,7 @@ def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -
 
 
 def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatArray:
-    """Return a joint's angular velocity w_{i-1,i}.
-
-    The angular velocity is theta-dot z for a rotary joint (7.62), and zero for a prismatic joint (7.63).
-
-    Args:
-        z: (..., 3) unit axis z_{i-1} in frame 0.
-        rate: (...) joint velocity, rad/s or m/s.
-        turns: Whether the joint is rotary.
-
-    Returns:
-        (..., 3) rad/s, in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
+    """Return a joint's angular velocity: theta-dot z if rotary (7.62), and 0 if prismatic (7.63)."""
     w: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
     return w if turns else np.zeros_like(w)
 
@@ -275,24 +216,10 @@ def joint_angular_velocity(z: ArrayLike, rate: ArrayLike, turns: bool) -> FloatA
 def interorigin_velocity(
     w_0_i: ArrayLike, d_vector: ArrayLike, z: ArrayLike, rate: ArrayLike, turns: bool
 ) -> FloatArray:
-    """Return the time derivative of an interorigin vector (7.73, 7.74).
+    """Return the time derivative of the interorigin vector d_{i-1,i}, `d_vector` (7.73, 7.74).
 
-    It is d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint.
-
-    If only joint i moves, w_0i is w_{i-1,i}, and the equations are 7.66 and 7.67.
-
-    Args:
-        w_0_i: (..., 3) angular velocity of link i, rad/s, in frame 0.
-        d_vector: (..., 3) interorigin vector d_{i-1,i}, metres, in frame 0.
-        z: (..., 3) unit axis z_{i-1} in frame 0.
-        rate: (...) joint velocity, rad/s or m/s.
-        turns: Whether the joint is rotary.
-
-    Returns:
-        (..., 3) time derivative of the vector in frame 0, m/s.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
+    It is d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
+    angular velocity w_0i of link i is w_{i-1,i}, and the equations are 7.66 and 7.67.
     """
     rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
     sliding: FloatArray = scalars(rate, "rate")[..., np.newaxis] * unit_vectors(z, "z")
@@ -302,18 +229,8 @@ def interorigin_velocity(
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
     """Return a joint's column of the velocity Jacobian (7.80, 7.85).
 
-    It is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint.
-
-    Args:
-        z: (..., 3) unit axis z_{i-1} in frame 0.
-        arm: (..., 3) moment arm d_{i-1,n} from the joint's origin to the endpoint, metres, in frame 0.
-        turns: Whether the joint is rotary.
-
-    Returns:
-        (..., 6) [linear; angular], in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
+    It is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. The moment arm `arm` is the
+    vector d_{i-1,n} (..., 3) from the joint's origin to the endpoint.
     """
     z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
@@ -321,56 +238,26 @@ def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
 
 
 def planar_rotation(theta: ArrayLike) -> FloatArray:
-    """Return the rotation matrix R(theta) of the plane (7.5).
-
-    Args:
-        theta: (...) radians.
-
-    Returns:
-        (..., 2, 2) rotation; the columns are the axes x1 and y1 in frame 0.
-
-    Raises:
-        InputError: an angle is not a finite number.
-    """
+    """Return the rotation R(theta) (..., 2, 2) of the plane (7.5); its columns are x1 and y1 in frame 0."""
     theta = scalars(theta, "theta")
     c, s = np.cos(theta), np.sin(theta)
     return np.stack((np.stack((c, -s), axis=-1), np.stack((s, c), axis=-1)), axis=-2)
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """Return dR/dtheta of the rotation matrix in the plane (7.4, figure 7.2).
+    """Return dR/dtheta (..., 2, 2) of the rotation matrix in the plane (7.4, figure 7.2).
 
     Its columns are y1 and -x1, which are the axes x1 and y1 turned by 90 degrees.
-
-    Args:
-        theta: (...) radians.
-
-    Returns:
-        (..., 2, 2), per radian.
-
-    Raises:
-        InputError: an angle is not a finite number.
     """
     R = planar_rotation(theta)
     return np.stack((R[..., 1], -R[..., 0]), axis=-1)
 
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link that turns about O_0 (7.1, 7.3).
+    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link of length a that turns about O_0 (7.1, 7.3).
 
-    Args:
-        theta: (...) joint angle, radians.
-        length: (...) link length a, metres.
-
-    Returns:
-        (..., 2) metres, in frame 0.
-
-    Raises:
-        InputError: a value is not a finite number.
-
-    Example:
-        >>> link_endpoint(np.pi / 2, 2.0).round(12)
-        array([0., 2.])
+    >>> link_endpoint(np.pi / 2, 2.0).round(12)
+    array([0., 2.])
     """
     return scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
@@ -380,20 +267,8 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 
     The velocity is tangential to the endpoint's circle, and its size is v = r w.
 
-    Args:
-        theta: (...) joint angle, radians.
-        rate: (...) joint velocity, rad/s.
-        length: (...) link length a, metres.
-
-    Returns:
-        (..., 2) m/s, in frame 0.
-
-    Raises:
-        InputError: a value is not a finite number.
-
-    Example:
-        >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
-        array([0., 6.])
+    >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
+    array([0., 6.])
     """
     speed = scalars(length, "length") * scalars(rate, "rate")
     return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
@@ -402,17 +277,8 @@ def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike)
 def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
     """Return the velocity of the tool frame from the velocity of frame n.
 
-    The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}. The angular velocities are equal.
-
-    Args:
-        velocity: (..., 6) velocity of frame n, m/s and rad/s, in frame 0.
-        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
-
-    Returns:
-        (..., 6) velocity of the tool frame, in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
+    The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, where `d_n_tool` (..., 3) is the vector
+    from O_n to O_tool in frame 0. The angular velocities are equal.
     """
     velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -421,23 +287,10 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of frame n from the velocity of the tool frame (7.115).
+    """Return the velocity of frame n from that of the tool frame (7.115): the inverse of `tool_velocity`.
 
-    The linear velocity is d-dot_0n = d-dot_{0,tool} - w x d_{n,tool}. The angular velocities are equal.
-
-    Args:
-        velocity: (..., 6) velocity of the tool frame, m/s and rad/s, in frame 0.
-        d_n_tool: (..., 3) vector from O_n to O_tool, metres, in frame 0.
-
-    Returns:
-        (..., 6) velocity of frame n, in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-
-    Example:
-        >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
-        array([0., 0., 0., 0., 0., 2.])
+    >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
+    array([0., 0., 0., 0., 0., 2.])
     """
     return tool_velocity(velocity, -vectors(d_n_tool, "d_n_tool"))
 
@@ -451,21 +304,10 @@ def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the matrix C in [d-dot; w] = C x-dot (7.119, 7.120).
+    """Return the matrix C in [d-dot; w] = C x-dot (7.119, 7.120): 6 by 6, or 6 by 7 for a quaternion.
 
     C is block diagonal; its blocks are the identity and Omega. For a quaternion, Omega is 4 E^T (3 by 4),
     with the matrix E of 7.57.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-
-    Returns:
-        (..., 6, 6), or (..., 6, 7) for a quaternion.
-
-    Raises:
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(4.0 * quaternion_rate_matrix(quaternion_of(R)).swapaxes(-1, -2))
@@ -473,25 +315,11 @@ def representation_matrix(representation: str, R: ArrayLike) -> FloatArray:
 
 
 def representation_inverse(representation: str, R: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122).
+    """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122): 6 by 6, or 7 by 6 for a quaternion.
 
     For a quaternion, C has several right inverses. The function returns the right inverse for which the
     quaternion's time derivative is perpendicular to the quaternion. The quaternion's length then stays
     constant. This right inverse has no singularity.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-        nearest: Least allowed distance from the representational singularity, radians.
-
-    Returns:
-        (..., 6, 6), or (..., 7, 6) for a quaternion.
-
-    Raises:
-        RepresentationSingularityError: Euler angles of a sample are within `nearest` of the singularity,
-            where Omega cannot be inverted. The error contains the distance.
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))
@@ -501,43 +329,12 @@ def representation_inverse(representation: str, R: ArrayLike, nearest: float = N
 def analytical_jacobian(
     representation: str, R: ArrayLike, J_v: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return J = C^-1 J_v, the manipulator Jacobian (7.122).
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in frame 0.
-        nearest: Least allowed distance from the representational singularity, radians.
-
-    Returns:
-        (..., 6, n), or (..., 7, n) for a quaternion: the derivatives of x with respect to the joint
-            coordinates.
-
-    Raises:
-        RepresentationSingularityError: see `representation_inverse`.
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
+    """Return the manipulator Jacobian J = C^-1 J_v, which contains the derivatives of x (7.122)."""
     return representation_inverse(representation, R, nearest) @ _rows(J_v, "J_v", 6)
 
 
 def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatArray:
-    """Return the velocity Jacobian J_v = C J from the manipulator Jacobian J (7.121).
-
-    Unlike the inverse conversion, this conversion works for every orientation.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the end frame.
-        J: (..., 6, n), or (..., 7, n) for a quaternion; the manipulator Jacobian.
-
-    Returns:
-        (..., 6, n), [linear; angular], in frame 0.
-
-    Raises:
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
+    """Return the velocity Jacobian J_v = C J from the manipulator Jacobian J (7.121)."""
     C = representation_matrix(representation, R)
     return C @ _rows(J, "J", C.shape[-1])
 
@@ -545,41 +342,13 @@ def velocity_jacobian(representation: str, R: ArrayLike, J: ArrayLike) -> FloatA
 def pose_rates(
     representation: str, R: ArrayLike, velocity: ArrayLike, nearest: float = NEAREST
 ) -> FloatArray:
-    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation.
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the frame.
-        velocity: (..., 6) [linear; angular] in frame 0, m/s and rad/s.
-        nearest: Least allowed distance from the representational singularity, radians.
-
-    Returns:
-        (..., 6), or (..., 7) for a quaternion.
-
-    Raises:
-        RepresentationSingularityError: see `representation_inverse`.
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
+    """Return x-dot = C^-1 [d-dot; w], the time derivatives of a frame's position and orientation."""
     column = vectors(velocity, "velocity", 6)[..., np.newaxis]
     return (representation_inverse(representation, R, nearest) @ column)[..., 0]
 
 
 def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """Return [d-dot; w] = C x-dot (7.119).
-
-    Args:
-        representation: SciPy's name of an Euler sequence, or "quaternion".
-        R: (..., 3, 3) orientation of the frame.
-        rates: (..., 6), or (..., 7) for a quaternion; the rates x-dot.
-
-    Returns:
-        (..., 6) [linear; angular] in frame 0, m/s and rad/s.
-
-    Raises:
-        UnknownNameError: the representation does not exist.
-        InputError: a wrong shape, or `R` is not a rotation.
-    """
+    """Return [d-dot; w] = C x-dot (7.119)."""
     C = representation_matrix(representation, R)
     column = vectors(rates, "rates", C.shape[-1])[..., np.newaxis]
     return (C @ column)[..., 0]

@@ -160,7 +160,7 @@ def sliding_acceleration(acc, w, z, v, a):
 
 
 def moving_point_acceleration(acc, alpha, w, p, u, b):
-    """7.125: acceleration of a point p that moves in a rotating frame with velocity u, acceleration b."""
+    """7.125: acceleration of a point p that moves in a rotating frame with velocity u and acceleration b."""
     return plus(plus(point_acceleration(acc, alpha, w, p), coriolis(w, u)), b)
 
 
@@ -168,7 +168,7 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration after a joint with angular velocity o, of rate b in the moving frame."""
+    """7.129: angular acceleration after a joint with angular velocity o; b: rate of o in the moved frame."""
     return plus(plus(alpha, b), cross(w, o))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bound
 
-#: The textbook has these symbols for the parameter names of the functions in `equations`.
+#: The textbook's symbols for parameter names of the functions in `equations`.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -24,7 +24,7 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: Symbols of single functions, by the function's name. They replace those of `_SYMBOLS`.
+#: Symbols that replace those of `_SYMBOLS` in a function, by the function's name.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
@@ -32,9 +32,10 @@ _SYMBOLS_BY_FUNCTION = {
     "turned_along": {"w": "z_j", "linear": "v_i", "angular": r"\omega_i"},
     "end_moved": {"z": "z_i", "linear": "v_j"},
     "motion_product": {
-        f"{name}_{i}": f"{symbol}_{i}"
-        for name, symbol in (("linear", "v"), ("angular", r"\omega"))
-        for i in (1, 2)
+        "linear_1": "v_1",
+        "linear_2": "v_2",
+        "angular_1": r"\omega_1",
+        "angular_2": r"\omega_2",
     },
     "moving_point_velocity": {"u": r"\dot{p}"},
     "moving_point_acceleration": {"u": r"\dot{p}", "b": r"\ddot{p}"},
@@ -44,7 +45,7 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 
 @dataclass(frozen=True)
-class Word:
+class LatexTerm:
     """A LaTeX expression; `kind` is `_SUM`, `_CROSS`, or `_ATOM` for any other expression.
 
     A sum needs brackets inside a product, and a cross product needs brackets inside another cross product.
@@ -56,46 +57,46 @@ class Word:
     def inside(self, kind: int) -> str:
         return f"({self.text})" if self.kind >= kind else self.text
 
-    def __neg__(self) -> Word:
-        return Word(f"-{self.inside(_SUM)}")
+    def __neg__(self) -> LatexTerm:
+        return LatexTerm(f"-{self.inside(_SUM)}")
 
-    def __add__(self, other: Word) -> Word:
-        return Word(f"{self.text} + {other.text}", _SUM)
+    def __add__(self, other: LatexTerm) -> LatexTerm:
+        return LatexTerm(f"{self.text} + {other.text}", _SUM)
 
-    def __sub__(self, other: Word) -> Word:
-        return Word(f"{self.text} - {other.inside(_SUM)}", _SUM)
+    def __sub__(self, other: LatexTerm) -> LatexTerm:
+        return LatexTerm(f"{self.text} - {other.inside(_SUM)}", _SUM)
 
-    def __rsub__(self, other: int) -> Word:
-        return Word(str(other)) - self
+    def __rsub__(self, other: int) -> LatexTerm:
+        return LatexTerm(str(other)) - self
 
-    def __mul__(self, other: Word) -> Word:
-        return Word(f"{self.inside(_SUM)} {other.inside(_SUM)}")
+    def __mul__(self, other: LatexTerm) -> LatexTerm:
+        return LatexTerm(f"{self.inside(_SUM)} {other.inside(_SUM)}")
 
-    def __rmul__(self, other: int) -> Word:
-        return Word(f"{other} {self.inside(_SUM)}")
-
-
-def _times(c: Word | int, x: Word) -> Word:
-    return Word(f"{c if isinstance(c, int) else c.inside(_CROSS)} \\, {x.inside(_SUM)}", x.kind)
+    def __rmul__(self, other: int) -> LatexTerm:
+        return LatexTerm(f"{other} {self.inside(_SUM)}")
 
 
-def _cross(x: Word, y: Word) -> Word:
-    return Word(f"{x.inside(_CROSS)} \\times {y.inside(_CROSS)}", _CROSS)
+def _times(c: LatexTerm | int, x: LatexTerm) -> LatexTerm:
+    return LatexTerm(f"{c if isinstance(c, int) else c.inside(_CROSS)} \\, {x.inside(_SUM)}", x.kind)
 
 
-def _rotate(R: Word, x: Word) -> Word:
-    return Word(f"{R.inside(_CROSS)} \\, {x.inside(_CROSS)}")
+def _cross(x: LatexTerm, y: LatexTerm) -> LatexTerm:
+    return LatexTerm(f"{x.inside(_CROSS)} \\times {y.inside(_CROSS)}", _CROSS)
 
 
-_words = bound(
+def _rotate(R: LatexTerm, x: LatexTerm) -> LatexTerm:
+    return LatexTerm(f"{R.inside(_CROSS)} \\, {x.inside(_CROSS)}")
+
+
+_latex_equations = bound(
     plus=lambda x, y: x + y,
     minus=lambda x, y: x - y,
     times=_times,
     cross=_cross,
     rotate=_rotate,
     product=_rotate,
-    dot=lambda x, y: Word(f"{x.inside(_CROSS)} \\cdot {y.inside(_CROSS)}"),
-    transposed=lambda R: Word(f"{R.inside(_CROSS)}^T"),
+    dot=lambda x, y: LatexTerm(f"{x.inside(_CROSS)} \\cdot {y.inside(_CROSS)}"),
+    transposed=lambda R: LatexTerm(f"{R.inside(_CROSS)}^T"),
 )
 
 
@@ -107,12 +108,13 @@ def latex(name: str) -> str:
     """
     parameters = inspect.signature(getattr(equations, name)).parameters
     symbols = _SYMBOLS | _SYMBOLS_BY_FUNCTION.get(name, {})
-    return _latex_of(getattr(_words, name)(*(Word(symbols.get(word, word)) for word in parameters)))
+    terms = (LatexTerm(symbols.get(parameter, parameter)) for parameter in parameters)
+    return _latex_of(getattr(_latex_equations, name)(*terms))
 
 
 def _latex_of(value: Any) -> str:
-    """Return the LaTeX text of a `Word`, or of a column or a matrix that consists of `Word` objects."""
-    if isinstance(value, Word):
+    """Return the LaTeX text of a term, or of a column or a matrix of terms."""
+    if isinstance(value, LatexTerm):
         return value.text
     rows = [" & ".join(map(_latex_of, row)) if isinstance(row, tuple) else _latex_of(row) for row in value]
     return r"\begin{bmatrix} " + r" \\ ".join(rows) + r" \end{bmatrix}"

@@ -1,9 +1,8 @@
 """Compute upper bounds on the lengths of a link's position, velocities and accelerations.
 
-The functions compute the bounds of a link from the bounds of its parent link. A state contains five numbers
-for a point of a link: p for the position, w and vel for the angular and the linear velocity, and alpha and
-acc for the angular and the linear acceleration. Each number is an upper bound on the sum of the lengths of
-all terms of the quantity.
+Each function computes the bounds of a link from the bounds of the parent link. The bounds of a link's point
+are (p, w, vel, alpha, acc): position, angular and linear velocity, angular and linear acceleration. A bound
+is at least the sum of the lengths of all terms of the quantity.
 
 NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) give the same bits.
 """
@@ -11,7 +10,7 @@ NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) 
 from urdfkin.kinematics.number_kinds import Length
 from urdfkin.kinematics.number_kinds import length_equations as eq
 
-#: A state is the five bounds (p, w, vel, alpha, acc).
+#: The five bounds (p, w, vel, alpha, acc).
 State = tuple[Length, ...]
 _Z = 1.0  #: Length of a joint's axis.
 
@@ -19,30 +18,25 @@ _Z = 1.0  #: Length of a joint's axis.
 def carried(state: State, d: Length) -> State:
     """Return the bounds for the link's point at the distance d (7.58, 7.128, 7.130)."""
     p, w, vel, alpha, acc = state
-    return (
-        eq.point_position(p, None, d),
-        w,
-        eq.point_velocity(vel, w, d),
-        alpha,
-        eq.point_acceleration(acc, alpha, w, d),
-    )
+    p, vel = eq.point_position(p, None, d), eq.point_velocity(vel, w, d)
+    return p, w, vel, alpha, eq.point_acceleration(acc, alpha, w, d)
 
 
 def turned(state: State, d: Length, o: Length, o_rate: Length) -> State:
-    """Return the state after a revolute joint with offset length d and joint velocity o (7.127, 7.129)."""
+    """Return the bounds after a revolute joint with offset length d and joint velocity o (7.127, 7.129)."""
     p, w, vel, alpha, acc = carried(state, d)
     w = eq.angular_velocity(w, _Z, o)
     return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc
 
 
 def slid(state: State, d: Length, u: Length, u_rate: Length) -> State:
-    """Return the state after a prismatic joint; d includes its displacement (7.128, 7.130)."""
+    """Return the bounds after a prismatic joint; d includes the joint's displacement (7.128, 7.130)."""
     p, w, vel, alpha, acc = carried(state, d)
     return p, w, eq.sliding_velocity(vel, _Z, u), alpha, eq.sliding_acceleration(acc, w, _Z, u, u_rate)
 
 
 def freed(state: State, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length) -> State:
-    """Return the state after a planar or floating joint; d includes its displacement."""
+    """Return the bounds after a planar or floating joint; d includes the joint's displacement."""
     p, w, vel, alpha, acc = carried(state, d)
     alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
     acc = eq.free_acceleration(acc, w, o, u, u_rate)

@@ -9,10 +9,9 @@ sum, a cross product becomes the product of two lengths, and a rotation changes 
 as large as every term, every partial sum and the result. Rounding errors are proportional to the scale.
 Rounding errors are not proportional to the result, because the result is small where large terms cancel.
 
-A scale that is not zero is at least `SMALLEST`, the smallest normal number. There are two reasons. First, a
-product smaller than `SMALLEST` has an error of half the smallest subnormal number. A product that is equal to
-`SMALLEST` has the same error. Second, a product of two small numbers may underflow to zero, and a later
-operation may multiply it by a large number.
+A scale that is not zero is at least `SMALLEST`, the smallest normal number, for two reasons. First, every
+product up to `SMALLEST` has an error of half the smallest subnormal number. Second, a product of two small
+numbers may underflow to zero, and a later operation may multiply the lost product by a large number.
 """
 
 from __future__ import annotations
@@ -21,9 +20,9 @@ from operator import add
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.roundings import SMALLEST
 
 array_equations = bound(
@@ -37,11 +36,7 @@ array_equations = bound(
     product=np.matmul,
 )
 
-
-FloatArray = NDArray[np.float64]
-
-
-#: A length is an array with a number for each configuration, or a float for a single configuration.
+#: Length of a vector: an array with a number for each configuration, or a float for a single configuration.
 Length = Any
 
 
@@ -60,7 +55,7 @@ def product(x: Length, y: Length) -> Length:
 
 
 def counted(x: FloatArray) -> FloatArray:
-    """Return the absolute values |x|; a value that is not zero becomes at least `SMALLEST`.
+    """Return the absolute values |x|; every value that is not zero is raised to at least `SMALLEST`.
 
     >>> counted(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST, 2.0]
     True
@@ -70,12 +65,10 @@ def counted(x: FloatArray) -> FloatArray:
 
 def norm(x: FloatArray) -> FloatArray:
     """Return the lengths (...) of vectors (..., n). A length is 0 or at least `SMALLEST`."""
-    # The squares could underflow or overflow; hypot does not.
-    return counted(np.hypot.reduce(x, axis=-1))
+    return counted(np.hypot.reduce(x, axis=-1))  # Squares could underflow or overflow; hypot does not.
 
 
-#: The equations with lengths: a vector is replaced by its length, and a number by its absolute value.
-#: Each length is a Python number or an array; arrays broadcast. A unit vector has length 1.
+#: The equations with the lengths of vectors and the absolute values of numbers; arrays broadcast.
 length_equations = bound(
     plus=add,
     minus=add,

@@ -10,34 +10,37 @@
 | `quaternion_of`, `quaternion_rates` and others: unit quaternions | 7.2.5: 7.57 |
 | `axis_aligning` | 7.4 |
 
-Arguments and results have any leading batch shape: a vector is (..., 3), a matrix (..., 3, 3), a quaternion
-(..., 4), and an angle or a rate (...). Units are metres, radians and seconds. `R_0_1` is the orientation of
-frame 1 in frame 0, and `w_0_1` is the angular velocity of frame 1 relative to frame 0, expressed in frame 0.
-Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
-raise it for a matrix that is not a rotation, and for an axis or a quaternion whose length is not 1.
+| Argument | Shape | Meaning |
+|---|---|---|
+| `R`, `R_0_1` | (..., 3, 3) | orientation of frame 1 in frame 0 |
+| `w`, `w_0_1` | (..., 3) | angular velocity of frame 1 relative to frame 0, rad/s, in frame 0 |
+| `axis`, `angle`, `rate` | (..., 3), (...), (...) | unit axis k, angle phi in rad, phi-dot in rad/s |
+| `rotation_vector` | (..., 3) | unit axis times the angle, rad |
+| `quat`, `rates` of a quaternion | (..., 4) | orientation of a body in frame 0, scalar last; 1/s |
+| `angles`, `rates` of Euler angles | (..., 3) | rad and rad/s, in the order of the sequence's name |
+| `name` | | Euler sequence with SciPy's name |
+| `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-A user's matrix often has only a few digits, so its columns are only approximately orthogonal. There are
-several ways to convert such a matrix to a rotation: over a quaternion, over Euler angles, or by Gram-Schmidt
-on its columns. The results differ in the last digit of the matrix. `nearest_rotation` and `polar_factor`
-return the rotation that is nearest to the matrix in the Frobenius norm. This rotation is unique: it is the
-orthogonal factor U of the polar decomposition M = U H.
+The dots are a batch shape: arrays of any leading shape are accepted, and results have the same leading shape.
+Functions that take an `ArrayLike` raise InputError for a wrong shape, for a value that is not finite, and for
+a matrix that is not a rotation. An axis or a quaternion whose length is not 1 raises InputError too.
 
-The textbook's joint i turns about the axis z_{i-1} of a frame. A URDF joint turns about any axis of its
-frame. `axis_aligning` returns the rotation between the two frames.
-
-A *rotation vector* is the unit axis times the angle.
+A user's matrix often has only a few digits, so its columns are only approximately orthogonal. A conversion to
+a quaternion, a conversion to Euler angles, and Gram-Schmidt on the columns give rotations that differ in the
+last digit of the matrix. `nearest_rotation` and `polar_factor` return the rotation that is nearest to the
+matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
+decomposition M = U H.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
-quaternion and its negative are the same rotation. The functions for quaternion rates have the argument
-`frame`. The angular velocity is expressed in the fixed frame 0, as in the textbook (`frame="fixed"`), or in
-the body's own frame (`frame="body"`). Quaternion rates have no singularity. `integrate_orientation`
-integrates the rates of a quaternion and normalises the quaternion after each step. The module does not
-integrate the angular velocity itself, because that integral is not an orientation (example 7.3).
+quaternion and its negative are the same rotation. Functions with the argument `frame` express the angular
+velocity in the fixed frame 0, as in the textbook (`frame="fixed"`), or in the body's own frame
+(`frame="body"`). Quaternion rates have no singularity. `integrate_orientation` integrates quaternion rates,
+because the integral of the angular velocity is not an orientation (example 7.3).
 
-Euler angles have 24 sequences, with SciPy's names: three letters, in the order of the angles. Capital letters
-are axes that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is
-the URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. The functions for Euler angles
-express angular velocities in the fixed frame 0.
+Euler angles have 24 sequences. A name has three letters, in the order of the angles. Capital letters are axes
+that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the
+URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. The functions for Euler angles express
+angular velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -53,26 +56,17 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
 from urdfkin.errors.validators import as_str
+from urdfkin.kinematics import equations
 from urdfkin.kinematics.inputs import FloatArray, matrices, rotations, scalars, unit_vectors, vectors
 
 
 def skew(w: ArrayLike) -> FloatArray:
-    """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16).
+    """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16), for any vector w.
 
-    Args:
-        w: (..., 3), any unit, any frame.
-
-    Returns:
-        (..., 3, 3), in the unit and frame of `w`.
-
-    Raises:
-        InputError: `w` is not (..., 3) or not finite.
-
-    Example:
-        >>> skew([0.0, 0.0, 1.0]) + 0.0
-        array([[ 0., -1.,  0.],
-               [ 1.,  0.,  0.],
-               [ 0.,  0.,  0.]])
+    >>> skew([0.0, 0.0, 1.0]) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  0.]])
     """
     w = vectors(w, "w")
     S = np.zeros((*w.shape, 3))
@@ -82,24 +76,14 @@ def skew(w: ArrayLike) -> FloatArray:
 
 
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the vector w of a skew-symmetric matrix S = S(w), the inverse of `skew`.
+    """Return the vector w of a skew-symmetric matrix S(w), the inverse of `skew` (7.26, 7.37).
 
-    A computed S has a small symmetric part, caused by rounding. The function removes this part: each
-    component of w is the mean of two entries, S_ij and -S_ji.
+    A computed S has a small symmetric part, caused by rounding. Each component of w is the mean of two
+    entries, S_ij and -S_ji, so the symmetric part has no effect. If an entry of the symmetric part exceeds
+    `tolerance` times the largest entry of S, InputError is raised.
 
-    Args:
-        S: (..., 3, 3).
-        tolerance: Largest allowed entry of the symmetric part, relative to the largest entry of S.
-
-    Returns:
-        (..., 3), in the unit and frame of `S`.
-
-    Raises:
-        InputError: `S` is not (..., 3, 3), not finite, or not skew-symmetric (7.26, 7.37).
-
-    Example:
-        >>> unskew(skew([1.0, 2.0, 3.0]))
-        array([1., 2., 3.])
+    >>> unskew(skew([1.0, 2.0, 3.0]))
+    array([1., 2., 3.])
     """
     S = matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -113,31 +97,20 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
-    """Return R S(w) R^T = S(R w), a skew-symmetric matrix expressed in another frame (7.46).
-
-    Args:
-        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        S_1: (..., 3, 3) skew-symmetric matrix of a vector in frame 1.
-
-    Returns:
-        (..., 3, 3) skew-symmetric matrix of the same vector in frame 0.
-
-    Raises:
-        InputError: a wrong shape, or `R_0_1` is not a rotation.
-    """
+    """Return R S(w) R^T = S(R w), the skew-symmetric matrix of a vector w of frame 1 in frame 0 (7.46)."""
     R_0_1 = rotations(R_0_1, "R_0_1")
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: A matrix stays unchanged if each entry differs from that of the nearest rotation by this number at most.
+#: Largest difference (per entry) from the nearest rotation at which a matrix is used unchanged.
 ROUNDED = 1e-15
 
 
 def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
     """Return the rotation that is nearest to a matrix M, up to rounding.
 
-    M is a rotation whose entries are rounded to nine decimals. The method is one Newton step (Bjorck and
-    Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is 3e-9 at
+    The entries of M are those of a rotation, rounded to nine decimals. The method is one Newton step (Bjorck
+    and Bowie): M - M (M^T M - I)/2. With M = U (I + E) the result is U (I - 3/2 E^2). The norm |E| is 3e-9 at
     most. Therefore, the error of the result is 1.4e-17 at most, which is an eighth of a rounding error.
     """
     M = rotations(M, name)
@@ -146,9 +119,9 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a 3 by 3 matrix whose errors may exceed those of `nearest_rotation`.
+    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant.
 
-    The matrix, for example one that is printed with few digits, has a positive determinant.
+    Unlike `nearest_rotation`, it accepts errors of any size, as in a matrix with few digits.
 
     >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -178,84 +151,45 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
     first = (1.0 + sign * x * x * scale, sign * x * y * scale, -sign * x)
     second = (x * y * scale, sign + y * y * scale, -y)
     columns = [np.stack(column, axis=-1) for column in (first, second)]
-    # Adding zero turns -0 into 0.
-    return np.stack([*columns, axis], axis=-1) + 0.0
+    return np.stack([*columns, axis], axis=-1) + 0.0  # Adding 0 turns -0 into 0.
 
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
-    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42).
-
-    Args:
-        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        w_0_1: (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
-
-    Returns:
-        (..., 3, 3) time derivative of `R_0_1`, 1/s.
-
-    Raises:
-        InputError: a wrong shape, or `R_0_1` is not a rotation.
-    """
+    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42), (..., 3, 3), 1/s."""
     return skew(vectors(w_0_1, "w_0_1")) @ rotations(R_0_1, "R_0_1")
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the angular velocity w, for which S(w) = R-dot R^T (7.38).
+    """Return the angular velocity w with S(w) = R-dot R^T (7.38); equations 7.35 to 7.37 show that w exists.
 
-    Equations 7.35 to 7.37 show that such a w exists.
+    `R_rate` (..., 3, 3) is the time derivative of `R_0_1`, 1/s; `tolerance` is that of `unskew`.
 
-    Args:
-        R_0_1: (..., 3, 3) orientation of frame 1 in frame 0.
-        R_rate: (..., 3, 3) time derivative of `R_0_1`, 1/s.
-        tolerance: Largest allowed entry of the symmetric part of R-dot R^T, relative to the largest entry of
-            R-dot R^T.
-
-    Returns:
-        (..., 3) angular velocity of frame 1, rad/s, expressed in frame 0.
-
-    Raises:
-        InputError: a wrong shape, `R_0_1` is not a rotation, or `R_rate` is not the rate of a rotation.
-
-    Example:
-        >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-        >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
-        array([1., 2., 3.])
+    >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
+    array([1., 2., 3.])
     """
     R_0_1 = rotations(R_0_1, "R_0_1")
     return unskew(matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
-    """Return the time derivative w x p of a vector p that is fixed in a turning frame (7.39 to 7.41).
+    """Return the time derivative w x p in frame 0 of a vector p that is fixed in frame 1 (7.39 to 7.41).
 
     Args:
-        w_0_1: (..., 3) angular velocity of the frame, rad/s, expressed in frame 0.
-        p_0: (..., 3) vector, metres, expressed in frame 0.
-
-    Returns:
-        (..., 3) time derivative of the vector in frame 0, m/s.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
+        w_0_1: (..., 3) angular velocity of frame 1.
+        p_0: (..., 3) the vector p, expressed in frame 0.
     """
     return np.cross(vectors(w_0_1, "w_0_1"), vectors(p_0, "p_0"))
 
 
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
-    """Return the angular velocity w_0n of the last frame (7.43 to 7.50).
+    """Return the angular velocity (..., 3) of frame n relative to frame 0, in frame 0 (7.43 to 7.50).
 
-    The result is the sum of the angular velocities of each frame relative to the previous frame, all
-    expressed in frame 0.
+    The result is the sum of the angular velocities of each frame relative to the previous frame.
 
     Args:
         Rs: (..., n, 3, 3); entry i is the orientation of frame i + 1 in frame i.
-        ws: (..., n, 3); entry i is the angular velocity of frame i + 1 relative to frame i, rad/s, expressed
-            in frame i.
-
-    Returns:
-        (..., 3) angular velocity of frame n relative to frame 0, rad/s, expressed in frame 0.
-
-    Raises:
-        InputError: a wrong shape, different numbers n in `Rs` and `ws`, or a matrix that is not a rotation.
+        ws: (..., n, 3); entry i is the angular velocity of frame i + 1 relative to frame i, in frame i.
     """
     Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
@@ -271,15 +205,12 @@ def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     return total
 
 
-#: A quaternion's norm may deviate from 1 by this number at most.
+#: Largest accepted difference between 1 and the norm of a quaternion.
 NORM_TOLERANCE = 1e-6
 
 
 def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
-    """Return `value` as quaternions that are normalised to unit length, up to rounding.
-
-    A norm that differs from 1 by more than 1e-6 raises InputError.
-    """
+    """Return normalised quaternions; a norm that differs from 1 by more than 1e-6 raises InputError."""
     quat = vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     if (np.abs(norms - 1.0) > NORM_TOLERANCE).any():
@@ -291,24 +222,18 @@ def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
 
 def rotation_of(quat: ArrayLike) -> FloatArray:
     """Return R = (q0^2 - q.q) I + 2 q q^T + 2 q0 S(q), the rotation of a unit quaternion."""
-    x, y, z, w = np.moveaxis(unit_quaternions(quat), -1, 0)
-    rows = (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
-        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
-        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
-    )
+    rows = equations.rotation_of_quaternion(*np.moveaxis(unit_quaternions(quat), -1, 0))
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def quaternion_of(R: ArrayLike) -> FloatArray:
     """Return the unit quaternion with qw >= 0 of a rotation.
 
-    The function uses Shepperd's method: it divides by the component with the largest absolute value, which
-    avoids cancellation.
+    Shepperd's method avoids cancellation: it divides by the component with the largest absolute value.
     """
     R = rotations(R, "R")
-    # The entries of K = 4 q q^T are sums of entries of R (and 1 on the diagonal).
-    # Each row of K is a multiple of q; the row with the largest diagonal entry gives q without cancellation.
+    # The entries of K = 4 q q^T are sums of entries of R (and of 1 on the diagonal).
+    # Each row of K is a multiple of q.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -341,21 +266,11 @@ ExpressedIn = Literal["fixed", "body"]
 
 
 def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the matrix E in (q-dot, q0-dot) = E w (7.57).
+    """Return the matrix E (..., 4, 3) in (q-dot, q0-dot) = E w (7.57).
 
     For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
     changes. The columns of E have length 1/2. The columns are perpendicular to each other and to the
     quaternion, so the quaternion's length is constant.
-
-    Args:
-        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        frame: Frame of `w`: "fixed" or "body".
-
-    Returns:
-        (..., 4, 3), dimensionless.
-
-    Raises:
-        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -367,22 +282,10 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the time derivative of a body's quaternion from the body's angular velocity w (7.57).
+    """Return the time derivative (..., 4) of a body's quaternion from the body's angular velocity w (7.57).
 
-    Args:
-        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        w: (..., 3) angular velocity of the body, rad/s.
-        frame: Frame of `w`: "fixed" means frame 0, "body" means the body's own frame.
-
-    Returns:
-        (..., 4) rates, 1/s, scalar last.
-
-    Raises:
-        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
-
-    Example:
-        >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
-        array([0., 0., 1., 0.])
+    >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
+    array([0., 0., 1., 0.])
     """
     return (quaternion_rate_matrix(quat, frame) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
@@ -392,19 +295,7 @@ def angular_velocity_from_quaternion_rates(
 ) -> FloatArray:
     """Return the angular velocity w = 4 E^T (q-dot, q0-dot), the inverse of 7.57.
 
-    The function ignores the component of the rates along the quaternion, because this component changes only
-    the quaternion's length.
-
-    Args:
-        quat: (..., 4) unit quaternion of the body's orientation in frame 0, scalar last.
-        rates: (..., 4) rates of `quat`, 1/s, scalar last.
-        frame: Frame of the result: "fixed" means frame 0, "body" means the body's own frame.
-
-    Returns:
-        (..., 3) angular velocity of the body, rad/s.
-
-    Raises:
-        InputError: a wrong shape, a quaternion that is not of unit length, or an unknown `frame`.
+    Rates along the quaternion change only the quaternion's length, and E^T maps them to 0.
     """
     E = quaternion_rate_matrix(quat, frame)
     return 4.0 * (E.swapaxes(-1, -2) @ vectors(rates, "rates", 4)[..., np.newaxis])[..., 0]
@@ -415,16 +306,15 @@ def integrate_orientation(
 ) -> FloatArray:
     """Return the quaternions (n, ..., 4) at n `times`, by the fourth-order Runge-Kutta method for 7.57.
 
-    The method makes one step from each time to the next. The times must increase. The exact quaternion has
-    constant length. Rounding and truncation errors change the length, so the quaternion is normalised after
-    each step. If the step is halved, the truncation error is divided by about 16.
+    The method makes one step from each time to the next. The exact quaternion has constant length. Rounding
+    and truncation errors change the length, so the quaternion is normalised after each step. If the step is
+    halved, the truncation error is divided by about 16.
 
     Args:
-        w: Returns the angular velocity (..., 3), rad/s, at a time. This function must be smooth within a
-            step, so add a time to `times` at each jump. For the start and the end of a time step, w(t) is
-            evaluated slightly inside the step.
+        w: Returns the angular velocity (..., 3) at a time. It must be smooth within a step, so add a time to
+            `times` at each jump. At the start and the end of a step, w is evaluated slightly inside the step.
         quat: (..., 4) orientation at the first time.
-        times: (n,) seconds.
+        times: (n,) increasing times, s.
         frame: Frame of the angular velocity.
     """
     times = scalars(times, "times")
@@ -464,113 +354,47 @@ def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
     """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28).
 
-    Args:
-        axis: (..., 3) unit axis k.
-        angle: (...) angle phi in radians.
-
-    Returns:
-        (..., 3, 3) rotation.
-
-    Raises:
-        InputError: a wrong shape, a value that is not finite, or an axis that is not a unit vector.
-
-    Example:
-        >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
-        array([[ 0., -1.,  0.],
-               [ 1.,  0.,  0.],
-               [ 0.,  0.,  1.]])
+    >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
+    array([[ 0., -1.,  0.],
+           [ 1.,  0.,  0.],
+           [ 0.,  0.,  1.]])
     """
     axis = unit_vectors(axis, "axis")
     angle = scalars(angle, "angle")[..., np.newaxis, np.newaxis]
-    # This is 1 - cos(phi), computed without cancellation at small angles.
+    # The versine is 1 - cos(phi); this formula has no cancellation at small angles.
     versine = 2.0 * np.sin(angle / 2.0) ** 2
     outer = axis[..., :, np.newaxis] * axis[..., np.newaxis, :]
     return np.eye(3) * np.cos(angle) + outer * versine + skew(axis) * np.sin(angle)
 
 
 def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        angle: (...) angle phi in radians.
-
-    Returns:
-        (..., 3, 3), 1/rad.
-
-    Raises:
-        InputError: as for `rotation_about`.
-    """
+    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms)."""
     return skew(axis) @ rotation_about(axis, angle)
 
 
 def angular_velocity_about(axis: ArrayLike, rate: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        rate: (...) phi-dot in rad/s.
-
-    Returns:
-        (..., 3) rad/s, in the frame of `axis`.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
+    """Return the angular velocity w = phi-dot k of a rotation about a fixed axis (7.12, 7.34)."""
     return scalars(rate, "rate")[..., np.newaxis] * unit_vectors(axis, "axis")
 
 
 def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatArray:
-    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about k (7.21).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        rate: (...) phi-dot in rad/s.
-        p: (..., 3) vector from a point on the axis, in metres.
-
-    Returns:
-        (..., 3) velocity in m/s, in the frame of the arguments.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
+    """Return phi-dot k x p, the velocity of the tip of a vector p that turns about the axis k (7.21)."""
     return np.cross(angular_velocity_about(axis, rate), vectors(p, "p"))
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Split a vector p = k (k . p) + r into the part along the axis k and the radial part r (7.18).
-
-    Args:
-        axis: (..., 3) unit axis k.
-        p: (..., 3).
-
-    Returns:
-        Two arrays (..., 3): the component of p along the axis, and the component r perpendicular to the axis.
-
-    Raises:
-        InputError: a wrong shape, or an axis that is not a unit vector.
-    """
+    """Return the component k (k . p) of p along the axis k, and the rest, perpendicular to k (7.18)."""
     axis, p = unit_vectors(axis, "axis"), vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
     return along, p - along
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi.
-
-    Args:
-        rotation_vector: (..., 3), radians.
-
-    Returns:
-        (..., 3, 3) rotation.
-
-    Raises:
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi."""
     vector = vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
-    # np.sinc(x) is sin(pi x) / (pi x), and 1 at 0.
+    # np.sinc(x) is sin(pi x) / (pi x), and 1 for x = 0.
     half = np.sinc(angle / (2.0 * np.pi))
     R: FloatArray = np.eye(3) + np.sinc(angle / np.pi) * S + 0.5 * half**2 * (S @ S)
     return R
@@ -586,7 +410,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = sine < 1e-150  # Here phi is twice this sine; the quotient would lose digits.
+    small = sine < 1e-150  # For a small angle phi, phi = 2 sine; the quotient phi / sine would lose digits.
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 
@@ -604,9 +428,8 @@ def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 _AXES = "xyz"
-#: Neighbouring axes differ in these triples.
 _TRIPLES = [a + b + c for a in _AXES for b in _AXES for c in _AXES if a != b != c]
-#: Twelve sequences have axes that turn with the body, and twelve have fixed axes.
+#: Twelve Euler sequences with axes that turn with the body, and twelve with fixed axes.
 SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 
 
@@ -620,8 +443,8 @@ class Sequence:
         third: Index of the third body-fixed axis; in a proper Euler sequence it is equal to `first`.
         other: The index that is neither the first nor the second.
         sign: +1 if (first, second, other) is right-handed, else -1.
-        fixed: Whether the sequence is given with axes that are fixed in space. Then the angles are in the
-            reverse order of the body-fixed axes.
+        fixed: Whether the name has axes that are fixed in space. Then the angles are in the reverse order of
+            the body-fixed axes.
     """
 
     name: str
@@ -685,10 +508,10 @@ def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
 def euler_of(name: str, R: ArrayLike) -> FloatArray:
     """Return the Euler angles of a rotation. Up to rounding, it is the inverse of `rotation_from_euler`.
 
-    The middle angle is in [0, pi] for a proper sequence and in [-pi/2, pi/2] for the others. At the
-    representational singularity, only the sum or the difference of the first and the third angle is
+    The middle angle is in [0, pi] for a proper sequence such as ZYZ and in [-pi/2, pi/2] for the others. At
+    the representational singularity, only the sum or the difference of the first and the third angle is
     determined. The third angle is then computed from the first angle, so that the product of the three
-    rotations is correct at the singularity too.
+    rotations is correct.
     """
     axes = sequence(name)
     R = rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0, because arctan2(0, -0) would be pi.
@@ -699,11 +522,10 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # The matrix R_first^T R is R_second R_third.
-    # Its row `j` (the second axis) depends only on the third angle.
+    # Row `j` (the second axis) of R_first^T R = R_second R_third depends only on the third angle.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # This row has only two entries that are not 0: those of the second axis and of the axis `rest`.
+    # Two entries of row `j` are not 0: those of the second axis and of the axis `rest`.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()
@@ -722,31 +544,19 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: Nearer than this distance (rad) to the singularity, computed rates lose too many digits.
+#: Least distance (rad) from the singularity at which Euler angle rates still have enough digits.
 NEAREST = 1e-9
 
 
 def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
-    """Return the matrix Omega in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
+    """Return the matrix Omega (..., 3, 3) in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
-    The columns of the matrix are the axes of the three rotations.
+    The columns of Omega are the axes of the three rotations, in frame 0.
 
-    Args:
-        name: SciPy's name of the sequence; the textbook's is "ZYZ".
-        angles: (..., 3) radians, in the order of the name.
-
-    Returns:
-        (..., 3, 3), dimensionless, expressed in frame 0.
-
-    Raises:
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
-
-    Example:
-        >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
-        array([[0., 0., 1.],
-               [0., 1., 0.],
-               [1., 0., 0.]])
+    >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
+    array([[0., 0., 1.],
+           [0., 1., 0.],
+           [1., 0., 0.]])
     """
     axes = sequence(name)
     turns = axes.turning(vectors(angles, "angles"))
@@ -758,20 +568,7 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: ArrayLike) -> FloatArray:
-    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54).
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-        rates: (..., 3) rates of the angles, rad/s.
-
-    Returns:
-        (..., 3) angular velocity, rad/s, expressed in frame 0.
-
-    Raises:
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
-    """
+    """Return the angular velocity w = Omega (phi-dot, theta-dot, psi-dot) (7.54)."""
     product = euler_rate_matrix(name, angles) @ vectors(rates, "rates")[..., np.newaxis]
     return product[..., 0]
 
@@ -779,52 +576,25 @@ def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: Array
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
     """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56).
 
-    They are computed in closed form.
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-        w: (..., 3) angular velocity, rad/s, expressed in frame 0.
-        nearest: Least allowed distance from the singularity, radians.
-
-    Returns:
-        (..., 3) rates, rad/s, in the order of the name.
-
-    Raises:
-        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
+    A distance of `nearest` or less from the singularity raises RepresentationSingularityError.
     """
     return (euler_rate_inverse(name, angles, nearest) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
 def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return the matrix Omega^-1, computed from the geometry of the axes and not by elimination (7.56).
+    """Return the matrix Omega^-1 (..., 3, 3) in closed form, from the geometry of the axes (7.56).
 
     In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
     axis has no component along the second axis. One component of w then gives the third rate, and the other
-    two components give the first and the second rate.
-
-    Args:
-        name: SciPy's name of the sequence.
-        angles: (..., 3) radians, in the order of the name.
-        nearest: Least allowed distance from the singularity, radians.
-
-    Returns:
-        (..., 3, 3).
-
-    Raises:
-        RepresentationSingularityError: the distance of a sample from the singularity is `nearest` or less.
-        UnknownNameError: the sequence does not exist.
-        InputError: a wrong shape, or a value that is not finite.
+    two components give the first and the second rate. A distance of `nearest` or less from the singularity
+    raises RepresentationSingularityError.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
     axes = sequence(name)
     turns = axes.turning(angles)
     cosine, sine = np.cos(turns[..., 1]), np.sin(turns[..., 1])
-    # The frame after the first rotation has the axes `first`, `second` and `other`.
-    # The third axis has the component `along` the axis `first` and the component `across` along `other`.
+    # `along` and `across` are the third axis' components along the axes `first` and `other`.
     if axes.proper:
         along, across = cosine, -axes.sign * sine
     else:

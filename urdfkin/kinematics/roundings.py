@@ -2,8 +2,8 @@
 
 The unit of an error is eps = 2^-52 times the rounded number. Each operation has an error of at most half an
 eps. Errors are counted to first order. A tolerance is `count * eps * scale`. This module defines the counts.
-The scales are computed elsewhere: in `urdfkin.verify.bounds` for the forward recursion, and in the modules of
-`urdfkin.dh` for tables.
+`urdfkin.verify.bounds` computes the scales for the forward recursion, and the modules of `urdfkin.dh` compute
+the scales for tables.
 
 **A joint.** For each joint, the recursion multiplies the rotation so far by the joint's constant rotation and
 by its rotation about its axis. If *all* roundings add up, the error of a component of a rotated vector grows
@@ -16,17 +16,17 @@ for each joint by
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-The worst cases of the parts do not occur together, so the error of the whole joint is smaller than the sum of
-the parts. The errors of urdfkin and of Pinocchio may have opposite signs, so the bound for the difference is
-5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes these counts: it runs the same equations on
-numbers that record each of their roundings.
+The worst cases of the first three rows do not occur together, so the last row is smaller than their sum. The
+errors of urdfkin and of Pinocchio may have opposite signs, so the bound for the difference is 5.7 + 16.8 =
+22.5. `tests/kinematics/test_roundings.py` computes the counts of the table: it runs the equations on numbers
+that record each of their roundings.
 
 The acceleration of a frame, for example, is a sum of terms such as w x (w x d); w, w and d are the three
-factors of this term. Two further operations have rounding errors: the sum of the terms over the joints, and
-the cross products in a term. In each implementation, they add at most 2 eps for all two or three factors of
-the term (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count is for one joint more
-than the path has. This joint covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24
-instead of 22.5, and this difference covers the other sums.
+factors of this term. The sum of the terms over the joints and the cross products in a term have rounding
+errors too. In each implementation, these errors are together at most 2 eps for all two or three factors of a
+term (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count is for one joint more than
+the path has, which covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24 instead of
+22.5, which covers the other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
 axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
@@ -43,17 +43,18 @@ cover this worst case. If each rounding error is uniformly distributed over its 
 of the sum is 3.3. For a single joint, `ROUNDINGS` is seven times this standard deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
-that turns the file's axis to the coordinate axis, and let t be its angle (the tilt). Then |Q R Q^T - R| <= 2
-|Q - 1| <= 2 t. If the joint rotates a vector, or translates it along its axis, the error is at most 2 t. All
-vectors after this joint have the same error. Therefore, for the frames after this joint, the count of each
-factor is larger by 2 t / eps. If the tilt is larger than eps, urdfkin reports the finding URDF514.
+that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
+2 |Q - 1| <= 2 t. If the joint rotates a vector, or translates a vector along the joint's axis, the error is
+at most 2 t. All vectors after this joint have the same error. Therefore, for the frames after a joint with
+the tilt t, the count of each factor is larger by 2 t / eps. If a tilt is larger than eps, urdfkin reports the
+finding URDF514.
 
 **An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. An export also omits
 small constants. A number of a constant rotation is small if it is less than half an eps of the largest number
 in its row. A component of an offset is small if it is less than half an eps of the largest component. Each
 omission causes an error of half an eps, but the rounding errors of one product and one sum disappear. The
-compiler decides whether products and sums are fused. The sine and cosine are those of a library. In batches
-in C, the sine and cosine are polynomials with an error of one eps. Their angle is reduced in three parts.
+compiler decides whether products and sums are fused. An export uses the sine and cosine of a library. Only
+batches in C use polynomials with an error of one eps; three subtractions reduce the polynomials' angle.
 
 | Roundings of the polynomials, with r the reduced angle | |
 |---|---|
@@ -73,17 +74,17 @@ The counts of an export's joint are
 | all of an export's joint | 6.5 | 7.2 |
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
-offset's length. If a component is omitted, its products in a matrix row or in a cross product are omitted
+offset's length. The products with an omitted component, in a matrix row or in a cross product, are omitted
 too. These products would have an error of 1.5, which is larger. Without fused multiply-adds, an export and
 Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the errors of the sums over the joints.
 `ROUNDINGS` is 24.0 and does not cover these sums. The standard deviation is the same as for urdfkin. In a
 comparison of an export with true values (test vectors), the error is at most 7.2, which is within
 `ROUNDINGS`.
 
-**An export in single precision** has a bound of its own for each number of a test vector. The unit is eps =
-2^-23. `urdfkin.export.single` multiplies the error of each operation by the derivative of the result with
-respect to the value of this operation. It does the same for each constant. The bound is the sum of the
-absolute values of all these products. The error of one operation is
+**An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
+2^-23. For each operation and each constant, `urdfkin.export.single` multiplies the error by the derivative of
+the result with respect to this value. The bound is the sum of the absolute values of all these products. The
+error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -95,9 +96,9 @@ absolute values of all these products. The error of one operation is
 
 A change of sign has no error. A test vector contains its inputs as single-precision numbers, so the inputs
 have no rounding error. A number below the smallest normal number, 2^-126, has an error of 2^-126 at most,
-because GPUs and some compilers replace it by 0. The constants also have the rounding errors of the export in
-double precision. Therefore, the double-precision bound, multiplied by 2^-52 / 2^-23, is added to the
-single-precision bound. An export has no other operations, so there are no other errors.
+because GPUs and some compilers replace such a number by 0. The constants also have the rounding errors of the
+export in double precision. Therefore, the double-precision bound, multiplied by 2^-52 / 2^-23, is added to
+the single-precision bound. An export has no other operations, so there are no other errors.
 
 **MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. For each joint, MuJoCo
 multiplies this quaternion by the quaternion of the constant rotation and by the quaternion of the joint's
@@ -111,17 +112,17 @@ converts it to a matrix. If all roundings add up, the error is
 With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2, which covers the sums over the
 joints too. MuJoCo does not replace the file's axes by coordinate axes.
 
-**A mimic joint** adds no rounding. urdfkin and the oracle compute its angle m q + c from the same doubles m
-and c. Both round twice: after the multiplication and after the addition. IEEE 754 then defines the result to
-the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the
-same order, from the mimicked joint outwards. The errors of sine and cosine are counted above. Sine and cosine
-first subtract multiples of pi/2 from their argument. This subtraction is exact for every angle, also for 1e12
-rad. Therefore a mistake in a mimic joint's angle is always detected.
+**A mimic joint** adds no rounding. urdfkin and the oracle compute a mimic joint's angle m q + c from the same
+doubles m and c. Both round the multiplication and then the addition, so IEEE 754 defines the result to the
+last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the same
+order, from the mimicked joint outwards. The errors of sine and cosine are counted above. The functions sine
+and cosine first subtract multiples of pi/2 from the angle; this subtraction is exact for every angle, also
+for 1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
 
 **A base** with a rotation M adds one joint to the count. A base without a rotation adds no rounding. The
-user's matrix M has nine correct digits. Both implementations replace M by the nearest rotation, each by its
-own method. Therefore, the error does not depend on the distance of M from the nearest rotation. The counts,
-with u = eps/2, are
+user's matrix M has nine correct digits. Each of the two programs replaces M by the nearest rotation, with a
+method of its own. Therefore, the error does not depend on the distance of M from the nearest rotation. The
+counts, with u = eps/2, are
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -147,14 +148,14 @@ satisfy it up to
 | MuJoCo's residual: x - x0, c1 times that, y - y0, two differences | 2.5 |
 | sum | 7.5 |
 
-The tolerance is this sum, multiplied by the size of all these terms and by k + 1. Here k is the number of
-mimic rules from this joint to the joint that has a coordinate of its own.
+The tolerance is this sum, multiplied by the size of all terms in the table and by k + 1. Here k is the number
+of mimic rules from the mimic joint to the joint that has a coordinate of its own.
 
-**Numbers near zero.** A product below the smallest normal number loses bits. Its error is 2^-1075, half the
-smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale that is not zero is
-therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). Therefore, the tolerance
-`count * eps * scale` is larger than this error, even if the product is multiplied by large numbers later. The
-smallest unit is eps times the smallest normal number, 2^-1074.
+**Numbers near zero.** A product below the smallest normal number loses bits. The error of such a product is
+2^-1075, half the smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale
+that is not zero is therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). The
+tolerance `count * eps * scale` is then larger than the error 2^-1075, even if the product is multiplied by
+large numbers later. The smallest unit is eps times the smallest normal number, 2^-1074.
 
 **A row** of a Denavit-Hartenberg table has 8 roundings at most:
 
@@ -174,93 +175,80 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from urdfkin.kinematics.inputs import FloatArray
 
 EPS = sys.float_info.epsilon
-#: Rounding a number to single precision has this relative error.
+#: Relative error of rounding a number to single precision.
 SINGLE = 2.0**-24
 #: The smallest normal number.
 SMALLEST = sys.float_info.min
-#: The smallest unit of rounding: eps times the smallest normal number. It is the smallest subnormal number.
+#: The smallest unit of rounding, which is the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST
 #: Least divisor: `max(x, NOT_ZERO)` avoids a division by 0. Every measured number is larger.
 NOT_ZERO = 1e-300
 
-#: This is the allowed difference (in eps) from Pinocchio; the module docstring derives it.
-#: It applies to each joint and to each factor of a term such as w x (w x d).
+#: Allowed difference (in eps) from Pinocchio, for each joint and each factor of a term such as w x (w x d).
 ROUNDINGS = 24.0
-#: This is the allowed difference (in eps) from MuJoCo; otherwise it is like `ROUNDINGS`.
+#: Allowed difference (in eps) from MuJoCo, for each joint and each factor of a term.
 MUJOCO = 30.0
-#: A mimic rule of an MJCF file may have this error (in eps) between urdfkin's tree and MuJoCo.
+#: Allowed error (in eps) of an MJCF file's mimic rule between urdfkin's tree and MuJoCo.
 MJCF_RULE = 8.0
-#: Each row of a Denavit-Hartenberg table may have this error (in eps).
+#: Rounding errors (in eps) of each row of a Denavit-Hartenberg table.
 ROW = 8.0
 
-# Exports in single precision use these constants (`urdfkin.export.single`); they are derived above.
+# Exports in single precision (`urdfkin.export.single`); the docstring of this module derives the numbers.
 
 SINGLE_EPS = 2.0**-23
-#: The smallest normal number, and the largest number.
+#: The smallest normal number, and the largest number, of single precision.
 SINGLE_SMALLEST, SINGLE_LARGEST = 2.0**-126, (2.0 - SINGLE_EPS) * 2.0**127
-#: The result of each operation has this relative error, in eps.
-SINGLE_OPERATION = {
-    "+": 0.5,
-    "-": 0.5,
-    "*": 0.5,
-    "/": 1.0,
-    "sqrt": 1.0,
-    "neg": 0.0,
-    "sin": 3.5,
-    "cos": 3.5,
-}
-#: A sine or cosine by a polynomial has this absolute error (in eps).
+#: Relative error (in eps) of each operation.
+SINGLE_OPERATION = dict.fromkeys("+-*", 0.5) | {"/": 1.0, "sqrt": 1.0, "neg": 0.0, "sin": 3.5, "cos": 3.5}
+#: Absolute error (in eps) of a sine or cosine that a polynomial computes.
 SINGLE_POLYNOMIAL = 1.0
 
-# These are rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
+# Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Constant poses that two programs read from one file may differ by this number (in eps) for each joint.
-#: If all roundings add up, the difference is 18.9.
-#: This is the sum of the first table in the module docstring, without the rotation about the axis.
+#: Allowed difference (in eps), for each joint, of the constant poses that two programs read from one file.
+#: The worst case is 18.9: the sum of the docstring's first table without the rotation about the axis.
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
-#: The directions of two joint axes have this error (in eps).
-#: Dividing an axis by its length has an error of 0.5; rotating it by Rodrigues' formula has one of 2.0.
+#: Error (in eps) of the directions of two joint axes.
+#: Dividing an axis by its length has an error of 0.5; rotating an axis by Rodrigues' formula has one of 2.0.
 AXES = 5.0
-#: The program that wrote the file causes this error (in eps) for each joint.
+#: Error (in eps), for each joint, that the program that wrote the file causes.
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
-#: This is 5e-15 rad, or 22.5 eps, for an angle up to pi.
-#: The number counts this error twice, for roll and for pitch, because both tilt an axis.
-#: Yaw does not tilt it.
+#: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
+#: Roll and pitch both tilt an axis, so the error 22.5 counts twice; yaw does not tilt the axis.
 WRITTEN = 45.0
-#: A length along an axis has this error, in units of eps times the length of the path.
-#: The dot product has an error of 2.4, and each sum has an error of 0.5 of its own value.
-#: Only a few of these sums are nearly as large as the path's length.
+#: Error of a length along an axis, in units of eps times the length of the path.
+#: A dot product has an error of 2.4, and each sum of lengths has an error of 0.5 of its own value.
+#: Only a few sums of lengths are nearly as large as the path's length.
 SUMMED = 4.0
 
-# Tolerances: a number that differs less than this from a round number is replaced by the round number.
+# Tolerances for rounding: a number within the tolerance of a round number is replaced by the round number.
 
-#: The error (in eps) of an angle up to pi is the sum of three errors, rounded up.
-#: They are 1.2 for a computed multiple of pi/12, and 1.1 for arctan2.
-#: The third is 1.0 for a number in a file (half a unit in the last place).
+#: Error (in eps) of an angle up to pi.
+#: A computed multiple of pi/12 has an error of 1.2, arctan2 has 1.1, and a number in a file has 1.0.
 ANGLE = 4.0
-#: An entry of a rotation matrix has this error (in eps).
+#: Error (in eps) of an entry of a rotation matrix.
 #: The entry is a difference of two products, which has an error of 0.75.
 #: A factor of these products is also a difference of two products, with another error of 0.75.
 ENTRY = 2.0
-#: A length that is rounded to twelve digits has this error, in the unit of `SUMMED`.
+#: Error of a length that is rounded to twelve digits, in the unit of `SUMMED`.
 DIGITS = SUMMED / 2.0
-#: The angle between two rotations has this error (in eps).
-#: One rotation is computed from roll, pitch and yaw, with an error of 3.1.
-#: The other is a product of three rotations.
-#: Its errors are 0.5 for the sines, 0.5 for the cosines, and 1.4 and 1.8 for the two products.
+#: Error (in eps) of the angle between two rotations.
+#: The first rotation is computed from roll, pitch and yaw, with an error of 3.1.
+#: The second rotation is a product of three rotations.
+#: The product's errors are 0.5 for the sines, 0.5 for the cosines, and 1.4 and 1.8 for two multiplications.
 TURN = 8.0
 
-#: A mimic joint's limit, converted to a limit of the mimicked joint, has this error (in eps).
+#: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.
 #: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
 #: The sum 2.0 is doubled, so that a value at the limits is accepted.
-FOLLOWER = 4.0
+MIMIC_LIMIT = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
@@ -278,7 +266,7 @@ def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 def of_rows(rows: int) -> float:
     """Return the number of roundings of a pose that is computed from a table with `rows` rows and a tool.
 
-    The caller must add half an eps for the rounding of the joint values.
+    The rounding of the joint values, half an eps, is not included.
     """
     return ROW * (rows + 1)
 
@@ -286,22 +274,10 @@ def of_rows(rows: int) -> float:
 def of_rows_read_back(rows: int) -> float:
     """Return the number of roundings in a comparison of a table with the URDF that was written from it.
 
-    The pose from the table has `of_rows(rows)`, and so has Pinocchio's pose from the URDF. The conversion to
-    roll, pitch and yaw has twice as many.
+    The pose from the table and Pinocchio's pose from the URDF have `of_rows(rows)` roundings each. The
+    conversion to roll, pitch and yaw has twice as many.
     """
     return 4.0 * of_rows(rows)
-
-
-def of_two_texts(joints: int) -> float:
-    """Return the allowed error (in eps) between the poses of a link in two URDF texts of the same robot.
-
-    The link comes after `joints` joints.
-
-    The parser and the writer round each joint's constant transform and its axis. If a program merges fixed
-    joints before it writes them, it rounds only the product of their constant transforms. The number of
-    roundings is then smaller.
-    """
-    return (CONSTANT + WRITTEN + AXES) * (joints + 1)
 
 
 def of_a_fit(rows: int) -> float:

@@ -55,7 +55,7 @@ class BaseMotion:
             _ = self.batch_shape
         except ValueError:
             shapes = f"{self.placement.shape}, {self.velocity.shape}, {self.acceleration.shape}"
-            raise InputError("the base's batch shapes do not fit together", found=shapes) from None
+            raise InputError("the batch shapes of the base's fields do not broadcast", found=shapes) from None
         if (self.placement[..., 3, :] != [0.0, 0.0, 0.0, 1.0]).any():
             raise InputError("the last row of the base's placement must be 0 0 0 1")
         R = nearest_rotation(self.placement[..., :3, :3], "the rotation of the base's placement")
@@ -77,9 +77,7 @@ class BaseMotion:
         )
 
     def state(self, batch_shape: tuple[int, ...]) -> FloatArray:
-        """Return the base motion as rows [R, p, w, v, alpha, a], (n, 24), for the compiled kernels.
-
-        If the fields have no batch axes, n is 1.
+        """Return rows [R, p, w, v, alpha, a] (n, 24) for the kernels; n is 1 if no field has batch axes.
 
         >>> BaseMotion().state(()).shape
         (1, 24)
@@ -105,7 +103,7 @@ STILL_STATE = frozen(STILL.state(()))
 def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
     """Subtract gravity (3,), m/s^2, from the linear acceleration of base states (1 or n, 24).
 
-    An accelerometer has the same readings on a fixed base under gravity and on the resulting base without it.
+    The readings of an accelerometer do not change if gravity is replaced by an acceleration of the base.
     """
     lifted = state.copy()
     lifted[:, -3:] -= gravity

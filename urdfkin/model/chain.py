@@ -33,7 +33,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: A robot has at least this size (m) in a comparison, also if all its frames coincide.
+#: Least size (m) of a robot in a comparison, even if all its frames coincide.
 LEAST_SIZE = 1e-9
 
 
@@ -42,8 +42,6 @@ class ChainJoint:
     """One moving joint on a path.
 
     Attributes:
-        name: Name in the URDF.
-        kind: Revolute, continuous or prismatic.
         backwards: Whether the path passes the joint from the joint's child link to its parent link.
         T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this
             frame is the joint's axis, reversed if `backwards`. The pose is relative to the previous joint's
@@ -75,8 +73,7 @@ class FrameChain(Displayable):
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
         lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
             an upper bound on the distance from joint k's origin to the next origin, for any rotations.
-        folded: (n + 1,) for each constant A_k: the number of URDF joint poses that were multiplied to obtain
-            it. Poses of fixed joints count too.
+        folded: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed joints.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -258,8 +255,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
             lengths.append(length)
             folded.append(count)
-            # A joint's constant pose comes before its motion.
-            # If the path leads from the joint's child to its parent, the constant pose comes after it.
+            # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0
@@ -278,10 +274,7 @@ def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint,
 
 
 def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the constant poses before and after a joint's motion, in path order.
-
-    Between these two poses, the joint rotates about z or slides along z.
-    """
+    """Return the constant poses before and after a joint's motion about or along z, in path order."""
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
     align = pose(axis_aligning(-joint.axis if backwards else joint.axis))

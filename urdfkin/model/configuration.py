@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, QuestionsSection, warn_caller
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, unit_quaternions
-from urdfkin.kinematics.roundings import EPS, FOLLOWER
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
 from urdfkin.model.tree import (
@@ -40,7 +40,7 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: This number (rad or m) bounds a range and replaces a missing limit.
+#: Largest end of a sampled range (rad or m); it also replaces a missing limit.
 WIDEST = 10.0
 
 
@@ -51,23 +51,24 @@ class NarrowedRange:
     Attributes:
         joint: Name of the mimicked joint.
         own: The range from the limits of the mimicked joint.
-        kept: The part of `own` in which all mimic joints are within their limits; None if there is none.
+        allowed: The part of `own` in which all mimic joints are within their limits; None if there is none.
         by: Names of the mimic joints whose limits make the range smaller.
         unit: "rad" or "m".
     """
 
     joint: str
     own: tuple[float, float]
-    kept: tuple[float, float] | None
+    allowed: tuple[float, float] | None
     by: tuple[str, ...]
     unit: str
 
     def __str__(self) -> str:
         names = ", ".join(self.by)
         own = f"joint {self.joint} ranges over {range_words(self.own)} {self.unit}"
-        if self.kept is None:
+        if self.allowed is None:
             return f"{own}; no value keeps all its mimic joints within their limits ({names})"
-        return f"{own}; its mimic joints keep their limits from {range_words(self.kept)} only ({names})"
+        allowed = range_words(self.allowed)
+        return f"{own}; its mimic joints are within their limits only for values from {allowed} ({names})"
 
 
 def range_words(ends: tuple[float, float]) -> str:
@@ -87,97 +88,95 @@ def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tupl
 
 
 def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
-    """Draw `count` random values in each range (lower, upper), uniformly: an array (count, ranges)."""
+    """Return `count` uniform random values in each range (lower, upper): an array (count, ranges)."""
     lower, upper = np.array(ranges).reshape(-1, 2).T
     return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
 
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the range of each joint with exactly one coordinate, without the limits of its mimic joints."""
-    return {joint.name: _own_range(joint) for joint in tree.joints if joint.nq == 1}
+
+    def own_range(joint: Joint) -> tuple[float, float]:
+        if joint.kind is JointKind.CONTINUOUS:
+            return -math.pi, math.pi
+        if joint.limit is None:
+            return -WIDEST, WIDEST
+        lower, upper = np.clip((joint.limit.lower, joint.limit.upper), -WIDEST, WIDEST).tolist()
+        return min(lower, upper), max(lower, upper)
+
+    return {joint.name: own_range(joint) for joint in tree.joints if joint.nq == 1}
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the ranges of `own_ranges`, narrowed so that the mimic joints are within their limits.
 
-    If no value of a range keeps the mimic joints within their limits, this range is not narrowed.
+    A range in which no value keeps the mimic joints within their limits is not narrowed.
     """
     ranges = own_ranges(tree)
-    narrowed = {one.joint: one.kept for one in narrowed_ranges(tree)}
+    narrowed = {one.joint: one.allowed for one in narrowed_ranges(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
 
 
 def narrowed_ranges(tree: KinematicTree) -> tuple[NarrowedRange, ...]:
     """Return a `NarrowedRange` for each joint whose mimic joints restrict its range further."""
-    followers: dict[str, list[Joint]] = {}
-    for joint in tree.joints:
-        if joint.mimic is not None and joint.limit is not None:
-            followers.setdefault(joint.mimic.leader, []).append(joint)
     ranges = own_ranges(tree)
-    found = (
-        _narrowed(tree.joints[tree.joint_index(name)], ranges[name], joints)
-        for name, joints in followers.items()
+    allowed, by = dict[str, tuple[float, float]](), dict[str, list[str]]()
+    for joint in tree.joints:
+        if (rule := joint.mimic) is None or (limit := joint.limit) is None:
+            continue
+        own = ranges[rule.leader]
+        if allowed_range(rule, limit, *own) != own:
+            by.setdefault(rule.leader, []).append(joint.name)
+        allowed[rule.leader] = allowed_range(rule, limit, *allowed.get(rule.leader, own))
+    return tuple(
+        NarrowedRange(
+            leader,
+            ranges[leader],
+            ends if ends[0] < ends[1] else None,
+            tuple(by[leader]),
+            "rad" if tree.joints[tree.joint_index(leader)].kind.turns else "m",
+        )
+        for leader, ends in allowed.items()
+        if leader in by
     )
-    return tuple(one for one in found if one is not None)
 
 
-def _narrowed(leader: Joint, own: tuple[float, float], joints: list[Joint]) -> NarrowedRange | None:
-    lower, upper = own
-    by = list[str]()
-    for joint in joints:
-        assert joint.mimic is not None
-        assert joint.limit is not None
-        if kept_range(joint.mimic, joint.limit, *own) != own:
-            by.append(joint.name)
-        lower, upper = kept_range(joint.mimic, joint.limit, lower, upper)
-    if not by:
-        return None
-    kept = (lower, upper) if lower < upper else None
-    return NarrowedRange(leader.name, own, kept, tuple(by), "rad" if leader.kind.turns else "m")
-
-
-def kept_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
+def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tuple[float, float]:
     """Return the part of a mimicked joint's range in which a mimic joint is within its limits.
 
     If the mimic joint is outside its limits in the whole range, the lower end is above the upper end.
     """
+    least, most = _rounded_outwards(limit)
 
-    def keeps(leader: float) -> bool:
-        # One unit in the last place beyond a limit is allowed, because a limit in decimal is rounded.
-        own = rule.multiplier * leader + rule.offset
-        return bool(np.nextafter(limit.lower, -np.inf) <= own <= np.nextafter(limit.upper, np.inf))
+    def is_allowed(leader: float) -> bool:
+        return least <= rule.multiplier * leader + rule.offset <= most
 
-    if keeps(lower) and keeps(upper):  # Then every value between the ends is within the limits too.
+    if is_allowed(lower) and is_allowed(upper):  # All values between the ends are allowed too.
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
-    # Make the range smaller at each end, by the rounding error of the mimic joint's value.
-    room = (
-        FOLLOWER * EPS * (max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)) / abs(rule.multiplier)
-    )
-    if not math.isfinite(room):  # The mimic joint has one limit only.
-        room = FOLLOWER * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
+    # The rounding error of the mimic joint's value narrows the range at each end.
+    size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
+    error = MIMIC_LIMIT * EPS * size / abs(rule.multiplier)
+    if not math.isfinite(error):  # The mimic joint has only one limit.
+        error = MIMIC_LIMIT * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
     return (
-        lower if keeps(lower) else max(lower, ends[0] + room),
-        upper if keeps(upper) else min(upper, ends[1] - room),
+        lower if is_allowed(lower) else max(lower, ends[0] + error),
+        upper if is_allowed(upper) else min(upper, ends[1] - error),
     )
 
 
-def _own_range(joint: Joint) -> tuple[float, float]:
-    if joint.kind is JointKind.CONTINUOUS:
-        return -math.pi, math.pi
-    if joint.limit is None:
-        return -WIDEST, WIDEST
-    lower, upper = (min(max(bound, -WIDEST), WIDEST) for bound in (joint.limit.lower, joint.limit.upper))
-    return (lower, upper) if lower <= upper else (upper, lower)
+def _rounded_outwards(limit: Limit) -> tuple[float, float]:
+    """Return the limits, wider by one unit in the last place, because a limit in decimal is rounded."""
+    return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
-#: In `from_pinocchio`, a mimic joint may deviate from its rule by this number (rad or m).
+#: Largest deviation (rad or m) of a mimic joint from its rule in `from_pinocchio`.
 _MIMIC_TOLERANCE = 1e-9
 
 
-#: Each number of a joint with several numbers in q or v has a suffix and a unit.
+#: Suffix and unit of each number of a joint with several numbers in q or v.
 _OF_Q = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
@@ -189,9 +188,9 @@ _OF_RATES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return a name for each number of `q`: the joint's name, with a suffix for one of several numbers.
+    """Return a name for each number of `q`: the joint's name, and a suffix if the joint has several numbers.
 
-    Example: `base.x`, `base.y`, ...; if another joint has such a name, `base:x`, `base:y`, ...
+    Example: `base.x`, `base.y`, ...; if another joint has the name `base.x`, then `base:x`, `base:y`, ...
     """
     return tuple(name for name, _ in _names_and_units(tree, _OF_Q))
 
@@ -225,7 +224,7 @@ def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
     return tuple(unit for _, unit in _names_and_units(tree, _OF_Q if what == "q" else _OF_RATES))
 
 
-def places(tree: KinematicTree, what: str) -> CoordinateLayout:
+def coordinate_layout(tree: KinematicTree, what: str) -> CoordinateLayout:
     """Return the names and units of the numbers of q, v or a, with which values are parsed."""
     is_q = what == "q"
     spans = {
@@ -245,10 +244,10 @@ def places(tree: KinematicTree, what: str) -> CoordinateLayout:
 
 
 def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
-    """Return the names of joints that have no coordinate, each with a hint for the error message."""
+    """Return a hint for the name of each joint that has no coordinate."""
     return {
         joint.name: Hint(
-            f"it mimics {joint.mimic.leader}: give that value, or load with mimic=False (--no-mimic)",
+            f"it mimics {joint.mimic.leader}: give that joint's value, or load with mimic=False (--no-mimic)",
             QuestionsSection.MIMIC_JOINTS,
         )
         if joint.mimic
@@ -262,30 +261,29 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
     """Return a hint for each length that q, v or a has in Pinocchio, but not in urdfkin."""
-    follow = any(joint.mimic for joint in tree.joints)
-    free = Hint(
+    has_mimic_joints = any(joint.mimic for joint in tree.joints)
+    leave_out = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
         QuestionsSection.MIMIC_JOINTS,
     )
-    of_followers = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
-    found: dict[int, Hint] = {}
+    mimic_count = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
+    hints: dict[int, Hint] = {}
     if what == "q":
         for mimic in (False, True):
-            length = _pinocchio_length(tree, mimic=mimic)
-            asks = f", mimic={mimic}" if follow else ""
-            found[length] = Hint(
-                f"Pinocchio's q has that length: robot.from_pinocchio(q{asks}) converts it to urdfkin's",
+            option = f", mimic={mimic}" if has_mimic_joints else ""
+            hints[_pinocchio_length(tree, mimic=mimic)] = Hint(
+                f"Pinocchio's q has that length: robot.from_pinocchio(q{option}) converts it to urdfkin's",
                 QuestionsSection.CONTINUOUS_JOINTS,
             )
-        if follow:
-            both = found.get(tree.nq + of_followers)
-            remedy = f"{both.remedy}; or {free.remedy}" if both else free.remedy
-            found[tree.nq + of_followers] = free._replace(remedy=remedy)
-    elif follow:
-        remedy = f"Pinocchio's {what} has that length: {free.remedy}"
-        found[tree.nv + of_followers] = free._replace(remedy=remedy)
-    found.pop(len(_names(tree, what)), None)
-    return found
+        if has_mimic_joints:
+            convert = hints.get(tree.nq + mimic_count)
+            remedy = f"{convert.remedy}; or {leave_out.remedy}" if convert else leave_out.remedy
+            hints[tree.nq + mimic_count] = leave_out._replace(remedy=remedy)
+    elif has_mimic_joints:
+        remedy = f"Pinocchio's {what} has that length: {leave_out.remedy}"
+        hints[tree.nv + mimic_count] = leave_out._replace(remedy=remedy)
+    hints.pop(len(_names(tree, what)), None)
+    return hints
 
 
 def neutral(tree: KinematicTree) -> FloatArray:
@@ -326,20 +324,18 @@ def locked_values(
         lock: A value for each joint to lock, as a mapping or text. If `joints` is given, the text may begin
             with the name of a pose.
         joints: Names of the joints that stay movable. Every other joint is locked at its value in `lock`, or
-            at 0 if `lock` has no value for it.
+            at 0 if `lock` has no value for the joint.
 
-    Raises:
-        UnknownNameError: there is no such joint or pose.
-        InputError: a joint to lock is fixed, is a mimic joint, has several coordinates or is named twice. A
-            value is not a number, or is outside the joint's limits.
+    An unknown joint or pose raises UnknownNameError. A joint to lock that is fixed, mimics another joint, has
+    several coordinates or is named twice raises InputError, and so does a value outside the joint's limits.
     """
-    layout = places(tree, "q")
+    layout = coordinate_layout(tree, "q")
     values, pose = layout.named(lock, "lock")
     chosen = set(values)
     if joints is not None:
         layout.demand_names(joints, "joints")
         if twice := sorted(chosen.intersection(joints)):
-            raise InputError("a joint to lock is also one of joints", where="lock", found=listed(twice))
+            raise InputError("a joint to lock is also in the list joints", where="lock", found=listed(twice))
         chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
         remedy = "write NAME=VALUE, or name the joints that remain movable in joints (--joints)"
@@ -359,23 +355,23 @@ def locked_values(
     q = layout.read({**dict(rest), **values}, "lock")
     if q.ndim > 1:
         raise InputError("a locked joint needs one value", where="lock", found=f"shape {q.shape[:-1]}")
-    held = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in chosen}
-    for name, x in held.items():
+    locked = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in chosen}
+    for name, x in locked.items():
         if not math.isfinite(x):
             raise NotFiniteError("a locked joint needs a finite value", where=f"lock, {name}", found=str(x))
-    _demand_within_limits(tree, held)
-    return held
+    _demand_within_limits(tree, locked)
+    return locked
 
 
-def _demand_within_limits(tree: KinematicTree, held: Mapping[str, float]) -> None:
-    """Check that locked joints are within their limits.
+def _demand_within_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
+    """Raise InputError if a locked joint, or a joint that mimics it, is outside its limits.
 
-    Joints that mimic a locked joint are checked too, unless they violate their limits at every value.
+    A mimic joint that is outside its limits at every value of the locked joint is not checked.
     """
     q = np.full(tree.nq, np.nan)  # NaN is never outside a limit.
-    for name, value in held.items():
+    for name, value in locked.items():
         q[tree.q_index[tree.joint_index(name)]] = value
-    impossible = {name for one in narrowed_ranges(tree) if one.kept is None for name in one.by}
+    impossible = {name for one in narrowed_ranges(tree) if one.allowed is None for name in one.by}
     for joint, words in _violations(tree, q):
         if joint.name not in impossible:
             name = joint.mimic.leader if joint.mimic else joint.name
@@ -388,7 +384,6 @@ def _demand_within_limits(tree: KinematicTree, held: Mapping[str, float]) -> Non
 
 
 def limits(tree: KinematicTree) -> FloatArray:
-    """Return the lower and upper limits (2, nq) of each coordinate; infinite without a limit."""
     found = np.tile([[-np.inf], [np.inf]], tree.nq)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1 and joint.limit is not None and joint.kind is not JointKind.CONTINUOUS:
@@ -397,7 +392,6 @@ def limits(tree: KinematicTree) -> FloatArray:
 
 
 def velocity_limits(tree: KinematicTree) -> FloatArray:
-    """Return the velocity limits (nv,); infinite without a limit."""
     found = np.full(tree.nv, np.inf)
     for joint, at in zip(tree.joints, tree.v_index, strict=True):
         if joint.nv == 1 and joint.limit is not None:
@@ -422,7 +416,7 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
 def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
     """Return q, v or a as a float64 array whose last axis has nq or nv numbers."""
     if (named := by_name(value, what)) is not None:
-        return places(tree, what).read(named)
+        return coordinate_layout(tree, what).read(named)
     array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
         names = ", ".join(_names(tree, what)) or "none, no joint moves"
@@ -470,12 +464,13 @@ def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
 
 
 def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str]]:
-    """Yield each joint that is outside its limits, with a message."""
-    for joint, values in zip(tree.joints, _own_values(tree, q), strict=True):
-        if values is None or joint.limit is None or not values.size:
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if not joint.kind.has_axis or joint.limit is None or not q.size:
             continue
-        # A limit in decimal is rounded, so one unit in the last place beyond the limit is allowed.
-        lower, upper = np.nextafter(joint.limit.lower, -np.inf), np.nextafter(joint.limit.upper, np.inf)
+        values = q[..., at]
+        if joint.mimic:
+            values = joint.mimic.multiplier * values + joint.mimic.offset
+        lower, upper = _rounded_outwards(joint.limit)
         outside = np.maximum(lower - values, values - upper)
         if outside.max() > 0.0:
             worst = float(values.flat[outside.argmax()])
@@ -486,8 +481,8 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 def _degrees(joint: Joint, value: float) -> str:
     """Return a hint to write the unit `deg` if the value looks like degrees, else an empty text.
 
-    Only a value of a revolute joint beyond `LARGEST_ANGLE` and far outside the limits looks like degrees.
-    After a conversion to radians, it must be within the limits.
+    A value looks like degrees if it is beyond `LARGEST_ANGLE` and far outside the limits of a revolute joint,
+    and within the limits after a conversion to radians.
     """
     if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
         return ""
@@ -497,9 +492,8 @@ def _degrees(joint: Joint, value: float) -> str:
     return f"; degrees? write {value:.6g}deg"
 
 
-#: `warn_of_degrees` looks for degrees in this number of configurations of a batch.
-#: A few are enough, because a whole batch has the same unit.
-_LOOKED_AT = 16
+#: Maximum number of configurations that are checked for degrees; a whole batch has the same unit.
+_MOST_CHECKED = 16
 
 
 def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
@@ -510,9 +504,9 @@ def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
     if tree.least_implausible == math.inf or not q.size:
         return []
     if q.ndim == 2:
-        q = q[:: -(-len(q) // _LOOKED_AT)]
+        q = q[:: -(-len(q) // _MOST_CHECKED)]
     elif q.ndim > 2:
-        most = max(1, int(_LOOKED_AT ** (1.0 / (q.ndim - 1))))
+        most = max(1, int(_MOST_CHECKED ** (1.0 / (q.ndim - 1))))
         q = q[tuple(slice(None, None, -(-size // most)) for size in q.shape[:-1])]
     flat = q.ravel()  # For a short array, argmax is several times faster than max.
     if not max(flat.item(flat.argmax()), -flat.item(flat.argmin())) > tree.least_implausible:
@@ -528,17 +522,6 @@ def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
         warn_caller(f"{tree.name}: {lines[0]}{more}: {advice}; {QuestionsSection.DEGREES}", DegreesWarning)
 
 
-def _own_values(tree: KinematicTree, q: FloatArray) -> Iterator[FloatArray | None]:
-    """Yield the value of each joint that has an axis, and None for each joint without an axis."""
-    for joint, at in zip(tree.joints, tree.q_index, strict=True):
-        if not joint.kind.has_axis:
-            yield None
-        elif joint.mimic:
-            yield joint.mimic.multiplier * q[..., at] + joint.mimic.offset
-        else:
-            yield q[..., at]
-
-
 # -- Pinocchio's layout ------------------------------------------------------------------------------
 
 
@@ -552,7 +535,6 @@ def _pinocchio_length(tree: KinematicTree, *, mimic: bool) -> int:
 
 
 def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
-    """Convert `q` (..., nq) to Pinocchio's layout (..., nq_pinocchio)."""
     blocks = [np.zeros((*q.shape[:-1], 0))]
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not _in_pinocchio(joint, mimic=mimic):
@@ -584,7 +566,7 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
             else None,
             question=QuestionsSection.MIMIC_JOINTS if other else QuestionsSection.CONTINUOUS_JOINTS,
         )
-    own, followers, at = np.zeros((*q.shape[:-1], tree.nq)), [], 0
+    own, mimic_joints, at = np.zeros((*q.shape[:-1], tree.nq)), [], 0
     for i, joint in enumerate(tree.joints):
         if not _in_pinocchio(joint, mimic=mimic):
             continue
@@ -592,10 +574,10 @@ def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -
         values = _angle_back(joint, q[..., at : at + size])
         at += size
         if joint.mimic:
-            followers.append((joint, tree.q_index[i], values))
+            mimic_joints.append((joint, tree.q_index[i], values))
         else:
             own[..., tree.q_index[i] : tree.q_index[i] + joint.kind.nq] = values
-    for joint, leader_at, values in followers:
+    for joint, leader_at, values in mimic_joints:
         _check_mimic_rule(joint, own[..., leader_at], values[..., 0])
     return own
 
@@ -634,7 +616,7 @@ def _check_mimic_rule(joint: Joint, leader: FloatArray, values: FloatArray) -> N
 
 # -- random samples --------------------------------------------------------------------------------------
 
-#: Positions of planar and floating joints lie between -_RANGE and _RANGE, in metres.
+#: Largest sampled coordinate (m) of the position of a planar or floating joint.
 _RANGE = 2.0
 
 
@@ -653,7 +635,7 @@ def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
     Continuous joints take any angle. Planar and floating joints take any orientation and positions within
     +-2 m. A missing limit, or a limit beyond 10 (rad or m), counts as 10. The limits of mimic joints restrict
     the mimicked joint too. If no value is within the limits of the mimicked joint and of the mimic joint,
-    only the limits of the mimicked joint apply. `limit_violations` then names the mimic joint.
+    only the limits of the mimicked joint apply, and `limit_violations` names the mimic joint.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
@@ -680,7 +662,6 @@ def _sample_floating(n: int, rng: np.random.Generator) -> FloatArray:
     return np.hstack((rng.uniform(-_RANGE, _RANGE, (n, 3)), quaternion))
 
 
-#: These functions draw random coordinates of a joint with several coordinates.
 _SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floating}
 
 
@@ -695,7 +676,7 @@ def special(tree: KinematicTree) -> FloatArray:
 
 
 def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
-    """Return random motions of the root link, with poses of a floating joint and velocities as in `draw`."""
+    """Return random motions of the root link: poses of a floating joint, and velocities as in `draw`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
@@ -708,10 +689,10 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
     """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
 
-    The samples cover the full range of each joint, even if a mimic joint then exceeds its own limits. The
-    equations are valid beyond the limits too. Joint velocities and accelerations are standard normal. In
-    every eighth sample these velocities and accelerations are a hundred times larger, so that the quadratic
-    terms of eq. 7.129 and 7.130 dominate.
+    The samples cover the own range of each joint, even if a mimic joint then exceeds its limits, because the
+    equations are valid beyond the limits too. Joint velocities and accelerations are standard normal. Every
+    eighth sample has a hundred times larger velocities and accelerations, so that the quadratic terms of eq.
+    7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:

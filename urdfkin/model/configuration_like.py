@@ -33,7 +33,7 @@ Given = ArrayLike | Mapping[str, ArrayLike]
 
 #: Largest number of names in a message.
 _LISTED = 8
-#: Matches the blank between a number and its unit.
+#: Pattern of the blank between a number and its unit.
 _UNIT_APART = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
 _AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
 
@@ -53,8 +53,7 @@ class CoordinateLayout:
         what: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and their count.
-        poses: Returns the named poses. urdfkin calls the functions `poses`, `otherwise` and `lengths` only if
-            an input needs them.
+        poses: Returns the named poses. An input that needs no pose does not call this function.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
         lengths: Returns a hint for each wrong length that users often pass, such as the length of q in
             Pinocchio.
@@ -80,8 +79,8 @@ class CoordinateLayout:
         ([0.0, 2.0], [[0.5, 1.0], [0.5, 2.0]])
         >>> arm.read("elbow=30deg")
         Traceback (most recent call last):
-        urdfkin.errors.InputError: q: no value for shoulder; give it too, or begin with a pose that it \
-keeps: 'neutral, elbow=...'
+        urdfkin.errors.InputError: q: no value for shoulder; give a value for each, or begin with a pose: \
+'neutral, elbow=...'
         """
         where = where or self.what
         if not isinstance(value, Mapping) and self._is_in_order(cells := _cells(value)):
@@ -127,11 +126,7 @@ keeps: 'neutral, elbow=...'
         return not is_pose and all(_pair(cell)[0] is None for cell in cells)
 
     def demand_names(self, names: Sequence[str], where: str) -> None:
-        """Check that each name belongs to a coordinate or to a joint with several coordinates.
-
-        A name that belongs to nothing raises UnknownNameError; a fixed joint, a mimic joint or a name that is
-        not a string raises InputError.
-        """
+        """Raise an error unless each name belongs to a coordinate or to a joint with several coordinates."""
         for name in names:
             if not isinstance(name, str) or (name not in self.names and name not in self.spans):
                 raise self._not_a_coordinate(name, where)
@@ -144,8 +139,8 @@ keeps: 'neutral, elbow=...'
 
     def _in_order(self, cells: Sequence[str], where: str) -> FloatArray:
         if len(cells) != len(self.names):
-            instead = self.lengths().get(len(cells))
-            raise wrong_count(self.names, len(cells), where, **instead._asdict() if instead else {})
+            hint = self.lengths().get(len(cells))
+            raise wrong_count(self.names, len(cells), where, **hint._asdict() if hint else {})
         rows = zip(cells, self.names, self.units, strict=True)
         return np.array([self._number(text, f"{where}, {name}", unit) for text, name, unit in rows], float)
 
@@ -162,7 +157,12 @@ keeps: 'neutral, elbow=...'
                 found |= self._of_a_joint(name, value, where)
         missing = [name for i, name in enumerate(self.names) if i not in found]
         if missing and rest is None:
-            raise self._missing(missing, values, where)
+            begin = f"'neutral, {next(iter(values), missing[0])}=...'"
+            raise InputError(
+                f"no value for {listed(missing)}",
+                where=where,
+                remedy=f"give a value for each, or begin with a pose: {begin}",
+            )
         shapes = [x.shape for x in found.values()]
         try:
             shape = np.broadcast_shapes(*shapes)
@@ -191,18 +191,9 @@ keeps: 'neutral, elbow=...'
         kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
         if not isinstance(name, str):
             return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
-        if (instead := self.otherwise().get(name)) is not None:
-            return InputError(f"{name!r} is not a {kind}", where=where, **instead._asdict())
+        if (hint := self.otherwise().get(name)) is not None:
+            return InputError(f"{name!r} is not a {kind}", where=where, **hint._asdict())
         return UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
-
-    def _missing(self, missing: Sequence[str], values: Mapping[str, object], where: str) -> InputError:
-        them, keeps = ("it", "it keeps") if len(missing) == 1 else ("them", "they keep")
-        begun = f"'neutral, {next(iter(values), missing[0])}=...'"
-        return InputError(
-            f"no value for {listed(missing)}",
-            where=where,
-            remedy=f"give {them} too, or begin with a pose that {keeps}: {begun}",
-        )
 
     def _number(self, text: str, where: str, unit: str | None) -> float:
         """Return one number in SI units; raise InputError for an invalid number or a wrong unit."""
@@ -218,12 +209,8 @@ keeps: 'neutral, elbow=...'
         if other or found.per not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
             per = ("", ", or these per s", ", or these per s^2")[order]
-            raise InputError(
-                "wrong unit",
-                where=where,
-                found=repr(text.strip()),
-                remedy=f"use {kinds}{per}",
-            )
+            hint = f"use {kinds}{per}"
+            raise InputError("wrong unit", where=where, found=repr(text.strip()), remedy=hint)
         return value
 
 

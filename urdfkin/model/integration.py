@@ -17,15 +17,12 @@ from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation, quaternion_of, rotation_of, skew
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
-#: Below this squared angle (rad^2), (|w| - sin|w|)/|w|^3 is computed as a series, to avoid cancellation.
+#: Largest squared angle (rad^2) for which a series replaces (|w| - sin|w|)/|w|^3, to avoid cancellation.
 _SERIES_BELOW = 0.25
 
 
 def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the configuration (..., nq) that is reached from `q` in one second.
-
-    The joint velocities `v` (..., nv) are constant during this second.
-    """
+    """Return the configuration (..., nq) that `q` reaches in one second at constant velocities `v`."""
     shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
     for joint, at, to in _coordinate_joints(tree):
@@ -47,7 +44,7 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
 def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> FloatArray:
     """Return the joint velocities (..., nv) that lead from `start` to `end` (..., nq) in one second.
 
-    For the angle of a revolute joint without limits, the result is the shorter of the two rotations.
+    The result for the angle of a revolute joint without limits is the shorter of two rotations.
     """
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
@@ -71,51 +68,43 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
 
 
 def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
-    """Return the common batch shape of two arrays; raise InputError if their shapes do not broadcast."""
     try:
         return np.broadcast_shapes(one.shape[:-1], other.shape[:-1])
     except ValueError:
         found = f"{one.shape[:-1]} and {other.shape[:-1]}"
-        raise InputError("the batch shapes do not fit together", found=found) from None
+        raise InputError("the batch shapes of the arguments do not broadcast", found=found) from None
 
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
-    """Return the joints with their own coordinates; each has the index of its first number in q and in v."""
+    """Return each joint with its own coordinates, and the indices of its first numbers in q and in v."""
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
     return [(joint, at, to) for joint, at, to in rows if joint.nv]
 
 
 def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
+    p, orientation = _screw(joint, own)
+    return p, (rotation_of if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
+
+
+def _screw(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the linear and the angular part of a planar or floating joint's coordinates or velocity.
+
+    The angular part is a vector (..., 3), or the quaternion (..., 4) in a floating joint's coordinates.
+    """
     if joint.kind is JointKind.FLOATING:
-        return own[..., :3], rotation_of(own[..., 3:])
+        return own[..., :3], own[..., 3:]
     if joint.kind is not JointKind.PLANAR:
-        raise NotImplementedError(f"the pose of a {joint.kind} joint")
-    zero = np.zeros((*own.shape[:-1], 1))
-    return np.concatenate((own[..., :2], zero), axis=-1), exp_rotation(_about_z(own[..., 2]))
-
-
-def _screw(joint: Joint, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the linear and the angular part, each (..., 3), of a planar or floating joint's velocity."""
-    if joint.kind is JointKind.FLOATING:
-        return step[..., :3], step[..., 3:]
-    if joint.kind is not JointKind.PLANAR:
-        raise NotImplementedError(f"the screw of a {joint.kind} joint")
-    zero = np.zeros((*step.shape[:-1], 1))
-    return np.concatenate((step[..., :2], zero), axis=-1), _about_z(step[..., 2])
-
-
-def _about_z(angle: FloatArray) -> FloatArray:
-    turn = np.zeros((*angle.shape, 3))
-    turn[..., 2] = angle
-    return turn
+        raise NotImplementedError(f"the motion of a {joint.kind} joint")
+    linear, angular = np.zeros((2, *own.shape[:-1], 3))
+    linear[..., :2], angular[..., 2] = own[..., :2], own[..., 2]
+    return linear, angular
 
 
 def _V(w: FloatArray) -> FloatArray:
-    """Return the matrix V(w), (..., 3, 3), which the module's docstring defines."""
     square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
     angle, W = np.sqrt(square), skew(w)
-    half = np.sinc(angle / (2.0 * math.pi))
+    half = np.sinc(angle / math.tau)
     summed = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
     cubed = np.where(
         square < _SERIES_BELOW, summed, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)

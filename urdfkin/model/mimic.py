@@ -23,8 +23,9 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, froz
 class Coupling:
     """The linear map from a path's coordinates to the values of its joints: values = G q + g.
 
-    `joints` are the names of all moving joints of the path, from the base to the tip. The mimic rule of a
-    joint with its own coordinate is None.
+    Attributes:
+        joints: Names of all moving joints of the path, from the base to the tip.
+        mimics: Mimic rule of each joint; None for a joint with its own coordinate.
 
     >>> turn = JointKind.REVOLUTE
     >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)), (turn, turn))
@@ -37,12 +38,14 @@ class Coupling:
     kinds: tuple[JointKind, ...]
 
     @cached_property
+    def _leaders(self) -> list[str]:
+        pairs = zip(self.joints, self.mimics, strict=True)
+        return [mimic.leader if mimic else joint for joint, mimic in pairs]
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the coordinates, which are the independent joints, in path order."""
-        leaders = (
-            mimic.leader if mimic else joint for joint, mimic in zip(self.joints, self.mimics, strict=True)
-        )
-        return tuple(dict.fromkeys(leaders))
+        return tuple(dict.fromkeys(self._leaders))
 
     @cached_property
     def matrix(self) -> FloatArray:
@@ -53,22 +56,22 @@ class Coupling:
 
     @cached_property
     def offset(self) -> FloatArray:
-        """The vector g (joints,), which contains the value of each joint if every coordinate is zero."""
+        """The vector g (joints,): the value of each joint if every coordinate is zero."""
         return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
-    def places(self, what: str = "q") -> CoordinateLayout:
-        """Return the names and units of the path's q, v or a, which are needed to read values by name."""
+    def layout(self, what: str = "q") -> CoordinateLayout:
+        """Return the names and units of the path's q, v or a, with which values are parsed."""
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
         own = tuple(map(units.get, self.names))
-        follow = {
-            joint: Hint(f"it mimics {mimic.leader}: give that value", QuestionsSection.MIMIC_JOINTS)
+        hints = {
+            joint: Hint(f"it mimics {mimic.leader}: give that joint's value", QuestionsSection.MIMIC_JOINTS)
             for joint, mimic, _ in rules
             if mimic
         }
         neutral = {"neutral": np.zeros(len(self.names))}
-        return CoordinateLayout(what, self.names, own, poses=lambda: neutral, otherwise=lambda: follow)
+        return CoordinateLayout(what, self.names, own, poses=lambda: neutral, otherwise=lambda: hints)
 
     def values(self, q: Given) -> FloatArray:
         """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates).
@@ -76,7 +79,7 @@ class Coupling:
         A wrong length of the last axis or a missing name raises InputError; an unknown name UnknownNameError.
         """
         coordinates = self.checked(q, "q")
-        # This is G q + g, because each row of G contains only one number that is not zero.
+        # Each row of G contains only one number that is not zero, so no matrix product is needed.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
     def checked(self, array: Given, what: str) -> FloatArray:
@@ -85,32 +88,31 @@ class Coupling:
         A last axis with the wrong length raises InputError.
         """
         if (named := by_name(array, what)) is not None:
-            return self.places(what).read(named)
+            return self.layout(what).read(named)
         values = np.asarray(array, dtype=np.float64)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             raise InputError(
                 f"{what} needs {len(self.names)} values on its last axis: {', '.join(self.names) or 'none'}",
                 found=f"shape {values.shape}",
-                remedy="select these from the robot's coordinates, for example with select()",
+                remedy="take the path's coordinates from the robot's q, for example with select()",
             )
         return values
 
     @cached_property
     def _leader_index(self) -> list[int]:
         column = {name: i for i, name in enumerate(self.names)}
-        pairs = zip(self.joints, self.mimics, strict=True)
-        return [column[mimic.leader if mimic else joint] for joint, mimic in pairs]
+        return [column[leader] for leader in self._leaders]
 
     @cached_property
     def _multiplier(self) -> FloatArray:
         return frozen([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
 
     def q_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Return the index in the robot's configuration `q` for each coordinate of the path."""
+        """Return the index of each coordinate of the path in the robot's configuration `q`."""
         return tuple(tree.q_index[tree.joint_index(name)] for name in self.names)
 
     def v_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Return the index in the robot's joint velocities `v` for each coordinate of the path."""
+        """Return the index of each coordinate of the path in the robot's joint velocities `v`."""
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
     def select(self, tree: KinematicTree, q: Given) -> FloatArray:

@@ -3,7 +3,7 @@
     T(x) = C_0 E_1(x_1) C_1 E_2(x_2) ...,      E_k = Rx, Ry, Rz, Tx, Ty or Tz of the amount x_k
 
 Chains, Denavit-Hartenberg tables, screws, and the models that `dh --compare` and `calibrate` fit have this
-form. The numbers x_k (rad or m) are joint values, cells of a table, or parameters. Let p be the position of
+form. The amounts x_k (rad or m) are joint values, cells of a table, or parameters. Let p be the position of
 the path's end. The derivative of the end's pose with respect to x_k is a twist (dp/dx_k, w). Let e be the
 direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is
 
@@ -39,7 +39,7 @@ class ElementaryMotion:
 class Path:
     """A product of constant poses (4, 4) and elementary motions, first to last.
 
-    >>> arm = Path((Motion(2, turns=True), elementary(0, False, 2.0)))
+    >>> arm = Path((ElementaryMotion(2, turns=True), elementary(0, False, 2.0)))
     >>> arm.poses([np.pi / 2])[:3, 3].round(12).tolist()
     [0.0, 2.0, 0.0]
     >>> arm.columns([0.0])[1].ravel().tolist()
@@ -49,7 +49,7 @@ class Path:
     steps: tuple[FloatArray | ElementaryMotion, ...]
 
     def frames(self, amounts: ArrayLike) -> FloatArray:
-        """Return the poses (..., steps, 4, 4) after each step, for x_k (..., motions) in rad or m."""
+        """Return the poses (..., steps, 4, 4) after each step, for amounts (..., motions) in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         frames = np.empty((*amounts.shape[:-1], len(self.steps), 4, 4))
         for i, T in enumerate(self._after_each_step(amounts)):
@@ -72,7 +72,7 @@ class Path:
             yield T
 
     def poses(self, amounts: ArrayLike) -> FloatArray:
-        """Return the pose (..., 4, 4) at the end of the path for the numbers x_k (..., motions), rad or m."""
+        """Return the pose (..., 4, 4) at the end of the path, for amounts (..., motions) in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         for T in self._after_each_step(amounts):  # noqa: B007  the last pose is the result
@@ -87,7 +87,7 @@ class Path:
         """Return the result of `columns`, computed from the result (..., steps, 4, 4) of `frames`."""
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
-        # A motion does not move its own axis, so the frame after the motion also contains the axis.
+        # A motion does not move its own axis, so the axis is also fixed in the frame after the motion.
         at = [i for i, _ in motions]
         axes = frames[..., at, :3, [step.axis for _, step in motions]]
         columns = np.zeros((*T.shape[:-2], 6, len(motions)))

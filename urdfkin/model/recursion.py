@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: This part of q, v or a begins with the first number of a joint.
+#: The part of q, v or a that begins with the first number of a joint.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)
@@ -62,7 +62,7 @@ class Column:
 
 @dataclass(eq=False)
 class Recursion:
-    """The steps of the recursion. Each step computes a link's state from the state of the link before it.
+    """Steps of the recursion: each computes a link's state from the state of the previous link.
 
     If `own` is True, velocities and accelerations are expressed in each link's own axes; else in world axes.
     """
@@ -102,12 +102,12 @@ class Recursion:
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
     def planar(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
-        """Return the state after a planar joint; S is the joint's rotation."""
+        """Return the state after a planar joint with the rotation S."""
         rates = [x for u in (v, a) for x in ((u[0], u[1], 0), (0, 0, u[2]))]
         return self._free(s, (q[0], q[1], 0), S, rates)
 
     def floating(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
-        """Return the state after a floating joint; S is the joint's rotation."""
+        """Return the state after a floating joint with the rotation S."""
         rates = [(u[k], u[k + 1], u[k + 2]) for u in (v, a) for k in (0, 3)]
         return self._free(s, (q[0], q[1], q[2]), S, rates)
 
@@ -142,7 +142,7 @@ class Recursion:
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
 
     def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
-        """Convert two vectors from world axes to the axes of the reference frame."""
+        """Return a six-vector in the axes of the reference frame, from two vectors in world axes."""
         if reference.own_axes:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
@@ -208,8 +208,7 @@ class Recursion:
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
         """Return the derivative of the Jacobian column `six` with respect to the coordinate of column `by`.
 
-        `before` says whether the joint of `by` comes before the joint of `six` on the path, or is the same
-        joint.
+        `before` is True if the joint of `by` is the joint of `six`, or is before it on the path.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

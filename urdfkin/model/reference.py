@@ -11,8 +11,7 @@ from urdfkin.errors.validators import safe_repr
 class Reference(IntEnum):
     """The three reference frames, with Pinocchio's names.
 
-    Each member has the number that the compiled kernels use. Two properties of a member define the axes and
-    the point of the results.
+    The number of a member is its number in the compiled kernels.
 
     * `LOCAL`: the frame's own origin, in the frame's axes.
     * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.
@@ -39,7 +38,7 @@ class Reference(IntEnum):
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:
-        """Return the member with the given name; a member is returned as it is.
+        """Return the member with a name, in upper or lower case; return a member unchanged.
 
         An unknown name raises UnknownNameError.
 

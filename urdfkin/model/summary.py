@@ -9,18 +9,17 @@ from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.model.configuration import narrowed_ranges
 from urdfkin.model.tree import Joint, KinematicTree
 
-#: Columns of the table of joints. Limits are in rad and rad/s, or in m and m/s for prismatic joints.
+#: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
-#: Indices of the text columns; link and joint are columns 0 and 1.
+#: Indices of the text columns after link and joint (0 and 1), and after joint, parent and child (0, 1 and 2).
 WORDS = (0, 1, 2, 3, 4, 5, 9)
-#: The text columns have these indices if the first columns are joint, parent link and child link.
-_AFTER_JOINT = (1, 2, *(i + 1 for i in WORDS[2:]))
+_WORDS_OF_JOINTS = (0, 1, 2, *(i + 1 for i in WORDS[2:]))
 
 
 def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
     """Return the summary of a robot for a terminal or a notebook: one table that also shows the tree.
 
-    `order` is a sentence that says how the joints are ordered; it is printed below the table.
+    The sentence `order` below the table explains the order of the joints.
     """
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
@@ -58,7 +57,7 @@ class Joints(dict[str, Joint], Displayable):
             for i, (joint, child) in enumerate(links)
         ]
         heads = ("joint", "parent", "child", *columns)
-        return TextDocument(f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=(0, *_AFTER_JOINT))])
+        return TextDocument(f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=_WORDS_OF_JOINTS)])
 
 
 def guides(tree: KinematicTree) -> Iterator[str]:
@@ -66,15 +65,15 @@ def guides(tree: KinematicTree) -> Iterator[str]:
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1
-    left, below = list(children), [""]
+    remaining, indents = list(children), [""]
     yield ""
     for joint in tree.joints:
-        left[joint.parent] -= 1
-        own, behind = ("├ ", "│ ") if left[joint.parent] else ("└ ", "  ")
+        remaining[joint.parent] -= 1
+        own, below = ("├ ", "│ ") if remaining[joint.parent] else ("└ ", "  ")
         if children[joint.parent] == 1:
-            own, behind = "", ""
-        yield below[joint.parent] + own
-        below.append(below[joint.parent] + behind)
+            own, below = "", ""
+        yield indents[joint.parent] + own
+        indents.append(indents[joint.parent] + below)
 
 
 def cells_of(tree: KinematicTree, i: int) -> tuple[str, ...]:

@@ -20,8 +20,10 @@ from numpy.typing import ArrayLike
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import FloatArray, floats, rotation_defect
+from urdfkin.kinematics import inputs
 from urdfkin.kinematics.rotation import coordinate_rotation, rotation_about
+
+FloatArray = inputs.FloatArray
 
 
 class FrameName(str):
@@ -59,26 +61,10 @@ class JointFrame(FrameName):
     prefix = "joint:"
 
 
-__all__ = [
-    "FloatArray",
-    "Joint",
-    "JointKind",
-    "KinematicTree",
-    "Limit",
-    "Lock",
-    "Mimic",
-    "build_tree",
-    "freed",
-    "frozen",
-    "with_locks",
-    "with_root_joint",
-]
-
-
 def frozen(array: ArrayLike) -> FloatArray:
     """Return a read-only, C-contiguous float64 copy of `array`; raises InputError if it is not numeric."""
     numeric = type(array) is np.ndarray and array.dtype == np.float64
-    copy = np.array(array if numeric else floats(array, "an array"), dtype=np.float64, order="C")
+    copy = np.array(array if numeric else inputs.floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
     return copy
 
@@ -91,7 +77,7 @@ class JointKind(Enum):
     nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
     has_axis: bool  #: Whether a joint of this kind rotates about an axis or slides along one.
     turns: bool  #: Whether a joint of this kind rotates about its axis.
-    bounded: bool  #: Whether a URDF gives such a joint a lower and an upper limit.
+    bounded: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
         member = object.__new__(cls)
@@ -119,8 +105,7 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside a joint's limits if it exceeds a limit by more than the larger of two amounts.
-#: They are `_OUTSIDE` (rad or m), and the fraction `_OF_RANGE` of the joint's range.
+#: Least distance from the limits of a value far outside: in rad or m, and as a fraction of the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
@@ -142,8 +127,8 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 class Mimic:
     """The rule of a mimic joint: its value is `multiplier * q_leader + offset`.
 
-    `leader` is the name of the mimicked joint. The mimicked joint is not a mimic joint itself, because chains
-    of mimic joints are resolved before a tree is built.
+    The mimicked joint `leader` is not a mimic joint: chains of mimic joints are resolved before a tree is
+    built.
     """
 
     leader: str
@@ -192,7 +177,7 @@ class Joint:
             )
 
     def __reduce__(self) -> tuple[type[Joint], tuple[Any, ...]]:
-        # Unpickling then calls the constructor, and `__post_init__` makes the arrays read-only.
+        # Unpickling then calls the constructor, so that `__post_init__` makes the arrays read-only.
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
     @property
@@ -212,11 +197,11 @@ class Joint:
     @property
     def length(self) -> float:
         """Length (m) of the offset from the parent link, with a locked prismatic joint's displacement."""
-        # The squares of 1e-200 or 1e200, which a URDF may contain, underflow or overflow; hypot avoids this.
-        own = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
-        return (
-            own + abs(self.lock.value) if self.lock and self.lock.joint.kind is JointKind.PRISMATIC else own
-        )
+        # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids squares.
+        length = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
+        if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
+            length += abs(self.lock.value)
+        return length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -239,11 +224,11 @@ class Lock:
 
     @property
     def motion(self) -> FloatArray:
-        """(4, 4) pose of the child link's frame in the joint frame."""
+        """Pose (4, 4) of the child link's frame in the joint frame."""
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
-        elif np.count_nonzero(axis) == 1:  # The zeros and ones of this rotation are exact.
+        elif np.count_nonzero(axis) == 1:  # About a coordinate axis, zeros and ones are exact.
             k = int(np.flatnonzero(axis)[0])
             T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
         else:
@@ -311,12 +296,10 @@ class KinematicTree:
 
     @cached_property
     def nq(self) -> int:
-        """Length of a configuration `q`."""
         return sum(joint.nq for joint in self.joints)
 
     @cached_property
     def nv(self) -> int:
-        """Length of the joint velocities `v` and of the joint accelerations `a`."""
         return sum(joint.nv for joint in self.joints)
 
     @cached_property
@@ -402,22 +385,21 @@ class KinematicTree:
             return self._frame_index(name)
         link, joint = self._link_index.get(name), self._joint_index.get(name)
         if link is None and joint is None:
-            meant = self._with_prefix(name)
-            if meant is None:
-                raise UnknownNameError(
-                    "frame", name, self.frame_names, where=self.name, question=QuestionsSection.UNKNOWN_FRAMES
-                )
-            return self._frame_index(meant)
+            if (prefixed := self._with_prefix(name)) is not None:
+                return self._frame_index(prefixed)
+            raise UnknownNameError(
+                "frame", name, self.frame_names, where=self.name, question=QuestionsSection.UNKNOWN_FRAMES
+            )
         if link is not None and joint is not None and link != joint + 1:
-            frames = self.link_frames, self.joint_frames
-            ways = [
-                *self._unambiguous(frames[0][link], *frames[1][link - 1 : link]),
-                *self._unambiguous(frames[1][joint], frames[0][joint + 1]),
+            links, joints = self.link_frames, self.joint_frames
+            names = [
+                *self._unambiguous(links[link], *joints[link - 1 : link]),
+                *self._unambiguous(joints[joint], links[joint + 1]),
             ]
             raise InputError(
                 f"frame {name!r} is the name of a link and of a joint at different places",
                 where=self.name,
-                remedy=f"write {' or '.join(map(repr, ways))}" if ways else "rename the link or the joint",
+                remedy=f"write {' or '.join(map(repr, names))}" if names else "rename the link or the joint",
             )
         return link if link is not None else self._joint_index[name] + 1
 
@@ -457,16 +439,12 @@ class KinematicTree:
         return tuple(reversed(joints))
 
     def leaves(self) -> Iterator[int]:
-        """Return the indices of the links without children."""
         parents = {joint.parent for joint in self.joints}
         return (link for link in range(len(self.links)) if link not in parents)
 
 
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
-    """Return the tree with a planar or floating joint `root_joint` from a new root link `universe`.
-
-    Pinocchio uses the same two names.
-    """
+    """Return the tree with a joint `root_joint` from a new root link `universe`: Pinocchio's names."""
     for known, name in ((tree.links, "universe"), ([joint.name for joint in tree.joints], "root_joint")):
         if name in known:
             raise InputError(
@@ -475,8 +453,8 @@ def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
                 remedy="rename it in the URDF, or load the robot without root_joint",
             )
     root = Joint("root_joint", kind, 0, np.eye(4), np.array([1.0, 0.0, 0.0]))
-    moved = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]
-    return KinematicTree(tree.name, ("universe", *tree.links), (root, *moved))
+    others = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]
+    return KinematicTree(tree.name, ("universe", *tree.links), (root, *others))
 
 
 def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree:
@@ -486,16 +464,15 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
     """Return the tree with named poses. Only values of joints with exactly one coordinate are stored."""
-    own = {joint.name for joint in tree.joints if joint.nq == 1}
-    kept = {pose: {name: x for name, x in of.items() if name in own} for pose, of in poses.items()}
-    return replace(tree, poses=kept)
+    single = {joint.name for joint in tree.joints if joint.nq == 1}
+    stored = {
+        pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()
+    }
+    return replace(tree, poses=stored)
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Return the tree with some joints, and the joints that mimic them, fixed at given values (rad or m).
-
-    Only a joint with exactly one coordinate can be fixed.
-    """
+    """Return the tree with some joints, and the joints that mimic them, fixed at given values (rad or m)."""
     leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
     joints = [
         Lock(joint, values[leader]).fixed() if leader in values else joint
@@ -504,7 +481,7 @@ def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTre
     return with_poses(KinematicTree(tree.name, tree.links, tuple(joints)), tree.poses)
 
 
-def freed(tree: KinematicTree) -> KinematicTree:
+def without_mimic_rules(tree: KinematicTree) -> KinematicTree:
     """Return the tree without mimic rules: every mimic joint gets its own coordinate."""
     return KinematicTree(tree.name, tree.links, tuple(replace(joint, mimic=None) for joint in tree.joints))
 
@@ -518,7 +495,7 @@ def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
     links, ordered = [root], list[Joint]()
-    # The function uses a stack: a chain of 50,000 links would exceed the interpreter's recursion limit.
+    # With recursion instead of a stack, a chain of 50,000 links would exceed Python's recursion limit.
     stack = [(0, joint, child) for joint, child in _last_name_first(below.get(root, []))]
     while stack:
         parent_index, joint, child = stack.pop()
@@ -553,10 +530,9 @@ def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
 
 def is_rigid(T: FloatArray, tolerance: float) -> bool:
     """Return whether a matrix (4, 4) is a rigid transform, with a rotation matrix within `tolerance`."""
-    return bool(rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
+    return bool(inputs.rotation_defect(T[:3, :3]) <= tolerance) and T[3].tolist() == [0.0, 0.0, 0.0, 1.0]
 
 
 def inverse(T: FloatArray) -> FloatArray:
-    """Return the inverse (4, 4) of a pose."""
     back = T[:3, :3].T
     return pose(back, -back @ T[:3, 3])

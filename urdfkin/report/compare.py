@@ -8,10 +8,10 @@ A change is a regression in these cases:
 - A quantity or a table is no longer compared, or there are fewer samples or results.
 - A bound is wider for the same joints.
 - The worst disagreement grew by more than a factor, and is above the error of a single rounding.
-- The ratio of the worst disagreement to the bound grew by more than this factor, and is above a tenth.
+- The ratio of the worst disagreement to the bound grew by more than a factor, and is above a tenth.
 
-A changed model is not a regression: its joints are listed with their axes, placements, limits and mimic
-rules. A renamed file is not a regression either: `compare` matches the robots by the robot name in the file.
+A changed model is not a regression: the report lists the changed axes, placements, limits and mimic rules of
+the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from urdfkin.errors.escape import log_line
 from urdfkin.errors.escape import markdown_text as text
 from urdfkin.model.mechanisms.mechanism import Tolerance
 from urdfkin.model.summary import axis_words, rule_words
-from urdfkin.report.markdown import LIMIT, shortened
+from urdfkin.report.markdown import LIMIT, count_within, row_line, shortened, table_lines
 from urdfkin.report.words import VERDICTS, check_name, counted, percent, quantity_name, summary, units, worst
 from urdfkin.system.documents import DocumentKind, Header, plain, says
 from urdfkin.validation.document import (
@@ -43,14 +43,14 @@ from urdfkin.validation.document import (
 )
 from urdfkin.verify.oracles import versions
 
-#: Longer texts are truncated to this length.
+#: Maximum length of a displayed value.
 _LONGEST = 200
-#: The numbers of a displayed pose are rounded to nine decimals.
+#: Displayed poses are rounded to nine decimals.
 _PRECISION = Tolerance(1e-9, 1e-9)
 
 
 def model_changes(old: ReportedModel | None, new: ReportedModel | None) -> Iterator[tuple[str, str, str]]:
-    """Yield the name, old value and new value of each change of a model. A missing value is empty."""
+    """Yield the name, the old value and the new value of each change in a model; a missing value is empty."""
     before, after = _joints(old), _joints(new)
     for name in dict.fromkeys([*before, *after]):
         was, now = before.get(name), after.get(name)
@@ -135,24 +135,20 @@ def _exit(found: ReportComparison) -> str:
 
 def markdown_of(old: Document, new: Document, found: ReportComparison, limit: int = LIMIT) -> str:
     mark = "❌" if found.regressions else "✅"
-    lines = [f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}", ""]
-    lines += ["| worst, eps·scale | old | new |", "| --- | ---: | ---: |"]
-    lines += [
-        f"| {text(quantity_name(name))} | {_cell(a)} | {_cell(b)} |" for name, a, b in figures(old, new)
-    ]
-    lines += [
+    worst_rows = ((text(quantity_name(name)), _cell(a), _cell(b)) for name, a, b in figures(old, new))
+    lines = [
+        f"## {mark} {verdict(found)[0].upper()}{verdict(found)[1:]}",
         "",
-        *(["| | changed value | old | new |", "| --- | --- | --- | --- |"] if found.changes else []),
+        *table_lines(["worst, eps·scale", "old", "new"], worst_rows, left=[0]),
+        "",
+        *(table_lines(["", "changed value", "old", "new"]) if found.changes else []),
     ]
-    left = limit - sum(len(line) + 1 for line in lines) - 100
-    ordered = sorted(found.changes, key=lambda change: not change.regression)
-    for shown, change in enumerate(ordered):
-        row = _row(change)
-        left -= len(row) + 1
-        if left < 0:
-            lines += ["", f"{counted(len(ordered) - shown, 'further change')} left out: the comment is full."]
-            break
-        lines.append(row)
+    room = limit - sum(len(line) + 1 for line in lines) - 100
+    rows = [_row(change) for change in sorted(found.changes, key=lambda change: not change.regression)]
+    shown = count_within(rows, room)
+    lines += rows[:shown]
+    if shown < len(rows):
+        lines += ["", f"{counted(len(rows) - shown, 'further change')} left out: the comment is full."]
     return "\n".join([*lines, ""])
 
 
@@ -160,20 +156,19 @@ def _row(change: ReportChange) -> str:
     where = f"{change.robot}: " if change.robot else ""
     cells = [where + change.what, change.old, change.new]
     mark = "❌ regression" if change.regression else ""
-    return f"| {mark} | {' | '.join(text(shortened(cell, 300)) for cell in cells)} |"
+    return row_line([mark, *(text(shortened(cell, 300)) for cell in cells)])
 
 
 def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else units(value)
 
 
-#: If the largest disagreement of a robot grows by more than this factor, the change is a regression.
-#: It may grow by a smaller factor, because the maximum over random samples varies.
+#: Factor by which the largest disagreement of a robot may grow without a regression.
+#: The maximum over random samples varies by smaller factors.
 FACTOR = 2.0
-#: A disagreement below this number (in eps * scale) is no regression.
-#: A single rounding error can be as large as this number.
+#: Largest disagreement (in eps * scale) that is never a regression; a single rounding can be as large.
 FLOOR = 2.0
-#: A disagreement below this fraction of its bound is no regression.
+#: Largest ratio of a disagreement to its bound that is never a regression.
 _SHARE_FLOOR = 0.1
 
 
@@ -255,10 +250,7 @@ COMPARISON = DocumentKind(
 
 
 def compare(old: Document, new: Document, factor: float = FACTOR) -> ReportComparison:
-    """Compare two reports.
-
-    The largest disagreement of a robot may grow by `factor` without a regression.
-    """
+    """Compare two reports; the largest disagreement of a robot may grow by `factor` without a regression."""
     changes = [*_run(old, new), *_robots(old, new, factor)]
     return ReportComparison(tuple(changes), tuple(new["sha256"]))
 
@@ -303,7 +295,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChang
 
 
 def by_source(document: Document) -> dict[str, ReportedRobot]:
-    """Return robots by their source. If a source occurs several times, a number is added to its name."""
+    """Return robots by source; a number is added to a source that occurs again: `ur5`, `ur5 (2)`."""
     named: dict[str, ReportedRobot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1
@@ -315,7 +307,7 @@ def by_source(document: Document) -> dict[str, ReportedRobot]:
 
 
 def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
-    """Return renamed files: a missing and a new source have the same robot name."""
+    """Return renamed files, old to new source: only one missing and one new source have the robot's name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1

@@ -10,16 +10,16 @@ from urdfkin.comparison.diff import Changes, ModelChange, motion_words, word
 from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text as text
-from urdfkin.report.markdown import LIMIT, shortened
+from urdfkin.report.markdown import LIMIT, count_within, row_line, shortened, table_lines
 from urdfkin.report.words import counted
 from urdfkin.system.documents import plain
 
-#: Titles of the columns
+#: Titles of the columns of the table of changes.
 HEADS = ("element", "what", "old", "new", "alone")
 
 
 def headline(found: Changes) -> str:
-    """Return the number of changes, and the distance by which all together move a frame."""
+    """Return the number of changes, and the distance by which all changes together move a frame."""
     rounding = ""
     if found.rounding is not None:
         metres, radians = found.rounding
@@ -33,12 +33,12 @@ def headline(found: Changes) -> str:
     return f"{head}; together they {motion_words(found.total)}"
 
 
-#: Columns of the table of pairs
+#: Titles of the columns of the table of pairs.
 PAIRS = ("old", "new", "changes")
 
 
 def pairs_document(found: Sequence[Changes]) -> TextDocument:
-    """Return a table with a row for each pair of robots, followed by the list of changes of each pair."""
+    """Return a table with a row for each pair of robots, followed by the changes of each pair."""
     rows = [(*one.sources, headline(one)) for one in found]
     return TextDocument(
         "", [Table(PAIRS, rows, left=3), *(line for one in found if one for line in lines_of(one))]
@@ -46,15 +46,14 @@ def pairs_document(found: Sequence[Changes]) -> TextDocument:
 
 
 def pairs_markdown(found: Sequence[Changes]) -> str:
-    lines = [f"| {' | '.join(PAIRS)} |", f"|{' --- |' * len(PAIRS)}"]
-    lines += [f"| {' | '.join(map(text, (*one.sources, headline(one))))} |" for one in found]
+    lines = table_lines(PAIRS, (map(text, (*one.sources, headline(one))) for one in found))
     parts = ["\n".join([*lines, ""])]
     parts += [markdown_of(one, LIMIT // len(found)) for one in found if one]
     return "\n".join(parts)
 
 
 def lines_of(found: Changes) -> list[str]:
-    """Return the changes as lines; a changed joint also has a line with the distance that a frame moves."""
+    """Return the changes as lines; after a joint's changes, a line states the distance that a frame moves."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     by_element: dict[str, list[ModelChange]] = {}
     for change in found.changes:
@@ -77,13 +76,13 @@ def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]
     rows: list[tuple[str, ...]] = []
     for change in found.changes:
         effect = found.effect_of.get(change.element)
-        said = effect.words if effect and change.moves else ""
+        motion = effect.words if effect and change.moves else ""
         old, new = ("" if value is None else word(value) for value in (change.old, change.new))
         new = change.size or new
         if longest is not None:
             old, new = shortened(old, longest), shortened(new, longest)
         cells = (change.element, change.what, old, new) if change.what else (str(change), "", "", "")
-        rows.append((*cells, said))
+        rows.append((*cells, motion))
     return rows
 
 
@@ -91,15 +90,12 @@ def markdown_of(found: Changes, limit: int = LIMIT) -> str:
     """Return the changes as Markdown for a pull request's comment, at most `limit` characters."""
     lines = [f"## {text(headline(found))}", "", f"{text(found.sources[0])} → {text(found.sources[1])}", ""]
     if found:
-        lines += [f"| {' | '.join(HEADS)} |", f"|{' --- |' * len(HEADS)}"]
-    left = limit - sum(map(len, lines)) - 200
-    for k, cells in enumerate(rows_of(found, 120)):
-        row = f"| {' | '.join(map(text, cells))} |"
-        left -= len(row) + 1
-        if left < 0:
-            lines += ["", f"{counted(len(found.changes) - k, 'more change')} not shown."]
-            break
-        lines.append(row)
+        lines += table_lines(HEADS)
+    rows = [row_line(map(text, cells)) for cells in rows_of(found, 120)]
+    shown = count_within(rows, limit - sum(map(len, lines)) - 200)
+    lines += rows[:shown]
+    if shown < len(rows):
+        lines += ["", f"{counted(len(rows) - shown, 'more change')} not shown."]
     return "\n".join([*lines, ""])
 
 

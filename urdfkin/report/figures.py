@@ -1,9 +1,9 @@
 """Histograms of the disagreements, and the data of the 3D view.
 
-The plot has one row for each quantity, with all reference frames together. The x axis of the histogram is
+The plot has one row for each quantity, with all reference frames together. The x axis of each histogram is
 logarithmic and shows the disagreement in eps * scale. The triangle shows the worst result. The bar shows the
-range of the bound over all frames, because different frames have different bounds. If all results are
-verified, the histogram lies left of the bar. The numbers of the 3D view have seven digits.
+range of the bounds, because different frames have different bounds. If all results are verified, the
+histogram lies left of the bar. The numbers of the 3D view have seven digits.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: The axis begins at this number of eps * scale; smaller disagreements are drawn as exact.
+#: Left end of the x axis, in eps * scale; smaller disagreements count as exact.
 _LEFT = 1e-2
+#: Height of the highest bar, relative to the distance between two rows.
 _HEIGHT = 0.82
 
 
@@ -52,7 +53,7 @@ def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> 
 
 
 def _right(checks: Sequence[ReportedCheck], edges: Sequence[float]) -> float:
-    """Return the right end of the axis, which is larger than every bound and every finite disagreement."""
+    """Return the right end of the x axis: twice the largest bound or disagreement, within limits."""
     ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 
@@ -65,54 +66,33 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
     last = int(np.flatnonzero(heights).max(initial=-1)) + 1
     axes.plot([_LEFT, edges[-1] * 10], [base, base], color=GRID, linewidth=0.7, zorder=1)
     if last > 0:
-        at = edges[first : first + last + 1] if first + last < len(edges) else edges[first:]
-        steps = heights[: len(at) - 1]
-        axes.stairs(
-            base + _HEIGHT * steps,
-            at,
-            baseline=base,
-            fill=True,
-            color=FIRST,
-            alpha=0.85,
-            linewidth=0,
-            zorder=3,
-        )
+        at = edges[first : first + last + 1]
+        tops = base + _HEIGHT * heights[: len(at) - 1]
+        axes.stairs(tops, at, baseline=base, fill=True, color=FIRST, alpha=0.85, linewidth=0, zorder=3)
     exact = counts[: first + 1].sum() / results if results else 0.0
-    axes.annotate(
-        f"{exact:.0%}" if exact else "",
-        (_LEFT, base),
-        xytext=(-4, 2),
-        textcoords="offset points",
-        ha="right",
-        fontsize=8,
-        color=TEXT,
-    )
+    _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    if largest is None or largest > right:  # A separate mark is at the right end.
-        axes.annotate(
-            "✗ not finite" if largest is None else f"✗ {units(largest)} ▸",
-            (1.0, base + 0.13),
-            xycoords=("axes fraction", "data"),
-            ha="right",
-            va="center",
-            fontsize=8,
-            weight="bold",
-            color=THIRD,
-            zorder=6,
-        )
+    if largest is None or largest > right:  # the mark is at the right end of the axis
+        text = "✗ not finite" if largest is None else f"✗ {units(largest)} ▸"
+        place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}
+        axes.annotate(text, (1.0, base + 0.13), fontsize=8, weight="bold", color=THIRD, zorder=6, **place)
     elif largest:
-        failed = any(check["failed"] for check in checks)
-        axes.plot(
-            [largest], [base + 0.13], marker="v", markersize=5, color=THIRD if failed else TEXT, zorder=5
-        )
+        colour = THIRD if any(check["failed"] for check in checks) else TEXT
+        axes.plot([largest], [base + 0.13], marker="v", markersize=5, color=colour, zorder=5)
+
+
+def _annotate_left(axes: Axes, text: str, y: float, points: float, **style: Any) -> None:
+    """Write a text left of the axis, at a height `y` and some points above."""
+    place: dict[str, Any] = {"xytext": (-4, points), "textcoords": "offset points", "ha": "right"}
+    axes.annotate(text, (_LEFT, y), color=TEXT, **place, **style)
 
 
 def _bound(axes: Axes, base: int, checks: Sequence[ReportedCheck]) -> None:
-    lows = [check["bound"][0] for check in checks if check["bound"][0] is not None]
-    highs = [check["bound"][1] for check in checks if check["bound"][1]]
+    lows = [low for low, _ in (check["bound"] for check in checks) if low is not None]
+    highs = [high for _, high in (check["bound"] for check in checks) if high]
     if lows and highs:
-        low, high = min(x for x in lows if x is not None), max(x for x in highs if x is not None)
+        low, high = min(lows), max(highs)
         axes.plot(
             [low, high], [base + 0.13] * 2, color=SECOND, linewidth=3.0, solid_capstyle="butt", zorder=4
         )
@@ -130,16 +110,7 @@ def _decorate(axes: Axes, names: Sequence[str], right: float) -> None:
     axes.tick_params(axis="x", which="both", labelsize=8, colors=TEXT, color=GRID)
     axes.minorticks_off()
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.annotate(
-        "exact",
-        (_LEFT, len(names) - 0.4),
-        xytext=(-4, 6),
-        textcoords="offset points",
-        ha="right",
-        fontsize=7.5,
-        color=TEXT,
-        annotation_clip=False,
-    )
+    _annotate_left(axes, "exact", len(names) - 0.4, 6, fontsize=7.5, annotation_clip=False)
     axes.set_xlabel("disagreement with Pinocchio, eps·scale", fontsize=9, color=TEXT)
     for side in ("left", "bottom"):
         axes.spines[side].set_visible(False)
@@ -153,14 +124,10 @@ _KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 def scene(model: ReportedModel, chains: list[Chain]) -> dict[str, Any]:
     """Return a robot as data for the script of the page, `assets/view3d.js`.
 
-    Entries of the dict, among others:
-
-    * `links`: the names.
-    * `joints`: one list for each joint. It contains the name, the index of the kind, the parent link, the
-      child link, the pose in the parent (three rows of four), the axis or 0, the index in q or -1, the
-      lower and the upper limit (None: no limit), and the mimic rule or 0. A mimic rule is the mimicked
-      joint's index in q, the multiplier and the offset.
-    * `chains`: the base link, the tip link and two tables for each chain.
+    The entry `joints` contains a list for each joint: the name, the index of the kind, the parent link, the
+    child link, the pose in the parent (three rows of four), the axis or 0, the index in q or -1, the lower
+    and the upper limit (None: no limit), and the mimic rule or 0. A mimic rule is the mimicked joint's index
+    in q, the multiplier and the offset.
     """
     links = {name: i for i, name in enumerate(model["links"])}
     joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}
@@ -189,7 +156,7 @@ def _joint(model: ReportedModel, i: int, links: dict[str, int]) -> list[Any]:
         _KINDS.index(joint["kind"]),
         links[joint["parent"]],
         links[joint["child"]],
-        [_short(x) for row in joint["placement"][:3] for x in row],
+        _three_rows(joint["placement"]),
         [_short(x) for x in joint["axis"]] if joint["axis"] else 0,
         -1 if joint["q"] is None else joint["q"],
         None if limit is None or limit["lower"] is None else _short(limit["lower"]),
@@ -200,8 +167,8 @@ def _joint(model: ReportedModel, i: int, links: dict[str, int]) -> list[Any]:
 
 def _table(table: ReportedDHTable, joints: dict[str, int]) -> dict[str, Any]:
     return {
-        "base": [_short(x) for row in table["base"][:3] for x in row],
-        "tool": [_short(x) for row in table["tool"][:3] for x in row],
+        "base": _three_rows(table["base"]),
+        "tool": _three_rows(table["tool"]),
         "rows": [
             [
                 joints[row["joint"]],
@@ -218,6 +185,10 @@ def _link(frame: str, links: dict[str, int], joints: dict[str, int]) -> int:
     if kind in ("link", "joint") and (rest in links or rest in joints):
         frame = rest
     return links[frame] if frame in links else joints[frame] + 1
+
+
+def _three_rows(T: Sequence[Sequence[float]]) -> list[float | int]:
+    return [_short(x) for row in T[:3] for x in row]
 
 
 def _short(value: float) -> float | int:

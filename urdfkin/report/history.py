@@ -1,8 +1,8 @@
 """History of robots in several validation reports: verdicts, results, findings and changes from run to run.
 
-Runs are ordered by their start. Robots in two reports are matched by their source. If a file was renamed, its
-robot is matched by the robot's name, as in `compare`. Each report is read twice, first for its start time and
-then for its results, so that only one report at a time is in memory.
+Runs are ordered by start time. Robots are matched by source, or by the robot's name if a file was renamed, as
+in `compare`. Each report is read twice, first for the start time and then for the results, so that only one
+report at a time is in memory.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from urdfkin.validation.document import VALIDATION, Document, ReportedRobot, Uni
 from urdfkin.validation.outcome import OUTCOMES
 from urdfkin.verify.oracles import versions
 
-#: A history has at most `MOST_RUNS` reports, and a folder at most `MOST_FILES` files.
+#: Maximum number of reports in a history, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: On a terminal, each robot has marks for the latest `MARKED` runs.
-#: On the page, the charts show the latest `CHARTED` runs.
+#: Number of latest runs with marks on a terminal, and in the charts of the page.
 MARKED, CHARTED = 20, 60
-#: This number of latest changes is shown without --all, and for each robot on the page.
+#: Number of latest changes (and of runs on a terminal) that are shown without --all.
 SHOWN = 20
+#: Maximum number of runs and of changes that the page lists for each robot.
 _LISTED = 500
-#: Mark of each verdict
+#: Mark of each verdict; the empty verdict belongs to a run without the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: The axis of the chart of disagreements begins at 10^-3 times the bound.
+#: Lower end of the chart of disagreements: common logarithm of the ratio to the bound.
 _LOWEST = -3.0
 
 
@@ -106,14 +106,12 @@ class HistoryDocument(Header):
     repeated: Annotated[list[Unused], says("Files that repeat a validation run of another file.")]
 
 
-#: Layout of the document
 HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-
-#: Changes of each source
-Told = dict[str | None, list[tuple[int, ChangeEntry]]]
+#: Changes of each source, each with the index of the run.
+ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
 @dataclass(slots=True)
@@ -122,10 +120,10 @@ class History:
 
     Attributes:
         runs: The runs, the oldest first.
-        robots: For each robot, the results in each run. The key is the path or name from which the robot was
-            loaded in the latest run. Worse verdicts come first.
+        robots: For each robot, the results in each run. The key is the robot's source in the latest run.
+            Worse verdicts come first.
         unusable: Files that cannot be used, with the reason.
-        repeated: Files that repeat the run of another file. The value is the name of the other file.
+        repeated: Files that repeat the run of another file.
     """
 
     runs: list[ValidationRun] = field(default_factory=list)
@@ -156,10 +154,10 @@ class History:
 
 
 def history(paths: Sequence[Path]) -> History:
-    """Read reports and return their history.
+    """Return the history of reports: JSON files of `urdfkin validate --json`, stores, and folders of both.
 
-    The paths are JSON files of `urdfkin validate --json`, stores, and folders with such files and stores.
-    InputError is raised if no report can be used, or if there are too many reports.
+    Raises:
+        InputError: No report can be used, or there are too many reports.
     """
     found = History()
     before: Document | None = None
@@ -175,13 +173,13 @@ def history(paths: Sequence[Path]) -> History:
             found=some or "no .json file and no store",
             remedy=f"write one with: {VALIDATION.made_by}",
         )
-    found.robots = dict(sorted(found.robots.items(), key=lambda one: _rank(found, one[1])))
+
+    def rank(item: tuple[str, list[Point]]) -> tuple[bool, int]:
+        latest = item[1][-1]
+        return latest["run"] != len(found.runs) - 1, VERDICTS.index(latest["verdict"])
+
+    found.robots = dict(sorted(found.robots.items(), key=rank))
     return found
-
-
-def _rank(found: History, points: Sequence[Point]) -> tuple[bool, int]:
-    """Return the sort key of a robot; robots of the latest run come first, and worse verdicts come first."""
-    return points[-1]["run"] != len(found.runs) - 1, VERDICTS.index(points[-1]["verdict"])
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
@@ -201,7 +199,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
 
 
 def _in_folder(folder: Path) -> Iterator[Path]:
-    """Yield the reports in a folder, in the order of their names. Links to folders are not followed."""
+    """Yield the reports in a folder, ordered by name; links to folders are not followed."""
     seen = 0
     for place, folders, names in os.walk(folder):
         here = Path(place)
@@ -219,10 +217,7 @@ def _in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Document]]:
-    """Yield each report, ordered by start time.
-
-    Add files that cannot be used to `found.unusable`, and repeated runs to `found.repeated`.
-    """
+    """Yield each report, ordered by start time; add other files to `found.unusable` or `found.repeated`."""
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
@@ -236,15 +231,12 @@ def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Docu
         except UrdfkinError as error:
             found.unusable.append(_unused(path, error))
             continue
-        run = hashlib.sha256(
-            repr([document[key] for key in ("started", "command", "seconds", "sha256")]).encode(
-                errors="replace"
-            )
-        ).hexdigest()
-        if run in seen:
-            found.repeated.append({"file": str(path), "reason": f"the same run as {seen[run]}"})
+        run = repr([document[key] for key in ("started", "command", "seconds", "sha256")])
+        digest = hashlib.sha256(run.encode(errors="replace")).hexdigest()
+        if digest in seen:
+            found.repeated.append({"file": str(path), "reason": f"the same run as {seen[digest]}"})
             continue
-        seen[run] = str(path)
+        seen[digest] = str(path)
         yield str(path), document
 
 
@@ -253,7 +245,7 @@ def _unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _start(path: Path) -> tuple[float, str]:
-    """Return the start time of a run in seconds and as text. If the text is not a date, return infinity."""
+    """Return the start time of a run in seconds and as text; infinity for a text that is not a date."""
     data = _read(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     try:
@@ -288,7 +280,7 @@ def _run(file: str, document: Document, before: Document | None) -> ValidationRu
 
 
 def _add(found: History, before: Document | None, document: Document) -> None:
-    """Add the robots of the latest run. A renamed file continues the history of the robot with this name."""
+    """Add the robots of the latest run; the history of a renamed file continues under the new name."""
     robots = by_source(document)
     for old, new in renamed_files(by_source(before) if before else {}, robots).items():
         found.robots[new] = found.robots.pop(old)
@@ -318,7 +310,7 @@ def _point(run: int, source: str, robot: ReportedRobot) -> Point:
 
 
 def document(found: History, *, all_: bool = False) -> TextDocument:
-    """Return the history for a terminal; with `all_`, show all runs and changes, not only the latest."""
+    """Return the history for a terminal; with `all_`, all runs and changes, otherwise only the latest."""
     some = None if all_ else SHOWN
     first = 0 if all_ else max(0, len(found.runs) - SHOWN)
     runs = [
@@ -327,30 +319,29 @@ def document(found: History, *, all_: bool = False) -> TextDocument:
             f"{run['failed']:,}", _share(run),
             *(run["versions"].get(name, "?") for name in ("urdfkin", "pin")),
         ]
-        for k, run in enumerate(found.runs, 1)
-        if k > first
+        for k, run in enumerate(found.runs[first:], first + 1)
     ]  # fmt: skip
     heads = ["run", "started", "verdict", "robots", "results", "outside", "of bound", "urdfkin", "pin"]
     parts: list[str | Table] = [Table(heads, runs, left=(1, 2))]
-    told_of = _by_robot(found)
+    grouped = _changes_by_source(found)
     rows = [
         [
             robot, marks(found, points), points[-1]["verdict"],
             units(points[-1]["worst"], compared=points[-1]["results"] > 0),
             _share(points[-1]), f"{points[-1]['errors']}", f"{points[-1]['warnings']}",
-            f"{len(_of(told_of, points))}",
+            f"{len(_changes_of(grouped, points))}",
         ]
         for robot, points in found.robots.items()
     ]  # fmt: skip
     heads = ["robot", "runs", "latest", "worst", "of bound", "errors", "warnings", "changes"]
     parts += ["", Table(heads, rows, left=(0, 1, 2))]
-    told = [
+    lines = [
         (Strong(words, "bold red") if change["regression"] else words)
         for run, change in changes(found)[:some]
         for words in [f"run {run + 1}, {words_of(change)}"]
     ]
-    more = len(changes(found)) - len(told)
-    parts += ["", "changes, the latest first:", *told] if told else ["", "no changes between the runs"]
+    more = len(changes(found)) - len(lines)
+    parts += ["", "changes, the latest first:", *lines] if lines else ["", "no changes between the runs"]
     parts += [f"... and {more:,} more: --all shows them"] if more else []
     parts += [Strong(f"not used: {one['file']}: {one['reason']}", "bold yellow") for one in found.unusable]
     parts += [f"not counted: {one['file']}: {one['reason']}" for one in found.repeated]
@@ -375,31 +366,34 @@ def headline(found: History) -> str:
 
 
 def marks(found: History, points: Sequence[Point]) -> str:
-    """Return a mark for each of the latest runs: `✓`, `✗`, `!`, and `·` where the robot is missing."""
+    """Return a mark for each of the latest runs: `✓`, `✗`, `!`, or `·` if the robot is missing."""
+    return "".join(MARKS[verdict] for verdict in _latest_verdicts(found, points))
+
+
+def _latest_verdicts(found: History, points: Sequence[Point]) -> list[str]:
+    """Return the verdict of a robot in each of the latest runs; empty if the robot is missing."""
     verdicts = {point["run"]: point["verdict"] for point in points}
     last = len(found.runs)
-    return "".join(MARKS[verdicts.get(run, "")] for run in range(max(0, last - MARKED), last))
+    return [verdicts.get(run, "") for run in range(max(0, last - MARKED), last)]
 
 
 def changes(found: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes with their run, the latest first, regressions first within a run."""
-    told = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
-    return sorted(told, key=lambda one: (-one[0], not one[1]["regression"]))
+    """Return all changes, each with the index of the run; the latest first, in each run regressions first."""
+    found_changes = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
+    return sorted(found_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 
 
-def _by_robot(found: History) -> Told:
-    """Return the changes of each source, the latest first."""
-    grouped: Told = {}
+def _changes_by_source(found: History) -> ChangesBySource:
+    grouped: ChangesBySource = {}
     for run, change in changes(found):
         grouped.setdefault(change["robot"], []).append((run, change))
     return grouped
 
 
-def _of(told: Told, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
-    """Return the changes of a robot under all names that its file has had."""
-    return [
-        one for source in dict.fromkeys(point["source"] for point in points) for one in told.get(source, [])
-    ]
+def _changes_of(grouped: ChangesBySource, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
+    """Return the changes of a robot under all sources of the robot."""
+    sources = dict.fromkeys(point["source"] for point in points)
+    return [one for source in sources for one in grouped.get(source, [])]
 
 
 def words_of(change: ChangeEntry) -> str:
@@ -417,8 +411,8 @@ def _date(run: ValidationRun) -> str:
 
 
 def as_html(found: History, command: str | None = None) -> str:
-    """Return a page with charts and the history of each robot. The template escapes all names."""
-    told = _by_robot(found)
+    """Return a page with charts and the history of each robot; the template escapes all names."""
+    grouped = _changes_by_source(found)
     return rendered(
         "history.html.j2",
         headline=headline(found),
@@ -429,7 +423,7 @@ def as_html(found: History, command: str | None = None) -> str:
         charted=range(max(0, len(found.runs) - CHARTED), len(found.runs)),
         stacks=_stacks(found),
         height=_height,
-        robots=[_robot(found, robot, points, told) for robot, points in found.robots.items()],
+        robots=[_robot(found, robot, points, grouped) for robot, points in found.robots.items()],
         changes=changes(found)[:SHOWN],
         total=len(changes(found)),
         unusable=found.unusable,
@@ -444,7 +438,7 @@ def as_html(found: History, command: str | None = None) -> str:
 
 
 def _stacks(found: History) -> list[dict[str, Counter[str]]]:
-    """Return for each run the number of robots by verdict, and the number of findings by severity."""
+    """Return, for each run, the number of robots by verdict and the number of findings by severity."""
     stacks: list[dict[str, Counter[str]]] = [
         {"verdicts": Counter(), "findings": Counter()} for _ in found.runs
     ]
@@ -457,7 +451,7 @@ def _stacks(found: History) -> list[dict[str, Counter[str]]]:
 
 
 def _height(share: Units) -> float:
-    """Return the height of a bar on the logarithmic axis from a thousandth of the bound to the bound.
+    """Return the height of a bar (%) on a logarithmic axis from a thousandth of the bound to the bound.
 
     >>> [_height(x) for x in (0.0, 0.001, 1.0, 7.0, None)]
     [2.0, 2.0, 100.0, 100.0, 100.0]
@@ -467,18 +461,15 @@ def _height(share: Units) -> float:
     return max(2.0, 100.0 * (1.0 - math.log10(share) / _LOWEST)) if share else 2.0
 
 
-def _robot(found: History, robot: str, points: Sequence[Point], told: Told) -> dict[str, Any]:
-    verdicts = {point["run"]: point["verdict"] for point in points}
-    last = len(found.runs)
-    shown = range(max(0, last - MARKED), last)
-    changed = _of(told, points)
+def _robot(found: History, robot: str, points: Sequence[Point], grouped: ChangesBySource) -> dict[str, Any]:
+    verdicts, own_changes = _latest_verdicts(found, points), _changes_of(grouped, points)
     return {
         "name": robot,
         "points": points[: -_LISTED - 1 : -1],
         "last": points[-1],
-        "verdicts": [verdicts.get(run, "") for run in shown],
-        "good": sum(verdicts.get(run) == "verified" for run in shown),
-        "changes": changed[:_LISTED],
-        "total": len(changed),
-        "is_current": points[-1]["run"] == last - 1,
+        "verdicts": verdicts,
+        "good": verdicts.count("verified"),
+        "changes": own_changes[:_LISTED],
+        "total": len(own_changes),
+        "is_current": points[-1]["run"] == len(found.runs) - 1,
     }

@@ -1,8 +1,8 @@
 """Report as an HTML page that works offline, uses no network and escapes every name.
 
-A large report is split: the page has the summary, and a file for each robot has its details. The page loads
-a robot's file when you unfold the robot. The files are scripts, because a page that is opened from disk
-cannot load other types of files.
+A large report is split: the page has the summary, and each robot has a file with its details. The page loads
+a robot's file when the reader unfolds the robot. The files are scripts, because a page that is opened from
+disk cannot load other types of files.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from urdfkin.report import pages
 from urdfkin.report.figures import distributions, scene
 from urdfkin.report.words import (
     VERDICTS,
+    accuracy_words,
     check_name,
     columns,
     counted,
     in_order,
-    judged_on,
     percent,
     pinocchio,
     second_oracle_cells,
@@ -36,6 +36,7 @@ from urdfkin.report.words import (
     units,
     verdict_counts,
     worst,
+    worst_cell,
 )
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
@@ -47,20 +48,20 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-#: With at most this number of robots, all details are open when the page loads.
+#: Maximum number of robots of a page whose details are all open when the page loads.
 _OPEN = 1
-#: The details of the first failed robots are open when the page loads.
+#: Maximum number of failed robots whose details are open when the page loads.
 _FAILURES_OPEN = 20
-#: With more robots than this, histograms are drawn only for robots that are not verified.
-#: A histogram takes a second.
+#: Maximum number of robots with histograms, each of which takes a second.
+#: In a larger report, only robots that are not verified have histograms.
 _DRAWN = 100
-#: If the details of all robots have more characters, each robot's details are in a separate file.
+#: Maximum number of characters of all details in one page; otherwise, each robot has a separate file.
 MOST = 5_000_000
 
 
 @cache
 def environment() -> Environment:
-    """Return the template environment. It escapes every name and rejects undefined variables."""
+    """Return the template environment, which escapes every name and rejects undefined variables."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -92,16 +93,14 @@ def as_is(text: str) -> Markup:
 
 
 def as_html(document: Document) -> str:
-    """Return the report as one page. The template escapes all names, even `<script>`."""
+    """Return the report as one page; the template escapes all names, even `<script>`."""
     document = _worst_first(document)
-    return _page(
-        document,
-        [_summary(robot, i) | _robot(robot, i, document) for i, robot in enumerate(document["robots"])],
-    )
+    robots = enumerate(document["robots"])
+    return _page(document, [_summary(robot, i) | _robot(robot, i, document) for i, robot in robots])
 
 
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
-    """Yield the path of each file relative to the page, and its text; the page is last.
+    """Yield the path and the text of each file; a path is relative to the page, and the page is last.
 
     If all details together are longer than `MOST` characters, each robot has its own file. For the page
     `report.html`, these files are in the folder `report-robots`.
@@ -163,7 +162,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 
 
 def _summary(robot: ReportedRobot, index: int) -> dict[str, Any]:
-    """Return the data for the heading of a robot's section; a closed section shows only its heading."""
+    """Return the data for the heading of a robot's section."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
     return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
 
@@ -177,16 +176,13 @@ def _totals(document: Document) -> dict[str, Any]:
         "frames": sum(len(robot["frames"]) for robot in robots),
         "results": sum(robot["results"] for robot in robots),
         "failed": sum(robot["failed"] for robot in robots),
-        "worst": units(worst(check["worst"] for check in checks), compared=bool(checks)),
+        "worst": worst_cell(checks),
         "share": percent(worst(map(share_of, robots))) if checks else "",
     }
 
 
 def _model_verdict(document: Document) -> dict[str, Any]:
-    """Return the banner about problems in the robots' files.
-
-    The banner has a colour, a title, the counts of findings, and the robot to look at first.
-    """
+    """Return the banner about problems in the robots' files: colour, title, counts, first affected robot."""
     severities = ("error", "warning", "note")
     found = [
         Counter[str](finding["severity"] for finding in robot["findings"]) for robot in document["robots"]
@@ -198,22 +194,20 @@ def _model_verdict(document: Document) -> dict[str, Any]:
     ]
     worst_word = next((word for word in severities if word in worst_of_file), "")
     affected, files = worst_of_file.count(worst_word), counted(len(found), "file")
-    total = Counter[str]()
-    for counts in found:
-        total.update(counts)
+    total = sum(found, Counter[str]())
     words = ", ".join(counted(total[word], word) for word in severities if total[word])
     if not found:
-        answer, title = "warn", "No model was read"
+        colour, title = "warn", "No model was read"
     elif any(unread):
-        answer, title = "bad", f"{sum(unread)} of {files} unusable"
+        colour, title = "bad", f"{sum(unread)} of {files} unusable"
     elif worst_word == "error":
-        answer, title = "bad", f"Errors in {affected} of {files}"
+        colour, title = "bad", f"Errors in {affected} of {files}"
     elif worst_word == "warning":
-        answer, title = "warn", f"Warnings in {affected} of {files}"
+        colour, title = "warn", f"Warnings in {affected} of {files}"
     else:
-        answer, title = "good", "No errors and no warnings"
+        colour, title = "good", "No errors and no warnings"
     return {
-        "verdict": answer,
+        "verdict": colour,
         "title": title,
         "counts": f"{words}." if words else "The linter has no findings." if found else "",
         "first": worst_of_file.index(worst_word) if worst_word else None,
@@ -253,8 +247,8 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
             for check in in_order(robot)
             if title and "second_oracle" in check
         ],
-        "judged": pages.judged_rows(robot["judge"]) if robot["judge"] else [],
-        "judged_on": judged_on(robot["judge"]) if robot["judge"] else "",
+        "accuracy": pages.accuracy_rows(robot["judge"]) if robot["judge"] else [],
+        "accuracy_words": accuracy_words(robot["judge"]) if robot["judge"] else "",
         "many": installed(),
         "heat_heads": heads,
         "heat": heat,
@@ -263,18 +257,14 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
 
 
 def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
-    """Return the plot of a robot, or an empty text.
-
-    The text is empty if matplotlib is not installed, or if the plots of all robots would take too long. The
-    tables contain the same numbers.
-    """
+    """Return the plot of a robot; empty without matplotlib, and for verified robots of a large report."""
     if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
         return ""
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 
 
 def when(started: str) -> str:
-    """Return the start time as text. If the input is not an ISO date, return the input."""
+    """Return the start time as text; an input that is not an ISO date is returned unchanged."""
     try:
         moment = datetime.fromisoformat(started)
     except ValueError:

@@ -1,8 +1,7 @@
 """JUnit XML of a report, and of the checks of `urdfkin verify`.
 
-The layout conforms to the schema of Jenkins, junit-10.xsd, which other programs read too. Some of these
-programs ignore the XML attributes of the element `failure`. The text of this element therefore contains all
-information.
+The layout conforms to the schema of Jenkins, junit-10.xsd, which other programs read too. The text of the
+element `failure` contains all information, because some programs ignore the attributes of this element.
 """
 
 from __future__ import annotations
@@ -32,9 +31,10 @@ _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 
 def as_junit(document: Document) -> bytes:
-    """Return a JUnit XML file with a suite for each robot, and a case for each quantity and reference."""
+    """Return JUnit XML with a suite for each robot, and a case for each quantity and reference frame."""
     suites = [_suite(robot, document) for robot in document["robots"]]
-    if _incomplete(document):
+    robots = document["robots"]
+    if document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots)):
         suites.insert(0, _whole_run(document))
     counts = {name: str(sum(int(suite.get(name, "0")) for suite in suites)) for name in _COUNTS}
     root = ET.Element("testsuites", {"name": "urdfkin validate", "time": _time(document["seconds"])} | counts)
@@ -44,11 +44,8 @@ def as_junit(document: Document) -> bytes:
 
 def _bytes(root: ET.Element) -> bytes:
     ET.indent(root)
-    return (
-        b'<?xml version="1.0" encoding="UTF-8"?>\n'
-        + _clean(ET.tostring(root, encoding="unicode")).encode()
-        + b"\n"
-    )
+    text = _clean(ET.tostring(root, encoding="unicode"))
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
@@ -107,12 +104,6 @@ def _suite_element(
         ET.SubElement(properties, "property", {"name": key, "value": _clean(value)})
     suite.extend(cases)
     return suite
-
-
-def _incomplete(document: Document) -> bool:
-    """Whether the run has an error that concerns no single robot."""
-    robots = document["robots"]
-    return document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots))
 
 
 def _whole_run(document: Document) -> ET.Element:

@@ -1,4 +1,4 @@
-"""Print tables on a terminal of any width: names on the left, numbers on the right with six digits."""
+"""Print tables on a terminal of any width; numbers have six digits and are right-aligned."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def print_document(out: Console, document: TextDocument) -> None:
-    """Print a document. Sentences are never wrapped, so that they can be copied."""
+    """Print a document without wrapping sentences, so that a reader can copy them."""
     if document.title:
         out.print(document.title, style="bold")
     for part in document.parts:
@@ -28,11 +28,11 @@ def print_document(out: Console, document: TextDocument) -> None:
 
 
 def print_table(out: Console, table: Table) -> None:
-    """Print a table with numbers at six digits. The names in the first column are never split over two lines.
+    """Print a table with numbers at six digits; a name in the first column is never split over two lines.
 
-    Numbers below the rounding error of the table's largest number are shown as 0; JSON output has full
-    precision. On a narrow terminal a long name is on its own line, above the other cells of its row. If the
-    previous row has the same name, this line is left out.
+    Numbers below the rounding error of the table's largest number are shown as 0. On a narrow terminal, a
+    long name is on its own line above the other cells of the row. This line is left out if the previous row
+    has the same name.
     """
     from rich.cells import cell_len
 
@@ -65,7 +65,7 @@ def print_table(out: Console, table: Table) -> None:
 
 
 def fits(out: Console, table: Table) -> bool:
-    """Whether a table fits the terminal; two spaces separate columns, and one follows the last column."""
+    """Return whether a table fits the terminal with two spaces between columns and one after the last."""
     return sum(width + 2 for width in _cells(table)[2]) - 1 <= out.width
 
 

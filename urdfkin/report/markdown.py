@@ -1,9 +1,10 @@
-"""Markdown for a comment on a pull request: verdict, table, and failures with their replay commands."""
+"""Markdown for a comment on a pull request: verdict, table, and failures with commands to reproduce them."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
+from itertools import accumulate
 
 from urdfkin.errors.escape import markdown_code, printable
 from urdfkin.errors.escape import markdown_text as text
@@ -12,11 +13,10 @@ from urdfkin.report.words import (
     check_name,
     columns,
     counted,
-    percent,
     second_oracle_heads,
     second_oracle_rows,
     second_oracle_title,
-    share_of,
+    share_cell,
     summary,
     units,
     worst_of,
@@ -26,7 +26,7 @@ from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 #: GitHub accepts comments of up to 65,536 characters.
 LIMIT = 60_000
 _MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
-#: At most this number of failed checks is shown for each robot.
+#: Maximum number of failed checks that are shown for each robot.
 _SHOWN = 3
 
 
@@ -46,7 +46,7 @@ def as_markdown(document: Document) -> str:
     ]
     foot = [
         "",
-        *_three_sides(document["robots"]),
+        *_cross_check_table(document["robots"]),
         "Worst disagreement for each quantity in eps·scale; rounding gives 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
@@ -60,54 +60,47 @@ def as_markdown(document: Document) -> str:
     return "\n".join(head + _body(robots, room) + foot)
 
 
-def _three_sides(robots: list[ReportedRobot]) -> list[str]:
+def _cross_check_table(robots: list[ReportedRobot]) -> list[str]:
     if (title := second_oracle_title(robots)) is None:
         return []
     heads = ["quantity", *map(text, second_oracle_heads(title))]
-    lines = [
+    rows = (map(text, (name, *cells)) for name, cells in second_oracle_rows(robots, title))
+    return [
         f"Comparison of urdfkin, Pinocchio and {text(title)}: the largest ratio of a disagreement to its"
         " bound, for each pair of libraries:",
         "",
-        _row(heads),
-        _row(["---", *["---:"] * (len(heads) - 2), "---"]),
+        *table_lines(heads, rows, left=(0, len(heads) - 1)),
+        "",
     ]
-    lines += (_row(map(text, (name, *cells))) for name, cells in second_oracle_rows(robots, title))
-    return [*lines, ""]
 
 
 def _body(robots: list[ReportedRobot], room: int) -> list[str]:
     quantities = columns(robots)
     heads = ["robot", "joints", "frames", "results", *map(text, quantities), "of bound", "verdict"]
-    lines = [_row(heads), _row(["---", *["---:"] * (len(heads) - 2), "---"])]
-    left = room - sum(len(line) + 1 for line in lines) - 200
-    tails: list[str] = []
-    for shown, robot in enumerate(robots):
-        row, tail = _row(_cells(robot, list(quantities.values()))), _details(robot)
-        left -= len(row) + sum(len(line) + 1 for line in tail) + 1
-        if left < 0:
-            rest = robots[shown:]
-            good = sum(robot["verdict"] == "verified" for robot in rest)
-            tails += [
-                "",
-                f"{counted(len(rest), 'further robot')} left out, because the comment is full; {good} of"
-                " them verified.",
-            ]
-            break
-        lines.append(row)
-        tails += tail
-    return lines + tails
+    lines = table_lines(heads, left=(0, len(heads) - 1))
+    parts = [(row_line(_cells(robot, list(quantities.values()))), _details(robot)) for robot in robots]
+    room -= sum(len(line) + 1 for line in lines) + 200
+    shown = count_within(["\n".join([row, *details]) for row, details in parts], room)
+    tails = [line for _, details in parts[:shown] for line in details]
+    if rest := robots[shown:]:
+        good = sum(robot["verdict"] == "verified" for robot in rest)
+        tails += [
+            "",
+            f"{counted(len(rest), 'further robot')} left out, because the comment is full; {good} of"
+            " them verified.",
+        ]
+    return [*lines, *(row for row, _ in parts[:shown]), *tails]
 
 
 def _cells(robot: ReportedRobot, quantities: list[tuple[str, ...]]) -> list[str]:
     verdict = robot["verdict"]
-    share = percent(share_of(robot)) if robot["checks"] else ""
     return [
         markdown_code(shortened(robot["source"], 60)),
         str(len(robot["joints"])),
         str(len(robot["frames"])),
         f"{robot['results']:,}",
         *(worst_of(robot, names) for names in quantities),
-        share,
+        share_cell(robot),
         f"{_MARKS[verdict]} {verdict}",
     ]
 
@@ -130,8 +123,21 @@ def _details(robot: ReportedRobot) -> list[str]:
     return lines
 
 
-def _row(cells: Iterable[str]) -> str:
+def row_line(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
+
+
+def table_lines(
+    heads: Sequence[str], rows: Iterable[Iterable[str]] = (), left: Collection[int] | None = None
+) -> list[str]:
+    """Return the lines of a table of escaped cells; `left` are the left-aligned columns (default: all)."""
+    marks = ["---" if left is None or i in left else "---:" for i in range(len(heads))]
+    return [row_line(cells) for cells in (heads, marks, *rows)]
+
+
+def count_within(texts: Sequence[str], room: int) -> int:
+    """Return how many of the first texts fit into `room` characters, with a line end after each text."""
+    return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 
 def fenced(code: str) -> str:

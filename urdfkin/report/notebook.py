@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class NotebookView:
-    """The 3D view that `Robot.view` returns in a notebook: `q` (nq,) at the start, `height` in pixels."""
+    """The 3D view that `Robot.view` returns in a notebook; `q` (nq,) is the first configuration."""
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
         self._name, self._height = robot.name, height

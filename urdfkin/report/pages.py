@@ -11,17 +11,19 @@ from urdfkin.dh.units import Units as DisplayUnits
 from urdfkin.model.configuration import range_words
 from urdfkin.model.summary import axis_words
 from urdfkin.report.words import (
-    SIDES,
     column,
     columns,
     counted,
+    error_cells,
     in_order,
-    nearer,
+    more_accurate,
     percent,
     quantity_name,
+    share_cell,
     share_of,
     units,
     worst,
+    worst_cell,
     worst_of,
 )
 from urdfkin.validation.document import (
@@ -38,8 +40,7 @@ from urdfkin.validation.document import (
 
 _READABLE = DisplayUnits(digits=6)
 
-#: These ratios of a disagreement to its bound are the upper edges of the heat map's colour steps.
-#: A result above the last edge is outside its bound.
+#: Upper edges of the heat map's colour steps: ratios of a disagreement to its bound.
 HEAT_STEPS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
@@ -60,9 +61,9 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
         "results": robot["results"],
         "failed": robot["failed"],
         "quantities": [(worst_of(robot, names), _key(robot, names)) for names in quantities_of],
-        "worst": units(largest, compared=bool(checks)),
+        "worst": worst_cell(checks),
         "worst_key": _sortable(largest) if checks else -1.0,
-        "share": percent(share) if checks else "",
+        "share": share_cell(robot),
         "share_key": _sortable(share) if checks else -1.0,
         "findings": ", ".join(
             counted(count, word) for word in ("error", "warning") if (count := _findings(robot, word))
@@ -73,7 +74,7 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
 
 
 def reason(robot: ReportedRobot) -> str:
-    """Return the reason of a verdict without the errors of the file, which the page lists as findings."""
+    """Return the reason of a verdict without the errors in the file, which the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -94,7 +95,6 @@ def _sortable(value: Units) -> float:
 
 
 def joint_rows(model: ReportedModel) -> list[dict[str, Any]]:
-    """Return a row for each joint with its limits, in the order of q."""
     return [
         {
             "name": joint["name"],
@@ -111,10 +111,7 @@ def joint_rows(model: ReportedModel) -> list[dict[str, Any]]:
 
 
 def _remaining_range(joint: ReportedJoint) -> str:
-    """Return a sentence about the part of a joint's range in which its mimic joints are within their limits.
-
-    The text is empty if the mimic joints do not narrow the range.
-    """
+    """Return a sentence about limits of mimic joints that narrow a joint's range; otherwise an empty text."""
     kept = joint.get("kept")
     if kept is None:
         return ""
@@ -152,9 +149,9 @@ def _limits(limit: ReportedLimit | None, kind: str) -> dict[str, str]:
 def heat_map(
     robot: ReportedRobot, model: ReportedModel
 ) -> tuple[list[str], list[tuple[str, list[HeatCell]]]]:
-    """Return the column heads, and the name and cells of each moving joint.
+    """Return the column heads, and a row with the name and the cells of each moving joint.
 
-    A cell shows the worst disagreement of all reference frames.
+    A cell shows the largest disagreement in all reference frames.
     """
     quantities_of = columns([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
@@ -172,7 +169,7 @@ def heat_map(
 
 
 def _columns(model: ReportedModel) -> dict[str, list[int]]:
-    """For each joint, return the indices of its columns in the Jacobian with mimic joints."""
+    """Return, for each joint, the indices of its columns in the Jacobian of all joints."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -196,12 +193,11 @@ def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatC
 def _share(check: ReportedCheck, subject: int) -> float:
     """Return an upper estimate of (disagreement / bound) for one frame, joint or column.
 
-    The document does not contain the bound of a single frame, joint or column. Therefore, the function
-    divides the disagreement by the smallest bound of the check. The result is at most `share_of_bound`, which
-    is the largest ratio in the whole check.
+    The document has no bound for a single frame, joint or column. Therefore, the disagreement is divided by
+    the smallest bound of the check. The estimate is at most the largest ratio in the check.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
-    if not value:  # A disagreement of 0 lies within every bound.
+    if not value:  # a disagreement of 0 lies within every bound
         return math.inf if value is None else 0.0
     if not tightest:
         return math.inf
@@ -209,57 +205,46 @@ def _share(check: ReportedCheck, subject: int) -> float:
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
-    """Return a table's rows as cells: joint, a, alpha, d, theta, and beta if a row has one.
+    """Return a table's rows as cells: joint, a, alpha, beta if the chain has any, d, theta.
 
     The cell of theta (revolute joint) or d (prismatic joint) also contains q.
     """
-    return [_dh_cells(row, has_beta(chain)) for row in _rows(chain, convention)]
+    rows = chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
+    return [_dh_cells(row, has_beta(chain)) for row in rows]
 
 
 def has_beta(chain: Chain) -> bool:
-    return any(row["beta"] != 0.0 for key in ("standard", "modified") for row in _rows(chain, key))
-
-
-def _rows(chain: Chain, convention: str) -> list[ReportedDHRow]:
-    return chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
+    return any(row["beta"] != 0.0 for row in (*chain["standard"]["rows"], *chain["modified"]["rows"]))
 
 
 def _dh_cells(row: ReportedDHRow, beta: bool) -> list[str]:
-    sign = "+" if row["sense"] > 0 else "−"
-    is_prismatic = row["kind"] == "prismatic"
-    d, theta = metres(row["d"]), angle(row["theta"])
-    d = _plus(d, f"{sign} q") if is_prismatic else d
-    theta = theta if is_prismatic else _plus(theta, f"{sign} q")
+    cells = {"d": _length(row["d"]), "theta": angle(row["theta"])}
+    variable = "d" if row["kind"] == "prismatic" else "theta"
+    constant, q = cells[variable], "+ q" if row["sense"] > 0 else "− q"
+    cells[variable] = q.removeprefix("+ ") if constant == "0" else f"{constant} {q}"
     betas = [angle(row["beta"])] if beta else []
-    return [row["joint"], metres(row["a"]), angle(row["alpha"]), *betas, d, theta]
+    return [row["joint"], _length(row["a"]), angle(row["alpha"]), *betas, *cells.values()]
 
 
-def _plus(constant: str, variable: str) -> str:
-    if constant == "0":
-        return variable.removeprefix("+ ")
-    return f"{constant} {variable}"
+def _length(metres: float) -> str:
+    return _READABLE.length(metres).replace("-", "−")
 
 
-def metres(value: float) -> str:
-    return _READABLE.length(value).replace("-", "−")
+def angle(radians: float) -> str:
+    """Format an angle; an exact multiple of pi/12 is written with π."""
+    return _READABLE.angle(radians, pi="π").replace("-", "−")
 
 
-def angle(value: float) -> str:
-    """Format an angle in radians; an exact multiple of pi/12 is shown as such."""
-    return _READABLE.angle(value, pi="π").replace("-", "−")
-
-
-def judged_rows(judgement: ReportedAccuracy) -> list[dict[str, Any]]:
+def accuracy_rows(study: ReportedAccuracy) -> list[dict[str, Any]]:
     return [
         {
             "quantity": quantity_name(line["quantity"]),
             "reference": line["reference"] or "",
             "numbers": line["numbers"],
-            "worst": [f"{line[side]['worst']:.2f}" for side in SIDES],
-            "typical": [f"{line[side]['typical']:.3f}" for side in SIDES],
-            "nearer": nearer(line),
+            "errors": error_cells(line),
+            "more_accurate": more_accurate(line),
         }
-        for line in judgement["lines"]
+        for line in study["lines"]
     ]
 
 

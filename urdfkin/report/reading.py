@@ -1,6 +1,6 @@
-"""Reader of report documents. This module checks the layout and the consistency of all entries.
+"""Read report documents, and check the layout and the consistency of all entries.
 
-A report is used as evidence, but it may have been edited or truncated. Entries that follow from other entries
+A report is used as evidence, but may have been edited or truncated. Entries that follow from other entries
 are computed again and compared: the outcome, verdicts, sums, ratios and percentiles. The links and joints of
 a robot must form a tree, and the indices of the joints in q and v must be consistent.
 """
@@ -31,11 +31,10 @@ from urdfkin.validation.error_stats import histogram_bin, percentile
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
-#: nq and nv of joint kinds
-_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
-_ONE = (1, 1)
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
-#: Rotations and unit axes may come from text with 6 digits.
+#: nq and nv of each kind of joint.
+_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(_WITH_AXIS, (1, 1))
+#: Tolerance of rotation matrices and unit axes, which may come from text with 6 digits.
 _ROUNDED = 1e-5
 
 
@@ -50,11 +49,7 @@ def moving_names(model: ReportedModel) -> list[str]:
 
 def column_names(model: ReportedModel) -> list[str]:
     """Return the joint name of each Jacobian column, if mimic joints have their own columns."""
-    return [joint["name"] for joint in model["joints"] for _ in range(_size(joint)[1])]
-
-
-def _size(joint: ReportedJoint) -> tuple[int, int]:
-    return _SIZES.get(joint["kind"], _ONE)
+    return [joint["name"] for joint in model["joints"] for _ in range(_SIZES[joint["kind"]][1])]
 
 
 def model_contradictions(model: ReportedModel, chains: Sequence[Chain]) -> Iterator[str]:
@@ -95,16 +90,17 @@ def _joint(joint: ReportedJoint, joints: Sequence[ReportedJoint]) -> Iterator[st
         yield f"{where}: axis {axis} is not a unit vector"
     rows = joint["placement"]
     R = [row[:3] for row in rows[:3]]
-    dots = [sum(a * b for a, b in zip(R[i], R[j], strict=True)) - (i == j) for i, j in _PAIRS]
-    if rows[3] != [0.0, 0.0, 0.0, 1.0] or max(map(abs, dots)) > _ROUNDED:
+    errors = [
+        abs(sum(a * b for a, b in zip(R[i], R[j], strict=True)) - (i == j))
+        for i in range(3)
+        for j in range(i + 1)
+    ]
+    if rows[3] != [0.0, 0.0, 0.0, 1.0] or max(errors) > _ROUNDED:
         yield f"{where}: its placement is not a rigid transform"
     if mimic is not None:
         leader = next((other for other in joints if other["name"] == mimic["leader"]), None)
-        if leader is None or leader["mimic"] is not None or _size(leader) != _ONE or _size(joint) != _ONE:
+        if leader is None or leader["mimic"] or not {joint["kind"], leader["kind"]} <= set(_WITH_AXIS):
             yield f"{where}: it cannot mimic {mimic['leader']}"
-
-
-_PAIRS = [(i, j) for i in range(3) for j in range(i + 1)]
 
 
 def _numbering(model: ReportedModel) -> Iterator[str]:
@@ -112,7 +108,7 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
     q, v, places = 0, 0, dict[str, tuple[int | None, int | None]]()
     for joint in model["joints"]:
         if joint["mimic"] is None:
-            nq, nv = _size(joint)
+            nq, nv = _SIZES[joint["kind"]]
             places[joint["name"]] = (q, v) if nq else (None, None)
             q, v = q + nq, v + nv
     for joint in model["joints"]:
@@ -126,9 +122,9 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
         )
 
 
-#: Relative tolerance of recomputed quotients
-_ALIKE = 1e-9
-#: Maximum plausible count
+#: Relative tolerance of recomputed quotients.
+_TOLERANCE = 1e-9
+#: Maximum number of results; a double represents all smaller integers.
 _MOST = 2**53
 
 
@@ -162,10 +158,13 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
     elif robot["checks"] or robot["chains"]:
         yield "`model` is missing, but something was compared"
         return
-    for what in ("results", "failed"):
-        counted = sum(check["results" if what == "results" else "failed"] for check in robot["checks"])
-        if robot["results" if what == "results" else "failed"] != counted:
-            yield f"`{what}` is not {counted}, the sum of the robot's checks"
+    sums = {
+        "results": (robot["results"], sum(check["results"] for check in robot["checks"])),
+        "failed": (robot["failed"], sum(check["failed"] for check in robot["checks"])),
+    }
+    for name, (value, expected) in sums.items():
+        if value != expected:
+            yield f"`{name}` is not {expected}, the sum of the robot's checks"
     yield from _verdict(robot, document["samples"] + SPECIAL)
     names = [(check["quantity"], check["reference"]) for check in robot["checks"]]
     if len(set(names)) != len(names):
@@ -248,7 +247,7 @@ def _check(
         yield f"`worst` is {check['worst']}, which is not in the last bin of the histogram"
     for name, percent, stated in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
         computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
-        if not math.isclose(_as_number(stated), computed, rel_tol=_ALIKE):
+        if not math.isclose(_as_number(stated), computed, rel_tol=_TOLERANCE):
             yield f"`{name}` is {stated}, but the histogram gives {computed:g}"
     yield from _share(check)
     yield from _case(check, subjects, robot, document["samples"] + SPECIAL)
@@ -257,19 +256,19 @@ def _check(
 def _share(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
 
-    The smallest possible value of `share_of_bound` is the worst disagreement divided by the largest bound.
-    The largest possible value is the worst disagreement divided by the smallest bound.
+    The ratio is at least the worst disagreement divided by the largest bound, and at most the worst
+    disagreement divided by the smallest bound.
     """
     share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `share_of_bound` is {share:g}"
     if low > high:
-        if share or largest or check["worst_case"]:  # Nothing was compared, so there is no bound.
+        if share or largest or check["worst_case"]:  # without a comparison, there is no bound
             yield f"`bound` is {check['bound']}, but something was compared"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
-    if not (ends[0] * (1.0 - _ALIKE) <= share <= ends[1] * (1.0 + _ALIKE)):
+    if not (ends[0] * (1.0 - _TOLERANCE) <= share <= ends[1] * (1.0 + _TOLERANCE)):
         yield f"`share_of_bound` is {share:g}, but `worst` is {largest:g} and `bound` is {low:g} to {high:g}"
 
 
@@ -292,9 +291,9 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
             f"`worst_case` has {case['disagreement']} at {case['frame']}, but its worst disagreement"
             f" is {of_frame}"
         )
-    share, low, high = _as_number(check["share_of_bound"]), check["bound"][0] or 0.0, check["bound"][1] or 0.0
-    units = _as_number(case["disagreement"])
-    if math.isfinite(units) and not share * low * (1 - _ALIKE) <= units <= share * high * (1 + _ALIKE):
+    share, units = _as_number(check["share_of_bound"]), _as_number(case["disagreement"])
+    low, high = (share * (bound or 0.0) for bound in check["bound"])
+    if math.isfinite(units) and not low * (1 - _TOLERANCE) <= units <= high * (1 + _TOLERANCE):
         yield f"`worst_case`: the disagreement {units:g} is not {share:g} times a bound"
     if model is not None and (len(case["q"]), len(case["v"]), len(case["a"])) != (
         model["nq"],
@@ -310,7 +309,7 @@ def _as_number(units: Units) -> float:
     return math.inf if units is None else units
 
 
-#: A message shows at most this number of contradictions.
+#: Maximum number of contradictions in a message.
 _SHOWN = 3
 
 
@@ -326,7 +325,7 @@ def read_document(path: Path) -> Document:
 
 
 def stored_document(folder: Path) -> Document:
-    """Read the document from a store; the checks and errors are those of `read_document`."""
+    """Return the document of a store, after the same checks as in `read_document`."""
     from urdfkin.validation.campaign import stored
 
     return checked(stored(folder).as_dict(), str(folder))

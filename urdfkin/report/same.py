@@ -18,22 +18,21 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
+from urdfkin.report.markdown import table_lines
 from urdfkin.report.words import counted
 from urdfkin.robot import Robot
 
-#: Without --all, this number of lines is shown for each kind of difference.
+#: Number of lines for each kind of difference that are shown without --all.
 SHOWN = 12
-#: This line is printed if the models differ and their joints were not matched by name.
+#: Line for models that differ and whose joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
-#: These attributes of `Interval` are the largest found angle, and the proven bound on the angle.
-TURNED = ("radians_seen", "radians")
-#: This question asks whether the two robots are equivalent.
+#: The question whether the two robots are equivalent.
 EQUIVALENT = SameQuestion()
-#: A distance is printed only if its bound is larger than DUST times the rounding error.
-#: The sum of several terms has additional rounding errors, so DUST is larger than 1.
-DUST = 1.001
-#: This heading is for joints with mimic joints that can exceed their own limits.
+#: Factor above 1: distances up to FACTOR * (rounding error) count as rounding and are not printed.
+#: The sum of several terms has additional rounding errors.
+FACTOR = 1.001
+#: Heading for joints whose mimic joints can exceed their limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -67,7 +66,7 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 
 
 def _within(found: Sameness, most: float) -> str:
-    """Return the answer to `--within`. If a frame exceeds the distance, the answer names the frame."""
+    """Return the answer to `--within`, with the name of a frame that exceeds the distance."""
     limit = f"WITHIN {most:g} m and rad without changes of B: "
     if found.within(most):
         return f"{limit}no frame is ever off by more than {_both(*found.written)}"
@@ -86,15 +85,15 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Return a text with the largest distance and the largest angle between matching frames.
+    """Return a text with the largest distance and angle between matching frames; empty: only rounding."""
 
-    The text is empty if distance and angle are only rounding errors.
-    """
-    lower, upper = (max((getattr(one, end) for one in frames), default=0.0) for end in ("lower", "upper"))
-    seen, radians = (max((getattr(one, end) for one in frames), default=0.0) for end in TURNED)
+    def largest(end: str) -> float:
+        return max((getattr(frame, end) for frame in frames), default=0.0)
+
+    upper, radians = largest("upper"), largest("radians")
     parts: list[tuple[Callable[[float], str], float, float]] = []
-    parts += [(length, lower, upper)] if upper > DUST * rounding[0] else []
-    parts += [(angle, seen, radians)] if radians > DUST * rounding[1] else []
+    parts += [(length, largest("lower"), upper)] if upper > FACTOR * rounding[0] else []
+    parts += [(angle, largest("radians_seen"), radians)] if radians > FACTOR * rounding[1] else []
     if any(math.isinf(most) for _, _, most in parts):
         least = " and ".join(f"{words(low)} or more" for words, low, _ in parts if low)
         return f" by {least} (no bound is proven)" if least else ", and no bound is proven"
@@ -106,17 +105,15 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Return a text with the distance and the angle between a frame of A and the matching frame of B.
-
-    The text is empty if distance and angle are only rounding errors.
-    """
-    parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > DUST * rounding[0] else []
-    parts += [up_to(angle, frame.radians_seen, frame.radians)] if frame.radians > DUST * rounding[1] else []
+    """Return a text with the distance and the angle of two matching frames; empty: only rounding."""
+    parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
+    if frame.radians > FACTOR * rounding[1]:
+        parts.append(up_to(angle, frame.radians_seen, frame.radians))
     return " and ".join(parts)
 
 
 def far_frames(found: Sameness) -> list[Interval]:
-    """Return the frames whose bound exceeds rounding, the frame with the largest bound first."""
+    """Return the frames whose bound exceeds rounding, the largest bound first."""
     metres, radians = found.rounding
     far = [frame for frame in found.frames if frame.upper > metres or frame.radians > radians]
     return sorted(far, key=lambda frame: (-frame.upper, -frame.lower))
@@ -125,8 +122,8 @@ def far_frames(found: Sameness) -> list[Interval]:
 def farthest(found: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    The verdict "same up to single precision" is about the unchanged models. The distances in the table are
-    distances after the changes of B, so the heading lists these changes.
+    For the verdict "same up to single precision", the heading lists the changes of B, because this verdict is
+    about unchanged models and the distances are distances after the changes.
     """
     changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
     return f"Largest distance over all configurations within limits{changed}"
@@ -137,10 +134,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return a text with the distance between a frame of A and the matching frame of B, if B is not changed.
-
-    The text is empty if the distance is only a rounding error.
-    """
+    """Return a text with the distance of a frame without changes of B; empty if it is only rounding."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -149,7 +143,7 @@ def as_written(found: Sameness) -> str:
 def where(found: Sameness, frame: Interval) -> str:
     """Return the configuration at which a lower bound is attained, with units.
 
-    The text has the coordinates of A. If a joint moves on its own only in B, the text has its coordinate too.
+    The text has the coordinates of A, and the coordinates of joints of B that no joint of A moves.
     """
     from urdfkin.model.configuration import coordinate_names, units
 
@@ -164,7 +158,7 @@ def where(found: Sameness, frame: Interval) -> str:
 
 
 def renamed(found: Sameness) -> list[str]:
-    """Return lines about joints and links with different names, and about joints in a different order."""
+    """Return lines about different names of joints and links, and about a different order of joints."""
     pairs = [one for one in found.joints if one.a != one.b]
     guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
     joints = [f"joint {one.a} is {one.b}" for one in pairs]
@@ -179,13 +173,13 @@ def renamed(found: Sameness) -> list[str]:
 
 
 def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
-    """Return the answer and its reasons; with `all_`, show every line, not only the first dozen of a kind."""
+    """Return the answer with reasons; with `all_`, all lines, otherwise at most `SHOWN` of each kind."""
     sources = zip("AB", found.names, found.sources, strict=True)
     parts: list[str | Table] = [f"{which}: {name} ({source})" for which, name, source in sources]
     head = headline(found, question)
     parts.append(Strong(head, "bold green" if found.holds(question) else "bold red"))
     some = None if all_ else SHOWN
-    after, words = ((), []) if found.up_to_single and not all_ else _reasons(found)
+    after, words = _reasons(found, all_=all_)
     parts += _lines("changes of B", after, some)
     if after and as_written(found) not in head:
         parts += _lines("", [as_written(found)], some)
@@ -202,17 +196,22 @@ def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool
     return TextDocument("", [*parts, str(found.checked)])
 
 
-def _reasons(found: Sameness) -> tuple[tuple[str, ...], list[str]]:
-    """Return the changes of B and the differences as lines."""
+def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
+    """Return the changes of B and the differences; both are empty for the verdict "up to single precision".
+
+    With `all_`, both are always complete.
+    """
+    if found.up_to_single and not all_:
+        return (), []
     return found.after, [one.words for one in found.differences]
 
 
-#: Columns of the table of pairs
+#: Titles of the columns of the table of pairs.
 PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
 
 
 def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
-    """Return a row for each pair: sources, verdict, largest distance, largest single-precision distance."""
+    """Return a row of the table with the titles `PAIRS` for each pair."""
     rows = list[tuple[str, ...]]()
     for one in found:
         words = "equivalent" if one.verdict is Verdict.SAME_AFTER else one.verdict.value
@@ -228,7 +227,7 @@ def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[
 
 
 def pairs_document(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> TextDocument:
-    """Return a table of several pairs of models, followed by a line for each pair that differs."""
+    """Return a table of pairs of models, followed by a line for each pair that differs."""
     rows = _pair_rows(found, question)
     different = [
         f"{one.sources[0]} and {one.sources[1]}: {headline(one, question)}"
@@ -239,16 +238,15 @@ def pairs_document(found: Sequence[Sameness], question: SameQuestion = EQUIVALEN
 
 
 def pairs_markdown(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> str:
-    rows = [PAIRS, ("---",) * len(PAIRS), *_pair_rows(found, question)]
-    lines = [f"| {' | '.join(map(markdown_text, row) if k != 1 else row)} |" for k, row in enumerate(rows)]
-    return "\n".join(lines) + "\n"
+    rows = (map(markdown_text, row) for row in _pair_rows(found, question))
+    return "\n".join([*table_lines(PAIRS, rows), ""])
 
 
 def as_document(found: Sameness) -> TextDocument:
     """Return the verdict, its reasons and the frames with the largest distances, for `print`."""
     a, b = (f"{name} ({source})" for name, source in zip(found.names, found.sources, strict=True))
     parts: list[str | Table] = [f"A: {a}", f"B: {b}"]
-    after, words = ((), []) if found.up_to_single else _reasons(found)
+    after, words = _reasons(found)
     for head, lines in (
         ("Change of B", [*after, as_written(found)] if after else []),
         ("Difference", words),
@@ -265,7 +263,7 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Return the distance of two frames at the worst configuration in words; empty if they coincide."""
+    """Return in words the distance of two frames at the worst configuration; empty if they coincide."""
     parts = [length(frame.lower)] if frame.lower else []
     parts += [angle(frame.radians_seen)] if frame.radians_seen and not frame.lower else []
     return " and ".join(parts)
@@ -289,7 +287,7 @@ def markdown_of(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
         text(f"{name} ({source})") for name, source in zip(found.names, found.sources, strict=True)
     )
     lines = [f"## {mark} {text(headline(found, question))}", "", names, ""]
-    after, reasons = ((), []) if found.up_to_single else _reasons(found)
+    after, reasons = _reasons(found)
     for head, words in (
         ("Changes of B", [*after, as_written(found)] if after else []),
         ("Differences", reasons),
@@ -304,22 +302,20 @@ def markdown_of(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
             lines.append("")
     frames = far_frames(found)
     if frames:
-        lines += [f"{farthest(found)}:", ""]
-        lines += [f"| {' | '.join(HEADS)} |", "| --- | ---: | ---: | ---: |"]
-        lines += [f"| {' | '.join(map(text, row))} |" for row in rows(frames[: 4 * SHOWN])]
-        lines.append("")
+        cells = (map(text, row) for row in rows(frames[: 4 * SHOWN]))
+        lines += [f"{farthest(found)}:", "", *table_lines(HEADS, cells, left=[0]), ""]
     return "\n".join([*lines, text(str(found.checked)), ""])
 
 
-#: `HALF` is half the side length of a picture in units of the SVG.
-#: The robots fill the fraction `FILLED` of the picture.
+#: Half the side length of a picture (units of the SVG), and fraction of the picture that the robots fill.
 HALF, FILLED = 150.0, 0.9
-#: `SCALE` is the largest length of the scale bar, relative to the side length of the picture.
-#: `FOOT` is the distance of the scale bar from the lower edge in units of the SVG.
-SCALE, FOOT = 0.3, 6.0
-#: The axes in the close view have this share of the distance between the two frames.
+#: Maximum length of the scale bar, relative to the side length of a picture.
+SCALE = 0.3
+#: Distance of the scale bar from the lower edge of a picture, in units of the SVG.
+FOOT = 6.0
+#: Length of the axes in the close view, relative to the distance between the two frames.
 AXIS = 0.35
-#: Each view has a title, and the azimuth and elevation of its direction in radians.
+#: Views: title, azimuth (rad), elevation (rad).
 VIEWS = (("from the front", 0.6, 0.35), ("from the side", 0.6 + np.pi / 2.0, 0.35))
 
 
@@ -330,9 +326,9 @@ def as_html(
     options: Sequence[str] = (),
     started: datetime | None = None,
 ) -> str:
-    """Return the HTML page with the answer. The template escapes all names.
+    """Return an HTML page with the answer; the template escapes all names.
 
-    `options` are other options of the command line on the page. `started` is the date and time on the page.
+    `options` are further options of the command line on the page. `started` is the date and time on the page.
     """
     from urdfkin.report.html import rendered, when
     from urdfkin.verify.oracles import versions
@@ -378,8 +374,8 @@ def pictures(
     """Draw the skeletons of the two robots in two views, and an enlarged picture of the worst frame.
 
     If `worst` is None, the zero configuration is drawn. If `written`, B is drawn without the changes that
-    make it equivalent to A. The result has for each view its title, its scale bar, and three groups of lines
-    (x, y, x, y): the lines of A, the lines of B, and the lines that connect A with B.
+    make B equivalent to A. Each view has a title, a scale bar, and three groups of lines (x, y, x, y): the
+    lines of A, the lines of B, and the lines that connect A with B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -419,7 +415,7 @@ def _axes(T: FloatArray, size: float) -> FloatArray:
 def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
-    """Project the lines along the direction of view, and scale them to the size of the picture."""
+    """Project lines along the direction of view, and scale them to the size of the picture."""
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     # The first row is the direction in space that points right on the page; the second row points down.
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])

@@ -1,7 +1,7 @@
-"""Report on a terminal: tables and the failures.
+"""Report on a terminal: tables and failures.
 
-A terminal of 80 columns shows two tables. A terminal of at least 100 columns shows one wide table. The text
-contains all information that the colours show.
+A terminal with less than 100 columns shows two tables; a wider terminal shows one wide table. The words
+contain all information that the colours show.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 from urdfkin.errors.display import Table
 from urdfkin.report.listing import print_table
 from urdfkin.report.words import (
-    SIDES,
+    accuracy_words,
     check_name,
     columns,
     counted,
+    error_cells,
     in_order,
-    judged_on,
-    nearer,
+    more_accurate,
     of_quantity,
     percent,
     pinocchio,
@@ -28,10 +28,11 @@ from urdfkin.report.words import (
     second_oracle_rows,
     second_oracle_title,
     second_reader_words,
-    share_of,
+    share_cell,
     summary,
     units,
     worst,
+    worst_cell,
     worst_of,
 )
 from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobot, outcome_of
@@ -39,14 +40,15 @@ from urdfkin.validation.document import Document, ReportedAccuracy, ReportedRobo
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: A terminal of this width shows a table with a column for each quantity.
+#: Minimum width of a terminal for a table with a column for each quantity.
 _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
     """Print a report; the width of the console determines the layout.
 
-    With `cases`, the command that computes each worst case again is shown. Failures always show it.
+    Each failure has the command that computes its worst case again. With `cases`, every check has this
+    command.
     """
     robots = document["robots"]
     out.print(
@@ -66,7 +68,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
             " pair of libraries",
             style="bold",
         )
-        print_table(out, _three_sides(robots, title))
+        print_table(out, _cross_check_table(robots, title))
     for robot in robots:
         _print_robot(robot, out, cases=cases)
     found = outcome_of(document)
@@ -95,8 +97,8 @@ def _print_robots(robots: Sequence[ReportedRobot], out: Console) -> None:
     rows = [
         [
             *_counts(robot),
-            units(worst(check["worst"] for check in robot["checks"]), compared=bool(robot["checks"])),
-            percent(share_of(robot)) if robot["checks"] else "",
+            worst_cell(robot["checks"]),
+            share_cell(robot),
             robot["verdict"],
         ]
         for robot in robots
@@ -120,7 +122,7 @@ def _print_quantities(robots: Sequence[ReportedRobot], out: Console) -> None:
     print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
 
-def _three_sides(robots: Sequence[ReportedRobot], title: str) -> Table:
+def _cross_check_table(robots: Sequence[ReportedRobot], title: str) -> Table:
     rows = [[quantity_name(name), *cells] for name, cells in second_oracle_rows(robots, title)]
     heads = [head.replace(", ", ",\n") for head in second_oracle_heads(title)]
     return Table(["quantity", *heads], rows, left=(0, 5))
@@ -144,19 +146,17 @@ def _print_checks(robot: ReportedRobot, out: Console) -> None:
     print_table(out, Table(heads, rows))
 
 
-def _judged(judgement: ReportedAccuracy) -> Table:
-    """Return the errors of the accuracy study, with a row for each quantity and reference frame."""
+def _accuracy_table(study: ReportedAccuracy) -> Table:
     heads = ["quantity, reference", "numbers", "worst\nurdfkin", "\nPinocchio"]
     heads += ["typical\nurdfkin", "\nPinocchio", "smaller\nerror"]
     rows = [
         [
-            line["quantity"] + (f", {line['reference']}" if line["reference"] else ""),
+            check_name(line),
             f"{line['numbers']:,}",
-            *(f"{line[side]['worst']:.2f}" for side in SIDES),
-            *(f"{line[side]['typical']:.3f}" for side in SIDES),
-            nearer(line),
+            *error_cells(line),
+            more_accurate(line),
         ]
-        for line in judgement["lines"]
+        for line in study["lines"]
     ]
     return Table(heads, rows)
 
@@ -178,10 +178,10 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
     if robot["judge"] is not None:
         out.print(
             f"{robot['source']}: errors in eps*scale, compared with values at 50 digits;"
-            f" {judged_on(robot['judge'])}",
+            f" {accuracy_words(robot['judge'])}",
             style="bold",
         )
-        print_table(out, _judged(robot["judge"]))
+        print_table(out, _accuracy_table(robot["judge"]))
     for check in robot["checks"]:
         case = check["worst_case"]
         if case is None or not (cases or check["failed"]):

@@ -8,19 +8,17 @@ from typing import Literal
 
 from urdfkin.validation.document import (
     Document,
-    Judged,
     ReportedAccuracy,
+    ReportedAccuracyLine,
     ReportedCheck,
     ReportedRobot,
-    SecondOracle,
     Units,
 )
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES
 
-SIDES: tuple[Literal["urdfkin"], Literal["pinocchio"]] = ("urdfkin", "pinocchio")
-#: Verdicts, worse ones first
+#: Verdicts, the worst first.
 VERDICTS = tuple(verdict.value for verdict in ValidationVerdict)
 
 
@@ -28,17 +26,14 @@ def quantity_name(quantity: str) -> str:
     return QUANTITIES[quantity].title if quantity in QUANTITIES else quantity
 
 
-def check_name(check: ReportedCheck) -> str:
+def check_name(check: ReportedCheck | ReportedAccuracyLine) -> str:
     """Return the quantity and reference frame of a check: `acceleration, local`."""
     reference = check["reference"]
     return check["quantity"] + (f", {reference}" if reference else "")
 
 
 def second_reader_words(robot: ReportedRobot) -> str:
-    """Return in words whether yourdfpy, the second reader, reads the same tree as urdfkin.
-
-    The text is empty if there was no comparison.
-    """
+    """Return in words whether yourdfpy reads the same tree as urdfkin; empty if there was no comparison."""
     reading = robot.get("second_reader")
     if reading is None:
         return ""
@@ -54,7 +49,7 @@ def second_reader_words(robot: ReportedRobot) -> str:
 
 
 def units(value: Units, *, compared: bool = True) -> str:
-    """Format a disagreement; None is infinity, and the text is empty if nothing was compared."""
+    """Format a disagreement; None is infinity. Return an empty text if nothing was compared."""
     if not compared:
         return ""
     if value is None:
@@ -70,7 +65,7 @@ def percent(share: Units) -> str:
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """Return the largest value. None stands for infinity and is larger than any number."""
+    """Return the largest value; None is infinity."""
     largest = 0.0
     for value in values:
         if value is None:
@@ -80,7 +75,7 @@ def worst(values: Iterable[Units]) -> Units:
 
 
 def quantities(robots: Sequence[ReportedRobot]) -> list[str]:
-    """Return the compared quantities of all robots; known quantities come first, in their usual order."""
+    """Return the compared quantities of all robots; known quantities come first, in a fixed order."""
     found = {check["quantity"] for robot in robots for check in robot["checks"]}
     return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
 
@@ -94,7 +89,7 @@ def in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return each heading of the table of robots with its quantities; an unknown one has its own heading."""
+    """Return the headings of the table of robots, each with its quantities."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name
@@ -108,28 +103,43 @@ def column(robot: ReportedRobot, names: Sequence[str]) -> list[ReportedCheck]:
 
 def worst_of(robot: ReportedRobot, names: Sequence[str]) -> str:
     """Return the text of a cell: the worst disagreement of several quantities in all reference frames."""
-    checks = column(robot, names)
+    return worst_cell(column(robot, names))
+
+
+def worst_cell(checks: Sequence[ReportedCheck]) -> str:
+    """Return the worst disagreement of checks as text; empty if there are no checks."""
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
 
 
-def nearer(line: Judged) -> Literal["urdfkin", "Pinocchio", "equal"]:
+def share_cell(robot: ReportedRobot) -> str:
+    """Return the largest ratio of a disagreement to its bound as text; empty if nothing was compared."""
+    return percent(share_of(robot)) if robot["checks"] else ""
+
+
+def error_cells(line: ReportedAccuracyLine) -> list[str]:
+    """Return the worst errors and then the typical errors, each of urdfkin and of Pinocchio."""
+    both = line["urdfkin"], line["pinocchio"]
+    return [*(f"{one['worst']:.2f}" for one in both), *(f"{one['typical']:.3f}" for one in both)]
+
+
+def more_accurate(line: ReportedAccuracyLine) -> Literal["urdfkin", "Pinocchio", "equal"]:
     ours, theirs = line["urdfkin"]["typical"], line["pinocchio"]["typical"]
     return "equal" if ours == theirs else "urdfkin" if ours < theirs else "Pinocchio"
 
 
-def nearer_counts(lines: Sequence[Judged]) -> str:
-    """Return in words how often urdfkin's typical error is smaller than Pinocchio's, equal, or larger."""
-    counts = Counter(nearer(line) for line in lines)
+def more_accurate_counts(lines: Sequence[ReportedAccuracyLine]) -> str:
+    """Return in words how often urdfkin's typical error is smaller, equal or larger than Pinocchio's."""
+    counts = Counter(more_accurate(line) for line in lines)
     return (
         f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
         f"{counts['equal']:,}, less accurate in {counts['Pinocchio']:,}"
     )
 
 
-def judged_on(judgement: ReportedAccuracy) -> str:
+def accuracy_words(study: ReportedAccuracy) -> str:
     """Return in words the samples, the motion of the base, and the result of the accuracy study."""
-    moving = " on a moving base" if judgement.get("moving_base") else ""
-    return f"{counted(judgement['samples'], 'sample')}{moving}; {nearer_counts(judgement['lines'])}"
+    moving = " on a moving base" if study.get("moving_base") else ""
+    return f"{counted(study['samples'], 'sample')}{moving}; {more_accurate_counts(study['lines'])}"
 
 
 def second_oracle_title(robots: Sequence[ReportedRobot]) -> str | None:
@@ -160,24 +170,21 @@ def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str
 
     The cell of a pair of libraries contains the largest ratio of a disagreement to its bound.
     """
-    found = [(check, check["second_oracle"]) for check in checks if "second_oracle" in check]
-    return [
-        f"{sum(check['results'] for check, _ in found):,}",
-        percent(worst(check["share_of_bound"] for check, _ in found)),
-        percent(worst(second_oracle["urdfkin"]["share_of_bound"] for _, second_oracle in found)),
-        percent(worst(second_oracle["pinocchio"]["share_of_bound"] for _, second_oracle in found)),
-        _alone([second_oracle for _, second_oracle in found], title),
-    ]
-
-
-def _alone(found: Sequence[SecondOracle], title: str) -> str:
-    counts = {
-        "urdfkin": sum(second_oracle["alone"]["urdfkin"] for second_oracle in found),
-        "Pinocchio": sum(second_oracle["alone"]["pinocchio"] for second_oracle in found),
-        title: sum(second_oracle["alone"]["second_oracle"] for second_oracle in found),
-        "undecided": sum(second_oracle["undecided"] for second_oracle in found),
+    checks = [check for check in checks if "second_oracle" in check]
+    found = [check["second_oracle"] for check in checks]
+    outliers = {
+        "urdfkin": sum(one["alone"]["urdfkin"] for one in found),
+        "Pinocchio": sum(one["alone"]["pinocchio"] for one in found),
+        title: sum(one["alone"]["second_oracle"] for one in found),
+        "undecided": sum(one["undecided"] for one in found),
     }
-    return ", ".join(f"{who} ({count:,})" for who, count in counts.items() if count) or "none"
+    return [
+        f"{sum(check['results'] for check in checks):,}",
+        percent(worst(check["share_of_bound"] for check in checks)),
+        percent(worst(one["urdfkin"]["share_of_bound"] for one in found)),
+        percent(worst(one["pinocchio"]["share_of_bound"] for one in found)),
+        ", ".join(f"{who} ({count:,})" for who, count in outliers.items() if count) or "none",
+    ]
 
 
 def share_of(robot: ReportedRobot) -> Units:

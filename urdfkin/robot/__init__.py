@@ -1,7 +1,7 @@
 """The class `Robot`: kinematics of a loaded robot, with every result checked against Pinocchio.
 
-Equation numbers refer to chapter 7 of the textbook that `docs/equations.md` names. With `verify=True`, the
-default, a method compares its result with Pinocchio's before it returns.
+Equation numbers refer to chapter 7 of the textbook in `docs/equations.md`. With `verify=True`, the default, a
+method compares its result with Pinocchio's before it returns.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ from urdfkin.verify.quantities import (
     recursive_quantities,
 )
 from urdfkin.verify.singular_values import SingularValues, singular_values
-from urdfkin.verify.singularity import columns_of
+from urdfkin.verify.singularity import FrameColumns, axis_kinds
 from urdfkin.verify.verifier import Verifier, Verify
 
 if TYPE_CHECKING:
@@ -82,29 +82,29 @@ _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 #: Gravity in m/s^2, in world axes. Pinocchio and MuJoCo have the same default.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: The usual rank of a Jacobian is computed at this number of random configurations.
-_GENERIC = 3
-#: Name completion hides these members for internal use.
-_INSIDE = {"plan", "verifier"}
-#: The number of bytes of an array must fit in 63 bits, which allows this number of float64 values.
+#: Number of random configurations at which the usual rank of a Jacobian is computed.
+_RANK_SAMPLES = 3
+#: Internal members, which name completion does not list.
+_INTERNAL = {"plan", "verifier"}
+#: Maximum number of float64 values of an array, whose number of bytes must fit in 63 bits.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
 class Robot(Displayable):
-    """A loaded robot and its kinematics; make one with `urdfkin.load`.
+    """A robot and its kinematics; `urdfkin.load` returns a robot.
 
-    A configuration `q` has shape (..., nq). Joint velocities `v` and joint accelerations `a` have shape (...,
-    nv). Arrays `q`, `v` and `a` may have leading batch axes, which broadcast as in NumPy. The order of joints
-    and the meaning of `v` are Pinocchio's.
+    A configuration `q` has the shape (..., nq). Joint velocities `v` and joint accelerations `a` have the
+    shape (..., nv). The leading axes are batch axes, which broadcast as in NumPy. The order of joints and the
+    meaning of `v` are Pinocchio's.
 
-    Each of `q`, `v` and `a` may be given in one of four forms:
+    Each of `q`, `v` and `a` may have one of four forms:
 
     - numbers in order: `[0.5, 2.0]`
     - a mapping: `{"elbow": 0.5, "wrist": "30deg"}`; its values may be batches
     - a text with names: `"elbow=0.5, wrist=2"`
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
-    A missing name is an error.
+    A mapping or text without one of the names is an error, except after the name of a pose.
 
     Methods that compute a quantity share these arguments:
 
@@ -116,14 +116,14 @@ class Robot(Displayable):
     - `reference`: LOCAL_WORLD_ALIGNED: at the frame's origin, in world axes. LOCAL: at the frame's origin, in
       the frame's axes. WORLD: at the body point that coincides with the world origin, in world axes.
     - `base`: Motion of the root link; None: fixed at the world origin.
-    - `out`: Output array, C-contiguous float64 of the result's shape. Its contents are undefined after an
+    - `out`: Output array, C-contiguous float64 of the result's shape; the contents are undefined after an
       error.
-    - `verify`: True: check this call with Pinocchio. "sample": check 100 of its configurations. None: as
-      chosen in `load`.
+    - `verify`: True: check the call with Pinocchio. "sample": check 100 configurations of the call. False: no
+      check. None: as chosen in `load`.
     - `threads`: Number of threads for a batch. None: one thread below 4,096 configurations, otherwise one for
       each processor. The result does not depend on the number of threads.
 
-    They share these errors:
+    These methods share these errors:
 
     - `InputError`: a wrong length, a number that is not finite, or batch shapes that do not broadcast.
     - `UnknownNameError`: the frame, reference or joint does not exist.
@@ -131,10 +131,10 @@ class Robot(Displayable):
 
     Attributes:
         tree: Links and joints.
-        verifier: The verifier of the robot's results. It has the URDF text that Pinocchio reads, and the
-            record of all checks so far.
-        findings: Warnings and notes about the URDF; a robot with errors does not load.
-        base_frame: Default base of chains: the catalogue's base, or the root link of other robots.
+        verifier: Verifier of the robot's results, with the URDF text that Pinocchio reads, and the record of
+            all checks so far.
+        findings: Warnings and notes about the URDF; `load` rejects a URDF with errors.
+        base_frame: Default base of chains: the base in the catalogue, or the root link of other robots.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -163,21 +163,21 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: A USD stage in single precision has bounds on the errors of poses; None means double precision.
+        #: Bounds on the errors of poses from a USD stage, which has single precision; None: double precision.
         self.single: SinglePrecision | None = None
-        #: If the robot is from a USD stage, each link has the path of its prim.
+        #: Path of the prim of each link, for a robot from a USD stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Fast evaluators of frames: those in `_prepared` do not check results, those in `_checked` do.
+        #: Fast evaluators of frames, without checks (`_prepared`) and with checks (`_checked`).
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # Compiled trees are not copied, because they are cheap to rebuild. A copy has its own verifier.
+        # A copy rebuilds its compiled trees, and has its own verifier.
         empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_checked": {}, "_compiled": {}}
         return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
@@ -185,8 +185,7 @@ class Robot(Displayable):
         return log_line(f"<Robot {self.name}: nq {self.nq}, nv {self.nv}, {len(self.tree.links)} links>")
 
     def __dir__(self) -> list[str]:
-        # Name completion does not list members for internal use.
-        return [name for name in super().__dir__() if name not in _INSIDE]
+        return [name for name in super().__dir__() if name not in _INTERNAL]
 
     def _sheet(self) -> TextDocument:
         with importing:
@@ -198,8 +197,8 @@ class Robot(Displayable):
     def view(self, q: Given = "ready", *, height: int = 480) -> Any:
         """Return a three-dimensional view of the robot for a notebook cell, with a slider for each joint.
 
-        The view needs no network and no server, and it is saved with the notebook. The browser computes the
-        motion, and nothing checks the poses that it shows. `urdfkin view` checks every pose that it shows.
+        The view needs no network and no server, and is saved with the notebook. The browser computes the
+        motion, so the poses in the view are not checked. The command `urdfkin view` checks every pose.
 
         Args:
             q: (nq,) initial configuration, rad, m.
@@ -261,7 +260,7 @@ class Robot(Displayable):
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the URDF text as UTF-8; for MJCF, of the file itself without its included files.
+        """SHA-256 of the URDF text as UTF-8; for MJCF and USD, of the file without included files.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").sha256[:8]
@@ -378,8 +377,8 @@ class Robot(Displayable):
     def all_frames(self) -> tuple[str, ...]:
         """Names `link:NAME` and `joint:NAME` of the frames of all links and joints, each once.
 
-        Each is a `FrameName`, so it is never ambiguous: it means the link or joint NAME, even if another link
-        or joint has the literal name `link:NAME`.
+        Each name is a `FrameName`, which always means the link or joint NAME, even if another link or joint
+        has the literal name `link:NAME`.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").all_frames[-3:]
@@ -389,7 +388,7 @@ class Robot(Displayable):
 
     @property
     def tip_frame(self) -> str:
-        """The default tip: the catalogue's tip, or the leaf link with the most moving joints above it.
+        """The default tip: the tip in the catalogue, or the leaf link behind the most moving joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame
@@ -403,7 +402,7 @@ class Robot(Displayable):
         return self._tip_frame
 
     def _default_frame(self) -> str:
-        """Return the tip that the catalogue names, or the only leaf; raise InputError for several leaves."""
+        """Return the tip in the catalogue, or the only leaf; raise InputError for several leaves."""
         if not self._has_one_tip:
             leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
             raise InputError(
@@ -429,20 +428,20 @@ class Robot(Displayable):
 
     @property
     def frames(self) -> dict[str, str]:
-        """The link that carries each frame, by the frame's name; a joint's frame belongs to its child link.
+        """The link of each frame, by the frame's name; a joint's frame belongs to the joint's child link.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").frames["joint_2"]
         'link_2'
         """
-        of = zip(self.tree.joints, self.tree.links[1:], strict=True)
-        return {joint.name: link for joint, link in of} | {link: link for link in self.tree.links}
+        pairs = zip(self.tree.joints, self.tree.links[1:], strict=True)
+        return {joint.name: child for joint, child in pairs} | {link: link for link in self.tree.links}
 
     @property
     def limits(self) -> FloatArray:
         """(2, nq) lower and upper limits of `q`, rad, m; infinite for a joint without limits.
 
-        The limits of mimic joints are not included; `limit_violations` checks them too.
+        The array does not contain the limits of mimic joints, which `limit_violations` also checks.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").limits.tolist()
@@ -481,11 +480,11 @@ class Robot(Displayable):
         return configuration.poses(self.tree)
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
-        """Draw random configurations (n, nq) within the limits, those of mimic joints included.
+        """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
         The same seed gives the same configurations. In some robots, no value of a mimicked joint satisfies
-        the joint's own limits and those of its mimic joint. For such a joint only its own limits apply, and
-        `limit_violations` names the mimic joint.
+        the limits of the mimicked joint and of the mimic joint. Then only the limits of the mimicked joint
+        apply, and `limit_violations` names the mimic joint.
 
         Args:
             n: Number of configurations.
@@ -509,7 +508,7 @@ class Robot(Displayable):
                 "this number of configurations does not fit into memory",
                 where=self.name,
                 found=f"n = {n}, which are {8 * n * self.nq // 10**9} GB",
-                remedy="draw them in parts, each with a seed of its own",
+                remedy="draw several smaller samples, each with another seed",
             ) from None
 
     def limit_violations(self, q: Given) -> list[str]:
@@ -519,14 +518,14 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        found = configuration.checked(self.tree, q, "q", look=False)  # The lines already ask about degrees.
-        return configuration.limit_violations(self.tree, found)
+        q = configuration.checked(self.tree, q, "q", look=False)  # the lines already ask about degrees
+        return configuration.limit_violations(self.tree, q)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
         """Return the configuration (..., nq) one second after `q` at constant joint velocities `v`.
 
-        The definition is Pinocchio's `integrate`. For another duration, pass `v * seconds`. Quaternions
-        keep norm 1. Angles of continuous joints are not wrapped.
+        The definition is that of Pinocchio's `integrate`. For another duration, pass `v * seconds`. The norm
+        of quaternions stays 1. Angles of continuous joints are not wrapped.
 
         Args:
             q: (..., nq) rad, m.
@@ -573,8 +572,8 @@ class Robot(Displayable):
     def to_pinocchio(self, q: Given, *, mimic: bool = False) -> FloatArray:
         """Convert `q` (..., nq) to Pinocchio's configuration, for the model of `pinocchio_model`.
 
-        Pinocchio stores a continuous joint as (cos q, sin q), and without `mimic` a mimic joint has a
-        coordinate of its own.
+        Pinocchio stores a continuous joint as (cos q, sin q). If `mimic` is False, Pinocchio stores a
+        separate coordinate for each mimic joint.
 
         Args:
             q: (..., nq) rad, m.
@@ -601,8 +600,8 @@ class Robot(Displayable):
         free-flyer or planar joint.
 
         Args:
-            mimic: True: the model couples its mimic joints, which Pinocchio 4.1 rejects for some robots.
-                False: each mimic joint is an independent joint.
+            mimic: True: the mimic joints follow their mimic rules, which Pinocchio 4.1 rejects for some
+                robots. False: each mimic joint is an independent joint.
 
         Raises:
             OracleError: Pinocchio does not accept this robot.
@@ -645,7 +644,8 @@ class Robot(Displayable):
         Args:
             name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), or the
                 path of a TOML file.
-            joints: The order of the joints, if your tool or policy uses another order than the convention.
+            joints: Names of the joints in the order of your tool or policy; None: the order of the
+                convention.
 
         Raises:
             UnknownNameError: there is no such convention, file or joint.
@@ -686,14 +686,14 @@ class Robot(Displayable):
     ) -> Robot:
         """Return this robot with some joints fixed at a value; q, v and a do not contain these joints.
 
-        A mimic joint is locked together with its mimicked joint. All methods work on the result. Pinocchio
-        checks them with the reduced model (`buildReducedModel`) of the whole URDF.
+        A mimic joint is locked together with its mimicked joint. Pinocchio checks the results of the returned
+        robot with the reduced model (`buildReducedModel`) of the whole URDF.
 
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
-            joints: The joints that remain movable. All other joints are locked. The value of a locked joint
-                is 0 if `lock` contains no value for it. If `lock` begins with a pose, such as "ready", the
-                pose is used instead of 0.
+            joints: The joints that remain movable; all other joints are locked. A locked joint without a
+                value in `lock` has the value 0. If `lock` begins with a pose, such as "ready", the joint has
+                the value in the pose.
 
         Raises:
             UnknownNameError: there is no such joint or pose.
@@ -711,12 +711,12 @@ class Robot(Displayable):
         if not isinstance(lock, str | Mapping):
             raise InputError("lock must be a mapping from joints to values, or text", found=safe_repr(lock))
         chosen = None if joints is None else as_names(joints, "joints")
-        held = configuration.locked_values(self.tree, lock, chosen)
-        tree = with_locks(self.tree, held)
-        found = copy(self)
-        found.tree, found.verifier = tree, self.verifier.locked(tree, tuple(held.items()))
-        found._tip_frame = self._tip_frame if self._has_one_tip else None
-        return found
+        locked = configuration.locked_values(self.tree, lock, chosen)
+        robot = copy(self)
+        robot.tree = with_locks(self.tree, locked)
+        robot.verifier = self.verifier.locked(robot.tree, tuple(locked.items()))
+        robot._tip_frame = self._tip_frame if self._has_one_tip else None
+        return robot
 
     # -- computation --------------------------------------------------------------------------------
 
@@ -740,8 +740,8 @@ class Robot(Displayable):
 
         Raises:
             UnknownNameError: the quantity or the frame does not exist.
-            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast,
-                the wrong number of inputs, or a quantity that only its own method computes.
+            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, the
+                wrong number of inputs, or a quantity that only its own method computes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -776,8 +776,8 @@ class Robot(Displayable):
         (2, 2, 4, 4)
         """
         fast = self._fast(frame, _ALIGNED, base, verify, threads)
-        if fast and (one := fast._placement(q, out)) is not None:
-            return one
+        if fast and (result := fast._placement(q, out)) is not None:
+            return result
         return self._computed("placement", (q,), frame, _ALIGNED, base, out, verify, threads)
 
     def relative_placement(
@@ -792,8 +792,8 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the pose of a frame relative to another frame, T_other_frame (..., 4, 4).
 
-        T_other_frame = T_world_other^-1 T_world_frame, with eq. 7.77 for both. Pinocchio computes both
-        placements for the check. The result does not depend on the motion of the base.
+        T_other_frame = T_world_other^-1 T_world_frame, with both placements from eq. 7.77. The result does
+        not depend on the motion of the base.
 
         Args:
             frame: Name of a link or joint, or a list of names.
@@ -808,11 +808,11 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from
 
         name = as_str(relative_to, "relative_to")
-        # An error message contains a line that repeats the call, with plain strings.
+        # A message with the call needs the repr of a plain string, and not that of a subclass.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
-        self.verifier.ready(verify)
+        self.verifier.require_pinocchio(verify)
         T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
         T = seen_from(T_world[:, -1:], T_world[:, :-1], to)
         result = call.in_shape(T) if out is None else out
@@ -839,8 +839,8 @@ class Robot(Displayable):
         [0.0, 0.9, 0.0, 0.0, 0.0, 1.0]
         """
         fast = self._fast(frame, reference, base, verify, threads)
-        if fast and (one := fast._velocity(q, v, out)) is not None:
-            return one
+        if fast and (result := fast._velocity(q, v, out)) is not None:
+            return result
         return self._computed("velocity", (q, v), frame, reference, base, out, verify, threads)
 
     def jacobian(
@@ -866,8 +866,8 @@ class Robot(Displayable):
         [[-0.4, -0.4], [0.5, 0.0]]
         """
         fast = self._fast(frame, reference, base, verify, threads)
-        if fast and (one := fast._jacobian(q, out)) is not None:
-            return one
+        if fast and (result := fast._jacobian(q, out)) is not None:
+            return result
         return self._computed("jacobian", (q,), frame, reference, base, out, verify, threads)
 
     def jacobian_rate(
@@ -885,10 +885,10 @@ class Robot(Displayable):
         """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion.
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
-        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. The reason is that the axes (LOCAL)
-        or the body point (WORLD) change with time. The linear part of the spatial acceleration is the linear
-        part of the classical acceleration minus w x vel. If the base moves, you must add the acceleration
-        that the base causes.
+        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes (LOCAL) or the body
+        point (WORLD) change with time. The linear part of the spatial acceleration is the linear part of the
+        classical acceleration minus w x vel. J a + J-dot v does not contain the acceleration that a moving
+        base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -910,21 +910,21 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the kinematic Hessian H (..., 6, nv, nv), the derivative of `jacobian` by each coordinate.
 
-        H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. J-dot of
-        eq. 7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on
-        v alone.
+        H[..., i, j] is the derivative of column i of J in the direction of the joint velocity j. J-dot of eq.
+        7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on v
+        alone.
 
         - Joint j before joint i: z_j rotates the column, z_j x (z_i x d_i).
         - Joint j after joint i: z_j moves the end of the lever arm, z_i x (z_j x d_j).
 
-        In WORLD, a joint j after joint i contributes nothing. In LOCAL, a joint j before joint i contributes
-        nothing.
+        H[..., i, j] is 0 in WORLD for a joint j after joint i, and in LOCAL for a joint j before joint i.
 
-        Symmetry in LOCAL_WORLD_ALIGNED: the linear rows are symmetric in i and j, except within one planar or
-        floating joint. The angular rows are not symmetric: the angular part of H[..., i, j] minus that of
-        H[..., j, i] is w_j x w_i. Here w_i is the angular part of column i of J. This is not true for two
-        columns of one floating joint. The difference is 0 for parallel axes. On a planar arm, all angular
-        rows are 0.
+        Symmetry in LOCAL_WORLD_ALIGNED, except for two columns of one planar or floating joint:
+
+        - The linear rows are symmetric in i and j.
+        - The angular part of H[..., i, j] minus that of H[..., j, i] is w_j x w_i, where w_i is the angular
+          part of column i of J. The difference is 0 for parallel axes. On a planar arm, all angular rows are
+          0.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link", verify=False)
@@ -933,8 +933,8 @@ class Robot(Displayable):
         [[-0.9, -0.4], [-0.4, -0.4]]
         """
         fast = self._fast(frame, reference, base, verify, threads)
-        if fast and (one := fast._hessian(q, out)) is not None:
-            return one
+        if fast and (result := fast._hessian(q, out)) is not None:
+            return result
         return self._computed("hessian", (q,), frame, reference, base, out, verify, threads)
 
     def acceleration(
@@ -952,9 +952,9 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the classical acceleration of a frame (..., 6), [linear; angular].
 
-        The linear part is p'', the second derivative of the position of the frame's origin. It is not the
-        spatial acceleration p'' - w x p'. Pinocchio's function for the classical acceleration is
-        `getFrameClassicalAcceleration`. Gravity is not included; `imu` includes it.
+        The linear part is p'', the second derivative of the position of the frame's origin. The spatial
+        acceleration is p'' - w x p'. Pinocchio's function for the classical acceleration is
+        `getFrameClassicalAcceleration`. The result does not include gravity; `imu` does.
 
         In LOCAL_WORLD_ALIGNED the result equals J a + J-dot v, with `jacobian` and `jacobian_rate`.
         `acceleration_breakdown` lists the contribution of each joint.
@@ -965,8 +965,8 @@ class Robot(Displayable):
         [-0.9, 0.0, 0.0, 0.0, 0.0, 0.0]
         """
         fast = self._fast(frame, reference, base, verify, threads)
-        if fast and (one := fast._acceleration(q, v, a, out)) is not None:
-            return one
+        if fast and (result := fast._acceleration(q, v, a, out)) is not None:
+            return result
         return self._computed("acceleration", (q, v, a), frame, reference, base, out, verify, threads)
 
     def imu(
@@ -985,9 +985,8 @@ class Robot(Displayable):
         """Return the readings of an IMU in a frame (..., 6), in the frame's own axes.
 
         The first three numbers are the accelerometer's reading, the *proper* acceleration R^T (p'' - g) in
-        m/s^2. At rest this acceleration is 9.81 m/s^2 upwards. p'' is the classical acceleration of
-        `acceleration` (eq. 7.130), not the spatial one. The last three numbers are the gyroscope's reading,
-        R^T w in rad/s (eq. 7.127).
+        m/s^2, with the classical acceleration p'' (eq. 7.130). At rest, the proper acceleration is 9.81 m/s^2
+        upwards. The last three numbers are the gyroscope's reading, R^T w in rad/s (eq. 7.127).
 
         Args:
             gravity: (3,) m/s^2 in world axes.
@@ -1020,12 +1019,13 @@ class Robot(Displayable):
     ) -> SingularValues:
         """Return the singular values of `jacobian` with guaranteed bounds, condition and manipulability.
 
-        The bounds include the rounding error of J and of the decomposition. Columns of J that are 0 for every
-        q are left out. The values are the same in LOCAL and LOCAL_WORLD_ALIGNED. `rows="all"` mixes linear
-        rows (metres) and angular rows (radians), so the values depend on the unit of length.
-        `found.manipulability_gradient(robot.hessian(q, frame))` returns the gradient of the manipulability.
-        `print(found)` shows a table, and explains a singularity: `found.singularity()` names the lost
-        direction and the joints that cause it.
+        The bounds include the rounding errors of J and of the decomposition. Columns of J that are 0 for
+        every q are left out. LOCAL and LOCAL_WORLD_ALIGNED have the same singular values. `rows="all"` mixes
+        linear rows (metres) and angular rows (radians), so the values depend on the unit of length. `print`
+        shows the result as a table. Methods of the result:
+
+        - `singularity()`: the lost directions, and the joints that cause the singularity
+        - `manipulability_gradient(robot.hessian(q, frame))`: the gradient of the manipulability
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1052,10 +1052,16 @@ class Robot(Displayable):
         bound = JACOBIAN.bound(call.plan, size, _ALIGNED)
         error = (EPS * bound.k * bound.scale)[:, 0].reshape(*call.shape, 6, self.nv)
         active = movable(call.plan)[0]
-        columns = columns_of(
-            self.tree, J, error, frame, self.rate_names, active, partial(self._sampled, frame),
+        columns = FrameColumns(
+            J,
+            error,
+            str(frame),
+            self.rate_names,
+            axis_kinds(self.tree),
+            active,
+            partial(self._sampled, frame),
             moving_base=base is not None,
-        )  # fmt: skip
+        )
         return singular_values(J, error, active[which].any(axis=0), which, columns)
 
     def analytical_jacobian(
@@ -1073,9 +1079,10 @@ class Robot(Displayable):
         """Return the analytical Jacobian J = C^-1 J_v (eq. 7.122), derivatives of position and orientation.
 
         The orientation is three Euler angles or a quaternion. The check uses Pinocchio's rotation and
-        Jacobian, and an independent formula for the angle derivatives
-        (`urdfkin.verify.analytical_reference`). Near the representational singularity, the result has fewer
-        correct digits. The bound grows as 1 / s^2, where s is the sine or cosine of the middle angle.
+        Jacobian, and an independent formula for the derivatives of the angles
+        (`urdfkin.verify.analytical_reference`). Near the representational singularity of Euler angles, the
+        result has fewer correct digits: the bound grows as 1 / s^2, where s is the sine or cosine of the
+        middle angle.
 
         Args:
             representation: Euler sequence by SciPy's name, "rpy" (the same as "xyz": roll, pitch, yaw), or
@@ -1087,9 +1094,8 @@ class Robot(Displayable):
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`. For a
-                checked call the limit is at least the rounding error, about 1e-13 rad. The error gives the
-                distance. A quaternion has no singularity.
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or in a
+                checked call than the rounding error, about 1e-13 rad. A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin
@@ -1103,8 +1109,8 @@ class Robot(Displayable):
         options: dict[str, Any] = {"representation": representation, "nearest": nearest}
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, _ALIGNED, base, (q,), **options)
-        self.verifier.ready(verify)
-        if self.verifier.wanted(verify):
+        self.verifier.require_pinocchio(verify)
+        if self.verifier.policy_of_call(verify):
             nearest = max(nearest, nearest_singularity(call.plan))
         rows = 7 if representation == "quaternion" else 6
         to = call.flat(out, (rows, self.nv))
@@ -1112,21 +1118,21 @@ class Robot(Displayable):
         walk, state = (call.plan, (call.q,), _ALIGNED), {"base": call.state, "threads": threads}
         Rs = call.compute(PLACEMENT.ours, *walk, **state)[..., :3, :3]
         Js_v = call.compute(JACOBIAN.ours, *walk, out=J if rows == 6 else None, **state)
-        near: list[tuple[float, int]] = []
+        too_near: list[tuple[float, int]] = []
 
         def compute(part: slice) -> None:
             try:
                 with np.errstate(over="ignore", invalid="ignore"):
                     J[part] = ANALYTICAL_JACOBIAN.compute(representation, Rs[part], Js_v[part], nearest)
             except RepresentationSingularityError as error:
-                near.append((error.distance, part.start + error.sample[0]))
+                too_near.append((error.distance, part.start + error.sample[0]))
 
         with importing:
             from urdfkin.compiled.evaluate import in_parts
 
         in_parts(compute, call.n, threads)
-        if near:
-            distance, k = min(near)
+        if too_near:
+            distance, k = min(too_near)
             raise RepresentationSingularityError(representation, distance, call.index(k))
         if not np.isfinite(J).all():
             raise RangeError("a result leaves the range of double precision", remedy="give smaller numbers")
@@ -1150,7 +1156,7 @@ class Robot(Displayable):
         """Return the contributions of each joint to a frame's classical acceleration (eq. 7.125, 7.130).
 
         A joint has four kinds of contribution: transverse, centripetal, Coriolis and sliding. The sum of all
-        contributions equals `acceleration` and is compared with Pinocchio's acceleration.
+        contributions is the result of `acceleration`, and is compared with Pinocchio's acceleration.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1174,7 +1180,7 @@ class Robot(Displayable):
 
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, as_str(frame, "frame"), reference, base, (q, v, a))
-        self.verifier.ready(verify)
+        self.verifier.require_pinocchio(verify)
         to = call.flat(out, (len(moving_joints(self.tree, call.links[0])), len(KINDS), 6))
         flat = (self.tree, call.links[0], call.q, *call.rates, call.reference, call.state)
         parts: AccelerationBreakdown = call.compute(
@@ -1199,11 +1205,10 @@ class Robot(Displayable):
     ) -> Enclosures:
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
-        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130, without rounding. The true values are
-        computed from the decimals in the URDF and from the exact doubles of `q`, `v`, `a` and `base`. Each
-        end of an interval is a double, and the two ends are nearly always neighbouring doubles. The result
-        also states whether urdfkin's and Pinocchio's values lie in the intervals. The computation takes less
-        than 1 ms for each joint before the frame.
+        The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding, for the decimals in
+        the URDF and the exact doubles of `q`, `v`, `a` and `base`. The ends of an interval are doubles,
+        nearly always neighbouring ones. The result also states whether urdfkin's and Pinocchio's values lie
+        in the intervals. The computation takes less than 1 ms for each joint before the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1212,11 +1217,10 @@ class Robot(Displayable):
             frame: Name of a link or joint; None: the robot's only tip.
             reference: Reference frame of velocities, accelerations and Jacobians.
             base: Motion of the root link; None: fixed at the world origin.
-            digits: Decimal digits of the interval arithmetic, at least 15. If None, there are 30 digits plus
-                one for each joint before the frame. With this number of digits, the two ends of an interval
-                are nearly always neighbouring doubles. With 15 digits, the intervals are about as wide as the
-                rounding errors of doubles.
-            hessian: Whether to enclose the Hessian too. This takes less than 0.1 ms for each pair of joints.
+            digits: Decimal digits of the interval arithmetic, at least 15. None: 30 digits plus one for each
+                joint before the frame. With 15 digits, the intervals are about as wide as the rounding errors
+                of doubles.
+            hessian: Whether to enclose the Hessian too, in less than 0.1 ms for each pair of joints.
 
         Raises:
             InputError: an argument is a batch or has a wrong length, or `digits` is below 15.
@@ -1250,8 +1254,8 @@ class Robot(Displayable):
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
-            reference: Reference frame of its results.
-            verify: True: check each result with Pinocchio, as the robot's methods do. False: check none.
+            reference: Reference frame of the results.
+            verify: True: check each result with Pinocchio. False: check no result.
 
         Raises:
             UnknownNameError: the frame or reference does not exist.
@@ -1270,13 +1274,13 @@ class Robot(Displayable):
     def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
         """Return the fastest evaluator of one frame: machine code for this robot.
 
-        The system's C compiler compiles each quantity at its first use. The compilation takes a few seconds,
-        once on each machine. The compiled code is compared with Pinocchio. Without a C compiler, Numba's
-        forward recursion is used. `CompiledFrame` lists the methods.
+        The system's C compiler compiles each quantity at its first use, in a few seconds, once on each
+        machine. The compiled code is compared with Pinocchio. Without a C compiler, the evaluator uses Numba.
+        `CompiledFrame` lists the methods.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
-            reference: Reference frame of its results.
+            reference: Reference frame of the results.
 
         Raises:
             UnknownNameError: the frame or reference does not exist.
@@ -1310,21 +1314,20 @@ class Robot(Displayable):
     ) -> str:
         """Return the kinematics of a frame as straight-line source code.
 
-        The code is compared with Pinocchio before it is returned. Its text states the agreement. The code
-        also contains a self-test. The expected values of the self-test were computed with fifty digits.
+        urdfkin compares the code with Pinocchio, and the text of the code states the agreement. The code also
+        contains a self-test, with expected values that were computed with fifty digits.
 
         Args:
             to: Language, one of `urdfkin.export.LANGUAGES`, such as "c" or "numpy".
             frame: Name of a link or joint; None: `tip_frame`.
             quantities: Any of "placement", "velocity", "jacobian", "jacobian_rate", "acceleration".
             reference: Reference frame of velocities, accelerations and Jacobians.
-            form: "tree": the code computes the pose from the URDF's joints. "dh": from the Denavit-Hartenberg
-                table from `base_frame` to the frame. "screws": from the product of exponentials of this path.
-                Results of "dh" and "screws" are in the axes of `base_frame`.
-            name: Prefix of the function names. None: the prefix consists of the names of the robot and the
-                frame.
+            form: Source of the pose: "tree": the joints of the URDF. "dh": the Denavit-Hartenberg table from
+                `base_frame` to the frame. "screws": the product of exponentials from `base_frame` to the
+                frame. Results of "dh" and "screws" are in the axes of `base_frame`.
+            name: Prefix of the function names; None: the names of the robot and the frame.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
-                unchecked code states UNVERIFIED.
+                unchecked code is UNVERIFIED.
 
         Raises:
             UnknownNameError: the language, frame, quantity, reference or form does not exist.
@@ -1353,14 +1356,15 @@ class Robot(Displayable):
     ) -> Any:
         """Return a `torch.nn.Module` with the kinematics of a frame, for PyTorch.
 
-        It is the class `Kinematics` of `export("torch", ...)`. `module(q)` returns the placement (..., 4, 4),
-        and each quantity is a method of the module. Tensors may have any leading shape, any floating type and
-        any device. PyTorch computes derivatives. PyTorch must be installed.
+        The module is an object of the class `Kinematics` in `export("torch", ...)`. `module(q)` returns the
+        placement (..., 4, 4), and each quantity is a method of the module. Tensors may have any leading
+        shape, any floating type and any device. PyTorch, which must be installed, can compute derivatives of
+        the results.
 
         Args:
             frame: As in `export`.
-            quantities: As in `export`. `module(q)` returns the first quantity in this list that is a function
-                of q only, for example the placement.
+            quantities: As in `export`. `module(q)` returns the first quantity that depends only on q, such as
+                the placement.
             reference: As in `export`.
             verify: As in `export`.
 
@@ -1440,8 +1444,8 @@ class Robot(Displayable):
         """Return the Denavit-Hartenberg table of the path between two frames, checked with Pinocchio.
 
         The table's methods take only the coordinates of the path, in the order of `table.joint_names`;
-        `robot.select(table, q)` returns these coordinates. `urdfkin.dh.dh_table` explains the other arguments
-        in full.
+        `robot.select(table, q)` returns these coordinates. `urdfkin.dh.dh_table` explains the arguments in
+        full.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
@@ -1451,10 +1455,9 @@ class Robot(Displayable):
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the table leads to the tip. "flange": the table leads to the flange, and a separate
                 tool transform leads from the flange to the tip.
-            parallel_offset: If consecutive joint axes are parallel, the table may store the offset along them
-                in one row or in several rows. "last": in the row of the last parallel axis. "first": in the
-                row of the first parallel axis. "each": the row of each parallel axis contains the offset of
-                its own link.
+            parallel_offset: Rows with the offset along consecutive parallel joint axes. "last": the row of
+                the last parallel axis. "first": the row of the first parallel axis. "each": the row of each
+                parallel axis contains the offset of one link.
             flip: Names of joints whose positive direction is reversed in the table.
             first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
@@ -1462,9 +1465,8 @@ class Robot(Displayable):
             slide: Position of the axes of prismatic joints. "drawn": the axis passes through the joint's
                 origin in the URDF. "minimal": the axis passes through the origin of the next revolute joint,
                 so that a is 0.
-            like: A published table. The new table has the same frames, signs and zero positions as the
-                published table. The arguments `flip`, `first`, `last`, `sign` and `parallel_offset` are
-                ignored if `like` is given.
+            like: A published table, whose frames, signs and zero positions the new table has. With `like`,
+                the arguments `flip`, `first`, `last`, `sign` and `parallel_offset` have no effect.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
@@ -1503,7 +1505,7 @@ class Robot(Displayable):
             slide=as_str(slide, "slide"),
             like=like,
         )
-        if self.verifier.wanted(verify):
+        if self.verifier.policy_of_call(verify):
             self.verifier.table(table)
         return table
 
@@ -1515,7 +1517,7 @@ class Robot(Displayable):
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
             base: Name of a link or joint; None: `base_frame`.
-            verify: True: check it with Pinocchio. None: as chosen in `load`.
+            verify: True: check the product with Pinocchio. None: as chosen in `load`.
 
         Raises:
             UnknownNameError: a frame does not exist.
@@ -1532,7 +1534,7 @@ class Robot(Displayable):
             from urdfkin.verify.chain_checks import check_screws
 
         found = screws_of(self.chain(tip, base))
-        if self.verifier.wanted(verify):
+        if self.verifier.policy_of_call(verify):
             check_screws(self.verifier, found)
         return found
 
@@ -1554,7 +1556,7 @@ class Robot(Displayable):
             from urdfkin.dh.tree_parameters import tree_parameters
 
         parameters = tree_parameters(self.tree)
-        if self.verifier.wanted(verify):
+        if self.verifier.policy_of_call(verify):
             self.verifier.tree_parameters(parameters)
         return parameters
 
@@ -1574,7 +1576,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the tree of the joints that move the given links, which is compiled at the first call."""
+        """Return the compiled tree of the joints that move some links; later calls return the same object."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1596,19 +1598,27 @@ class Robot(Displayable):
         frame = self._default_frame() if frame is None else frame
         call = Call(self.tree, self.plan, frame, reference, base, inputs, **options)
         to = call.flat(out, row.own_shape(self.nv))
-        self.verifier.ready(verify)
-        flat, read = (call.plan, (call.q, *call.rates), call.reference), self.verifier.wanted(verify) is True
-        how = {"base": call.state, "out": to, "threads": threads, "read": read}
-        found = call.compute(row.ours, *flat, **how, **options)
-        result = call.in_shape(found) if out is None else out
+        self.verifier.require_pinocchio(verify)
+        results = call.compute(
+            row.ours,
+            call.plan,
+            (call.q, *call.rates),
+            call.reference,
+            base=call.state,
+            out=to,
+            threads=threads,
+            read=self.verifier.policy_of_call(verify) is True,
+            **options,
+        )
+        result = call.in_shape(results) if out is None else out
         self.verifier.check(row, call, result, verify)
         return result
 
     def _sampled(self, frame: str) -> FloatArray:
         """Return unchecked Jacobians (n, 6, nv) of a frame at random configurations."""
-        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_GENERIC),))
-        found: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
-        return found[:, 0]
+        call = Call(self.tree, self.plan, frame, _ALIGNED, None, (self.sample(_RANK_SAMPLES),))
+        J: FloatArray = call.compute(JACOBIAN.ours, call.plan, (call.q,), _ALIGNED)
+        return J[:, 0]
 
     def _fast(
         self,
@@ -1619,29 +1629,28 @@ class Robot(Displayable):
         threads: int | None,
     ) -> PreparedFrame | None:
         """Return the fast evaluator for a call; None if the call needs the general code."""
-        wanted = self.verifier.policy if verify is None else verify
-        if base is not None or threads is not None or (wanted is not True and wanted is not False):
+        policy = self.verifier.policy if verify is None else verify
+        if base is not None or threads is not None or (policy is not True and policy is not False):
             return None
         if frame is None:
             frame = self._default_frame()
         if not isinstance(frame, str):
             return None
-        known = self._checked if wanted else self._prepared
+        known = self._checked if policy else self._prepared
         if reference is _ALIGNED and type(frame) is str and (fast := known.get(frame)) is not None:
             return fast
-        return self._prepare(frame, reference, verify=wanted)
+        return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        """Return the fast evaluator of a frame, which is made at the first call."""
-        # The plain name is the key in most cases, because the hash of an enumeration member is slow.
-        # Other keys also contain the types: an enumeration member would otherwise equal its number.
-        # Without its type, `LinkFrame("link:a")` would equal the name "link:a".
+        """Return the fast evaluator of a frame; later calls return the same object."""
+        # A plain name is a fast key; the hash of an enumeration member is slow.
+        # The types in the other keys distinguish the name "link:a" from `LinkFrame("link:a")`.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
         try:
             prepared = known.get(key)
-        except TypeError:  # The key is not hashable, so the name is not valid.
+        except TypeError:  # an argument that is not hashable is not valid
             self.tree.frame_link(frame)
             return self._prepare(frame, Reference.of(reference), verify=verify)
         if prepared is None:
@@ -1652,15 +1661,16 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: The docstring of `Robot` has lists of shared items; a method has the sections `Args` and `Raises`.
+#: Pattern of an item in the lists of `Robot`'s docstring.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
+#: Pattern of an item in the sections `Args` and `Raises` of a method.
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
-    """Return the docstring of a method of `Robot`, completed with the shared arguments and errors.
+    """Return the docstring of a method of `Robot`, with the shared arguments and errors.
 
-    `QUANTITIES` contains the shape, the units and the equations of the result.
+    The shape, the units and the equations of the result are those of `QUANTITIES`.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)
@@ -1686,8 +1696,8 @@ def _indented(items: Sequence[str]) -> str:
 
 
 def _complete_docstrings() -> None:
-    """Add the shared arguments and errors of `Robot.__doc__` to the methods' docstrings."""
-    arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("They share these errors:")
+    """Add the shared arguments and errors in the docstring of `Robot` to the docstrings of its methods."""
+    arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("These methods share these errors:")
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():
         if isinstance(method, FunctionType) and "threads" in method.__code__.co_varnames and method.__doc__:

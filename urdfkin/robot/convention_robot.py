@@ -19,14 +19,13 @@ if TYPE_CHECKING:
 class ConventionRobot:
     """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
 
-    The methods are those of `Robot` with the same arguments. q, v and a have the target program's order and
-    units. Jacobians have the target program's order of columns, and six-vectors have its order of rows. The
-    arguments `frame` and `reference` mean the same as in `Robot`. Pinocchio checks each result as usual,
-    before the result is converted.
+    The methods have the names and arguments of those of `Robot`. q, v and a, the columns of Jacobians and the
+    rows of six-vectors have the target program's order; q, v and a also have its units. Pinocchio checks each
+    result before the result is converted.
 
     Attributes:
-        robot: The robot itself.
-        conversion: The names and conversions of the convention: the result of `robot.convention(...)`.
+        robot: The robot.
+        conversion: Names and conversions of the convention, from `robot.convention(...)`.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating").with_convention("drake")
@@ -54,7 +53,7 @@ class ConventionRobot:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints in the target program, in that program's order."""
+        """Names of the joints in the target program, in the target program's order."""
         return self.conversion.joint_names
 
     @property
@@ -124,7 +123,7 @@ class ConventionRobot:
         return self.conversion.columns(ours[0], J)
 
     def imu(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
-        """Return an IMU's readings (..., 6), in this order: accelerometer, gyroscope; see `Robot.imu`."""
+        """Return an IMU's readings (..., 6), [accelerometer; gyroscope]; see `Robot.imu`."""
         return self._call(self.robot.imu, (q, v, a), frame, **options)[1]
 
     def _call(

@@ -1,7 +1,7 @@
 """Compute the motion of one frame along a trajectory, compared with Pinocchio, for plots and viewers.
 
 The equations are in sections 7.5 to 7.7 of the textbook. If urdfkin and Pinocchio disagree, the methods of
-`Robot` raise an error; this module returns the disagreement as a result.
+`Robot` raise an error, but `frame_motion` returns the disagreement.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class MotionCheck:
     """Comparison of a quantity from urdfkin with the same quantity from Pinocchio, for each sample.
 
     Attributes:
-        units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
-            Here eps is the machine epsilon, and scale is the size of the quantity's numbers.
-        share: (n,) the difference as a fraction of its bound; the check fails if a value is above 1.
+        units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale,
+            where eps is the machine epsilon, and scale is the size of the quantity's numbers.
+        share: (n,) the difference as a fraction of the bound; above 1 is a disagreement.
         bound: (n,) largest difference that rounding can cause, divided by eps * scale.
     """
 
@@ -55,10 +55,10 @@ class FrameMotion:
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
         movable: (6, nv) False for entries of the Jacobian that are 0 in every configuration.
-        parts: The contributions to the acceleration: for each joint, one for each term of the equation.
-        checks: Comparison with Pinocchio for each quantity, by its name. Empty if Pinocchio cannot check the
+        parts: Contributions to the acceleration, for each joint and each term of the equation.
+        checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
             robot.
-        not_verified: The reason why Pinocchio cannot check the robot; None if it can.
+        not_verified: Reason why Pinocchio cannot check the robot; None if Pinocchio can.
 
     >>> import urdfkin
     >>> urdfkin.frame_motion(urdfkin.load("planar_two_link"), ([[0, 0]], [[1, 0]], [[0, 0]]), "tip")
@@ -83,7 +83,7 @@ class FrameMotion:
 
     @property
     def agrees(self) -> bool:
-        """Whether all differences from Pinocchio are within their bounds; True if there is no comparison.
+        """Whether all differences from Pinocchio are within the bounds; True without a comparison.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").agrees
@@ -95,7 +95,7 @@ class FrameMotion:
     def singular_values(self) -> FloatArray:
         """(n, min(6, nv)) singular values of the Jacobian, largest first.
 
-        The rows of this Jacobian have different units: metres and radians.
+        The rows of the Jacobian have different units: metres and radians.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").singular_values.shape
@@ -116,7 +116,7 @@ class FrameMotion:
     def manipulability(self, rows: slice = slice(0, 6)) -> FloatArray:
         """Return Yoshikawa's manipulability sqrt(det J J^T), the product of the singular values.
 
-        With fewer joint velocities than rows, det J J^T is 0, and sqrt(det J^T J) is returned. Columns that
+        With fewer joint velocities than rows, det J J^T is 0, and the result is sqrt(det J^T J). Columns that
         are 0 for every q are left out, as in `Robot.singular_values`.
 
         Args:
@@ -146,14 +146,13 @@ def frame_motion(
 ) -> FrameMotion:
     """Compute the motion of a frame along a trajectory, and compare every sample with Pinocchio.
 
-    A disagreement does not raise an error. The result reports the disagreement in its attributes `agrees` and
-    `checks`.
+    A disagreement does not raise an error; the attributes `agrees` and `checks` of the result report it.
 
     Args:
         robot: The robot.
-        motion: A trajectory, as from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n, nv) in rad,
-            m and s.
-        frame: A link's or joint's name.
+        motion: A trajectory, such as from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n, nv) in
+            rad, m and s.
+        frame: Name of a link or joint.
         reference: Reference frame of velocity, acceleration and Jacobian.
 
     Raises:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: These findings only help the author of a URDF file. They are not reported for generated URDFs.
+#: Findings that help only the author of a URDF file, and are not reported for generated URDFs.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
@@ -63,7 +63,7 @@ def load(  # noqa: PLR0911  each kind of source has a branch
 ) -> Robot:
     """Return a robot from a URDF, an MJCF or USD file, a table or an object of another library.
 
-    The input is checked first. These sources are accepted:
+    urdfkin checks the source first. Accepted sources:
 
     - a path: .urdf, .xacro, .xml for MJCF (`docs/mjcf.md`), .usd, .usda, .usdc or .usdz (`docs/usd.md`)
     - a name of the catalogue; `urdfkin robots` lists them
@@ -72,30 +72,30 @@ def load(  # noqa: PLR0911  each kind of source has a branch
       becomes the root link, and its tip becomes the leaf link
     - a product of exponentials (`urdfkin.dh.screws`), or a file with M and screws
     - a `pinocchio.Model` or RobotWrapper, a `yourdfpy.URDF`, an ElementTree of Python or lxml
-    - a module of robot_descriptions, or its name, such as "panda_description", if that package is installed
+    - a module of the package robot_descriptions, or the name of such a module, such as "panda_description"
 
     Args:
         source: One of the sources above.
         verify: True: compare every result with Pinocchio. "sample": compare 100 configurations of each call.
             False: no comparison.
         mimic: True: mimic joints follow the mimicked joints, as the URDF states. False: each mimic joint
-            moves freely. None: True, except for catalogue robots with unusable mimic rules.
+            moves freely. None: True, except for robots of the catalogue with unusable mimic rules.
         root_joint: Kind of the joint between the world and the root link: "floating" or "planar". None: the
             root link is fixed.
-        xacro_args: Arguments for a .xacro file, which is expanded first (needs the extra `xacro`).
-        oracle: Oracle that checks quantities, "pinocchio" or "mujoco" (needs the extra `mujoco`).
+        xacro_args: Arguments for a .xacro file, which needs the extra `xacro`.
+        oracle: Oracle that checks quantities: "pinocchio", or "mujoco", which needs the extra `mujoco`.
         lock: Value (rad or m) of each joint to lock, such as `{"finger": 0.04}`; see `Robot.locked`.
         joints: The joints that remain movable; see `Robot.locked`.
         variant: Variant to select in each variant set of a USD stage, such as `{"Gripper": "Robotiq"}`.
         articulation: Path or name of the articulation, for a USD stage with several articulations.
 
     Returns:
-        The robot. Each warning about the file is issued as an `UrdfWarning`, except for catalogue robots.
+        The robot. Warnings about the file are issued as `UrdfWarning`, except for robots of the catalogue.
 
     Raises:
         UrdfError: the file has errors; `findings` lists them with their positions.
         SourceError: the source cannot be read.
-        UnknownNameError: no file and no robot has that name; the message lists the nearest names.
+        UnknownNameError: no file and no robot has the name `source`; the message lists similar names.
         TableError: the robot made from a table does not reproduce the tip placements of the table.
         InputError: an argument has an invalid value.
 
@@ -313,11 +313,11 @@ def robot_of(
     table: bool = False,
     quiet: bool = False,
 ) -> Robot:
-    """Return the robot of a URDF text that is already in memory; errors in the text raise UrdfError.
+    """Return the robot of a URDF text in memory; the first six options are those of `load`.
 
-    The first six options are those of `load`. If the text was generated from another source, `made` is True,
-    and `listed` are the findings about that source. `table` says whether the source was a Denavit-Hartenberg
-    table or a product of exponentials. If `quiet` is True, no warnings are issued.
+    `made` states whether urdfkin generated the text from another source, and `listed` contains findings about
+    this source. `table` states whether the source is a Denavit-Hartenberg table or a product of exponentials.
+    With `quiet`, no warnings are issued. Errors in the text raise UrdfError.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle
@@ -365,10 +365,12 @@ def robot_of(
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
-    """Return the reason why Pinocchio cannot check the robot, from the findings; None if it can."""
+    """Return the first finding because of which Pinocchio cannot check the robot; None: no such finding."""
+    problems = {
+        PinocchioReading.REFUSES: "Pinocchio refuses the file",
+        PinocchioReading.DIFFERS: "Pinocchio reads another robot",
+    }
     for finding in findings:
-        if finding.oracle is PinocchioReading.REFUSES:
-            return f"Pinocchio refuses the file ({finding.code}, line {finding.line}: {finding.message})"
-        if finding.oracle is PinocchioReading.DIFFERS:
-            return f"Pinocchio reads another robot ({finding.code}, line {finding.line}: {finding.message})"
+        if finding.oracle in problems:
+            return f"{problems[finding.oracle]} ({finding.code}, line {finding.line}: {finding.message})"
     return None

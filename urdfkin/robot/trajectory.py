@@ -1,17 +1,16 @@
 """Make a trajectory from a line between two configurations, or from samples in a CSV or .npz file.
 
-A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. The motion starts and ends at
-rest, and the acceleration is continuous. If a file has no joint velocities, they are computed by central
-differences of the configurations, after the angles are unwrapped. The error of these joint velocities is
-proportional to the square of the time step. If joint accelerations are computed from configurations, their
-errors at the start and the end of the trajectory are larger. These errors are proportional to the time step.
-To estimate the errors, the differences are also computed from every second sample, and the two results are
-compared.
+*Line.* A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. The motion starts and
+ends at rest, and the acceleration is continuous.
 
-A log often wraps the angle of a wheel to [-pi, pi] or [0, 2 pi]. If the wheel passes the end of this range,
-the angle in the log jumps. A velocity that is computed from this jump would be huge and wrong. The angle of a
-planar joint wraps in the same way. The quaternion of a floating joint may change its sign without a change of
-orientation.
+*Differences.* Joint velocities that a file does not contain are computed by central differences of the
+configurations, with an error proportional to the square of the time step. Joint accelerations from
+configurations have larger errors at the start and the end of the trajectory, which are proportional to the
+time step. To estimate the errors, the differences are also computed from every second sample.
+
+*Unwrapping.* A log often wraps the angle of a wheel or of a planar joint to [-pi, pi] or [0, 2 pi], so the
+angle jumps at the end of the range. The quaternion of a floating joint may change its sign without a change
+of orientation. A velocity from such a jump would be huge and wrong, so the jumps are removed first.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.inputs import FloatArray, scalars
 from urdfkin.kinematics.rotation import angular_velocity_from_quaternion_rates, rotation_of
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import checked, places
+from urdfkin.model.configuration import checked, coordinate_layout
 from urdfkin.model.configuration_like import Given, listed, wrong_count
 from urdfkin.model.integration import difference, integrate
 from urdfkin.model.tree import Joint, JointKind, KinematicTree, frozen
@@ -48,16 +47,18 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
 
 
-#: Each array has a shape, which is stated without the first axis (the index of the sample).
+#: Shape of each array without the first axis, which is the index of the sample.
 Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
     """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
 
-    Pickled objects are rejected, so no code from the file is executed. A file that cannot be read or has no
-    numbers raises SourceError. An array that is unknown, missing, of a wrong shape or not finite raises
-    InputError.
+    Pickled objects are rejected, so no code from the file is executed.
+
+    Raises:
+        SourceError: the file cannot be read, or does not contain numbers.
+        InputError: an array is unknown, missing, of a wrong shape or not finite.
     """
     try:
         with np.load(io.BytesIO(read_bytes(path, MOST_DATA, pipes=True)), allow_pickle=False) as archive:
@@ -110,11 +111,11 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
         )
 
 
-#: A second difference needs three samples.
+#: Minimum number of samples; a second difference needs three.
 _FEWEST = 3
-#: These arrays of an .npz file contain the fields of `BaseMotion`.
+#: Arrays of an .npz file with the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: A note tells the user if the rounding error of the times exceeds this fraction of the smallest time step.
+#: Largest rounding error of the times, as a fraction of the smallest time step, without a note for the user.
 _TIME_ROUNDING = 1e-6
 
 
@@ -124,7 +125,7 @@ class TrajectorySamples:
 
     Attributes:
         where: Name of the file.
-        q: (n, nq) configurations, as they are in the file.
+        q: (n, nq) configurations, not unwrapped.
         t: (n,) seconds, increasing.
         v: (n, nv) joint velocities.
         a: (n, nv) joint accelerations; None if `v` is None.
@@ -148,14 +149,13 @@ class Trajectory:
         q: (n, nq) configurations, rad and m.
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
-        rates: How v and a were obtained, as text.
-        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, their error is
-            unknown.
-        notes: Remarks for the user about the samples, for example about unwrapped angles. Each remark is one
-            line.
-        base: Motion of the root link for all n samples. None if the root link is fixed at the world's origin.
-        errors: Estimated largest error of v and estimated largest error of a, if v and a were computed by
-            differences. None if v and a were given, or if there are too few samples.
+        rates: Origin of v and a, such as "by central differences".
+        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, the error of v
+            and a is unknown.
+        notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
+        base: Motion of the root link for all n samples; None: fixed at the world origin.
+        errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
+            with too few samples.
 
     >>> import urdfkin
     >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
@@ -176,7 +176,7 @@ class Trajectory:
         return f"<Trajectory: {len(self.t)} samples in {self.t[-1] - self.t[0]:.4g} s, rates {self.rates}>"
 
     def derivation(self) -> str:
-        """Return one line that states how v and a were obtained, with the estimates of their errors.
+        """Return one line with the origin of v and a, and with the estimates of the errors.
 
         >>> import urdfkin
         >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101).derivation()
@@ -194,10 +194,18 @@ class Trajectory:
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
     """Return a straight line in joint space between two configurations, with zero velocity at both ends.
 
-    Planar and floating joints move from start to end with a constant twist direction (a screw motion). They
-    turn by at most half a turn. A continuous joint moves by `end - start`, also if this is more than one
-    turn. The duration in seconds must be positive, and `samples` (with both ends) at least 3; else
-    InputError.
+    Planar and floating joints make a screw motion of at most half a turn. A continuous joint moves by
+    `end - start`, even by more than one turn.
+
+    Args:
+        robot: The robot.
+        start: (nq,) rad, m.
+        end: (nq,) rad, m.
+        duration: Duration, s.
+        samples: Number of samples, with both ends; at least 3.
+
+    Raises:
+        InputError: a wrong length, fewer than 3 samples, or a duration that is not positive.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("ur5")
@@ -222,8 +230,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # The joint velocities are `step` times s', and the joint accelerations are `step` times s''.
-    # The same is true for screw motions, because their velocities are expressed in the moving frame.
+    # With the derivatives s' and s'' of s, v is `step` times s', and a is `step` times s''.
+    # Screw motions have constant directions too, because their velocities are expressed in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -242,14 +250,13 @@ def read_trajectory(
     | motion of the root link | | base_placement (n, 4, 4), base_velocity (n, 6), base_acceleration (n, 6) |
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
-    Without t, the samples are one second apart. If the file has no `a`, the accelerations are computed by
-    central differences of v. If the file has no v and a, both are computed by central differences. The angles
-    of continuous, planar and floating joints are unwrapped first. The attributes `rates`, `errors` and
-    `notes` of the result report these computations.
+    Without t, the samples are one second apart. If the file has no a, or neither v nor a, central differences
+    replace the missing arrays. For v, the angles of continuous, planar and floating joints are unwrapped
+    first. The attributes `rates`, `errors` and `notes` of the result report these computations.
 
     Args:
         robot: The robot.
-        path: The file. A file with the suffix .npz is read as an .npz file, and any other file as CSV.
+        path: The file; any suffix but .npz means CSV.
         convention: Convention of the file's names and numbers, as in `Robot.convention`; None: urdfkin's.
 
     Raises:
@@ -274,7 +281,7 @@ def read_trajectory(
 
 
 def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None) -> TrajectorySamples:
-    """Read the samples of a file as `read_trajectory` does, but compute no missing velocities."""
+    """Read the samples of a file like `read_trajectory`, but without computing missing velocities."""
     archive = path.suffix.lower() == ".npz"
     data = _arrays(path, conversion or robot) if archive else _table(robot, path, conversion)
     t, v, a = (data.get(name) for name in "tva")
@@ -301,9 +308,10 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
 
 
 def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
-    """Return samples as a trajectory; compute v and a by central differences if they are missing.
+    """Return samples as a trajectory, with central differences for missing arrays v and a.
 
-    Too few samples raise InputError.
+    Raises:
+        InputError: there are too few samples.
     """
     n = len(x.q)
     if n < _FEWEST:
@@ -317,8 +325,7 @@ def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # With half of the samples, the time step doubles, and so does an error proportional to the time step.
-        # An error that is proportional to the square of the time step is then four times as large.
+        # The error is proportional to the time step to this power.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
     words = "by central differences" if x.v is None else "v as given, a by central differences of v"
@@ -337,9 +344,9 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of central differences from all samples and from half of the samples.
+    """Estimate the largest error of differences from all samples and from half of the samples.
 
-    The error of the differences is proportional to the time step to the power `order`.
+    With half of the samples, the error is larger by the factor 2^`order`.
     """
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
@@ -377,7 +384,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
     """Return the unit of each number of "q", "v" or "a" by its name, such as "m/s"; "" for quaternions."""
-    layout = conversion.layout(letter) if conversion else places(robot.tree, letter)
+    layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
         name: f"{unit}{per}" if unit else "" for name, unit in zip(layout.names, layout.units, strict=True)
@@ -385,7 +392,7 @@ def column_units(robot: Robot, letter: str, conversion: Conversion | None = None
 
 
 def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
-    """Return the arrays in an .npz file: t, q, v and a, and the arrays of the base's motion."""
+    """Return the arrays t, q, v and a of an .npz file, and the arrays of the base's motion."""
     shapes = {"t": (), "q": (known.nq,), "v": (known.nv,), "a": (known.nv,)}
     base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True))
     data = read_arrays(path, shapes | base, ["q"])
@@ -397,10 +404,7 @@ def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 
 
 def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """Return joint velocities (n, nv) by central differences of configurations.
-
-    The velocities of planar and floating joints are in the moving frame.
-    """
+    """Return joint velocities (n, nv) by central differences; free joints: in the moving frame."""
     slopes = _gradient(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -445,9 +449,8 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
-    names of the columns, in any order. Without names, the columns are the columns in `required`, in this
-    order. A file that does not fit raises InputError.
+    Empty lines and lines that begin with # are skipped. The first other line may contain the names of the
+    columns, in any order. Without names, the columns are those in `required`, in this order.
 
     Args:
         text: The content of the file.
@@ -456,8 +459,10 @@ def read_columns(
         required: Names of the required columns.
         optional: Names of the optional columns.
         named: Whether the first line must contain the names.
-        units: SI unit of each column that may have a unit at the end of its heading, for example `elbow
-            [deg]` or `elbow_deg`.
+        units: SI unit of each column whose heading may end with a unit, such as `elbow [deg]` or `elbow_deg`.
+
+    Raises:
+        InputError: the text does not fit the columns.
 
     >>> read_columns("b,a\n1,2\n3,4\n", "x.csv", "q", ["a", "b"])["a"].tolist()
     [2.0, 4.0]
@@ -489,14 +494,14 @@ def read_columns(
     }
 
 
-#: Allowed names of the time column
+#: Allowed names of the time column.
 _TIMES = ("t", "time", "timestamp")
-#: One second has this number of units.
+#: Number of units of time in one second, by the name of the unit.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
 }  # fmt: skip
-#: CSV column names may end with a unit: `v:elbow_deg_s`, `a:elbow_rad_per_s2`, `elbow_deg`.
+#: Patterns of column names that end with a unit: `v:elbow_deg_s`, `a:elbow_rad_per_s2`, `elbow_deg`.
 _SUFFIXES = (
     re.compile(r"(.+)_(deg|rad|mm|m)_(?:per_)?(s2?)", re.DOTALL),
     re.compile(r"(.+)_(deg|rad|mm|m|s|ms|us|ns)", re.DOTALL),
@@ -504,7 +509,7 @@ _SUFFIXES = (
 
 
 def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column that a heading names, and the unit of its numbers; "" for the SI unit.
+    """Return the column that a heading names, and the unit of the numbers in the column; "" for the SI unit.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
@@ -534,9 +539,10 @@ def _column_name(heading: str, units: Mapping[str, str]) -> str:
 
 
 def _unit(text: str, where: str, expected: str) -> str:
-    """Return the short name of a unit that a heading names; "" for the SI unit.
+    """Return the short name of a unit in a heading; "" for the SI unit.
 
-    A unit that is unknown or does not fit the column raises InputError.
+    Raises:
+        InputError: the unit is unknown, or does not fit the column.
     """
     if expected == "s":
         if (factor := _PER_SECOND.get(text.strip().lower())) is None:
@@ -554,14 +560,14 @@ def _unit(text: str, where: str, expected: str) -> str:
 
 
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
-    """Return a column in SI units; 30 degrees become the same double as the text `30deg` elsewhere."""
+    """Return a column in SI units; 30 degrees become the double that `parse_quantity` returns for `30deg`."""
     if unit == "deg":
         return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
 def width_of(text: str, where: str) -> int:
-    """Return the number of cells in the first line that is not skipped; 0 if all lines are skipped."""
+    """Return the number of cells in the first line that is not skipped; 0: no such line."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
@@ -591,7 +597,7 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a line contains the names of columns; a name can also be a number, such as "1"."""
+    """Return whether a line contains the names of columns, which can also be numbers, such as "1"."""
     return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
@@ -620,14 +626,14 @@ def _check_columns(
         )
 
 
-#: The largest and the smallest of angles that were wrapped to one turn differ by at most this value (rad).
-#: It includes a margin for angles that are rounded to two decimals.
+#: Largest range of angles that were wrapped to one turn, rad, with a margin for a rounding to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: If a joint turns by more than this angle (rad) between two samples, its direction is uncertain.
-#: In the opposite direction, the joint would turn by less than twice this angle.
+#: Angle between two samples, rad, above which the direction of the rotation is uncertain. In the opposite
+#: direction, the joint would turn by less than twice this angle.
 _AMBIGUOUS = math.tau / 3.0
 
-#: A smaller motion (rad or m) of a mimic joint, by a whole turn of its mimicked joint, counts as rounding.
+#: Largest motion (rad or m) of a mimic joint that counts as rounding, if the mimicked joint makes whole
+#: turns.
 _ROUNDING = 1e-9
 
 
@@ -643,9 +649,9 @@ class Unwrapped:
 def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
     """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
-    Between two samples a joint is assumed to turn in the shorter direction. If the angles of a joint span
-    more than one turn, they were not wrapped and stay unchanged. Revolute joints have limits, and their
-    angles stay unchanged too.
+    Between two samples, a joint is assumed to turn in the shorter direction. Angles that span more than one
+    turn were not wrapped, and stay unchanged. The angles of revolute joints, which have limits, stay
+    unchanged too.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -661,7 +667,7 @@ def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
 
 
 def _turning(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Unwrap the angle of a continuous or planar joint, which is the joint's last coordinate."""
+    """Unwrap the last coordinate of a continuous or planar joint, an angle."""
     angle, notes = own[:, -1], []
     new = own.copy()
     within_one_turn = bool(np.ptp(angle) <= _ONE_TURN)
@@ -685,7 +691,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Choose the signs of a floating joint's quaternions so that consecutive ones are close."""
+    """Choose the signs of a floating joint's quaternions so that consecutive quaternions are close."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]
@@ -720,7 +726,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint that moves if whole turns are added to its mimicked joint."""
+    """Yield a note for each mimic joint that moves if the mimicked joint turns by whole turns."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

@@ -1,12 +1,12 @@
 """Store results in a cache on disk, with a checksum in each file.
 
-urdfkin later executes or unpickles cached files, so another user's file could run any code. For this reason,
-a folder is used only if no other user can write to it. Its name contains a digest of the source files, so a
+urdfkin executes or unpickles cached files, so another user's file could run any code. A folder is therefore
+used only if no other user can write to it. The name of a folder contains a digest of the source files, so a
 changed source file leads to another folder. A folder that urdfkin has not used for a month is deleted.
 
-A truncated or corrupted file could crash the process or compute a wrong result, so it is reported and
-replaced. The checksum includes the names of the file and its folder. Therefore, `get` detects a renamed file,
-which could belong to another robot.
+A truncated or corrupted file could crash the process or cause a wrong result, so such a file is reported and
+replaced. The checksum includes the names of the file and of the folder, because a renamed file could belong
+to another robot.
 """
 
 from __future__ import annotations
@@ -29,11 +29,12 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
-#: Version of the checksum. The digest in a folder's name includes this version.
+#: Version of the checksum, which is a part of the digest in a folder's name.
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
+#: Name of a file whose modification time is the last use of the folder.
 _USED = ".used"
-#: Root, and the host's root user in some containers, may own the parent folders.
+#: Users that may own parent folders: root, and the host's root user in some containers.
 _TRUSTED = (0, 65534)
 
 
@@ -41,12 +42,11 @@ class CacheWarning(UserWarning):
     """The cache cannot be used, or a cached file is damaged; the results are not affected."""
 
 
-def kept_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | None = None) -> Path | None:
-    """Return a cache folder that only this user can write to; create it if it does not exist.
+def cache_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | None = None) -> Path | None:
+    """Return a cache folder to which only this user can write; None, with a warning, if impossible.
 
-    The folder's name begins with `kind`. Its digest includes the contents of the files `sources` and the
-    `texts`, for example options. The default of `root` is the user's cache folder. If no such folder can be
-    used, the function issues a `CacheWarning` and returns None.
+    The folder's name is `kind` and a digest of the contents of the files `sources` and of `texts`, such as
+    options. `root` is the parent folder; None: the user's cache folder. Missing folders are created.
     """
     digest = hashlib.sha256("\n".join([_CHECKSUM_VERSION, *texts]).encode())
     for source in sources:
@@ -80,9 +80,9 @@ _warned: set[str] = set()
 
 
 def _unsafe_reason(folder: Path) -> str | None:
-    """Return the reason why another user could have written to a folder; None if this is impossible.
+    """Return the reason why another user could have written to a folder; None if no other user could.
 
-    If a user can write to a parent folder without the sticky bit, this user can replace the folder.
+    A user who can write to a parent folder without the sticky bit can replace the folder.
     """
     me = os.geteuid()
     for place in (folder, *folder.parents):
@@ -118,7 +118,7 @@ _DIGEST = hashlib.sha256().digest_size
 
 
 def put(place: Path, data: bytes) -> None:
-    """Write a file with a checksum, completely or not at all; a failure is only a `CacheWarning`."""
+    """Write a file with a checksum, completely or not at all; report a failure as a `CacheWarning`."""
     name = ""
     try:
         with tempfile.NamedTemporaryFile(dir=place.parent, prefix=f".{place.name}.", delete=False) as file:
@@ -133,7 +133,7 @@ def put(place: Path, data: bytes) -> None:
 
 
 def get(place: Path) -> bytes | None:
-    """Return the content of a file that `put` wrote; None if it is missing or, with a warning, damaged."""
+    """Return the content of a file that `put` wrote; None for a missing or, with a warning, damaged file."""
     try:
         content = read_if_there(place, MOST_DATA)
     except SourceError as error:
@@ -156,5 +156,5 @@ def _checksum(place: Path, data: bytes) -> bytes:
 
 
 def report_damaged(place: Path, reason: str) -> None:
-    """Warn that a cached file is damaged; the caller computes the content again and replaces the file."""
+    """Warn that a cached file is damaged, and that urdfkin computes the content again."""
     say_once(f"{place} is damaged and is computed again: {reason}")

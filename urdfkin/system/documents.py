@@ -1,7 +1,7 @@
 """JSON documents: their common header, their schemas, and functions that read and write them.
 
-A `TypedDict` defines the entries of a document. Its JSON Schema is generated from this `TypedDict`, and
-documents from files are checked against it. `plain` turns results into documents.
+A `TypedDict` defines the entries of a document. urdfkin generates the document's JSON Schema from the
+`TypedDict`, and uses the `TypedDict` to check documents from files. `plain` turns results into documents.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 class Header(TypedDict):
     """The first entries of every certificate and report.
 
-    These entries name the kind of document and the verdict. They also contain the package versions and the
-    robot texts on which the verdict depends.
+    The entries name the kind of document, the verdict, and the package versions and robot texts on which the
+    verdict depends.
     """
 
     schema: Annotated[str, says("Name and version of the layout of this document.")]
@@ -77,10 +77,11 @@ class DocumentKind(Generic[_T]):
     """A kind of document, for example a certificate.
 
     Attributes:
-        name: The value of the entry "schema" in each document of this kind: a name, a slash and a version.
+        name: Value of the entry "schema": a name, a slash and a version.
+        type: The `TypedDict` of the entries.
         verdicts: The possible verdicts; empty if the document has no header.
-        made_by: The urdfkin command that writes documents of this kind.
-        is_open: Whether a document may have other entries, for example of a later version of urdfkin.
+        made_by: Command that writes documents of this kind.
+        is_open: Whether a document may have unknown entries, for example of a later version of urdfkin.
     """
 
     name: str
@@ -115,7 +116,7 @@ class DocumentKind(Generic[_T]):
         return self.checked(read_json(path), str(path))
 
     def checked(self, data: object, where: str) -> _T:
-        """Return the data of the file `where` as a document, or raise InputError if they do not conform."""
+        """Return the data of the file `where` as a document; raise InputError for an invalid document."""
         self._demand_name(data, where)
         try:
             document = typed(data, self.type)
@@ -157,7 +158,7 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the JSON path and the name of an entry that is only in `data`, not in `document`, or None."""
+    """Return the JSON path and the name of an entry of `data` that is not in `document`; None: no entry."""
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"
@@ -170,12 +171,12 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Convert a result to dicts, lists, texts and numbers, from which `typed` restores it. Infinity stays."""
+    """Convert a result to dicts, lists, texts and numbers, infinity included; `typed` is the inverse."""
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
 
 def typed(data: object, type_: type[_T]) -> _T:
-    """Return data as an object of a type; raise ValueError with the path of an entry that does not fit."""
+    """Return data as an object of a type; raise ValueError with the path of an invalid entry."""
     try:
         return msgspec.convert(data, type_)
     except msgspec.ValidationError as error:
@@ -186,7 +187,7 @@ def plain(value: Any) -> Any:
     """Return a result as plain data for JSON.
 
     Data classes become objects, enums become their values, and arrays and tuples become lists. Infinity and
-    NaN do not exist in JSON and become None.
+    NaN, which JSON does not have, become None.
 
     >>> plain({"worst": math.inf, "frames": ("a", "b")})
     {'worst': None, 'frames': ['a', 'b']}
@@ -195,12 +196,12 @@ def plain(value: Any) -> Any:
 
 
 def read_json(path: Path) -> object:
-    """Read a JSON file; raise SourceError if it cannot be read, and InputError as `parse_json` does."""
+    """Read a JSON file; raise SourceError if the file cannot be read, and InputError like `parse_json`."""
     return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
 
 
 def parse_json(content: bytes, where: str) -> object:
-    """Parse a file; raise InputError if it is not JSON, or has a number beyond the range of doubles."""
+    """Parse JSON; raise InputError for invalid JSON, or for a number beyond the range of doubles."""
     try:
         return json.loads(content, parse_constant=_number, parse_float=_number)
     except (ValueError, RecursionError) as error:

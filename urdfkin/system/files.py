@@ -1,8 +1,8 @@
 """Read and write files safely, and replace parts of a text.
 
-By default, the functions accept regular files only: an untrusted folder may contain a link to an endless
-device, or a named pipe without a writer. A path from the caller may be a pipe, as in
-`urdfkin check <(xacro arm.xacro)`. A pipe is read with a timeout; Python's `open` would wait for ever.
+By default, the functions accept regular files only, because an untrusted folder may contain a link to an
+endless device, or a named pipe without a writer. A path from the user may be a pipe, such as
+`<(xacro arm.xacro)` in bash. A pipe is read with a timeout; Python's `open` would wait for ever.
 """
 
 from __future__ import annotations
@@ -44,12 +44,13 @@ def edited(data: bytes, edits: Iterable[Edit]) -> bytes:
     return b"".join([*parts, data[cursor:]])
 
 
-#: urdfkin waits this time (s) for a process that opens the other end of a named pipe.
+#: Maximum time to wait for a process that opens the other end of a named pipe, s.
 PATIENCE = 10.0
-#: A robot, a table, a settings file or a cached file has at most this size in bytes.
+#: Maximum size of a robot, a table, a settings file or a cached file, bytes.
 MOST = 100_000_000
-#: Data (trajectories, samples, reports) have at most this size in bytes.
+#: Maximum size of data (trajectories, samples, reports), bytes.
 MOST_DATA = 2_000_000_000
+#: Maximum number of bytes of one read.
 _AT_A_TIME = 2**20
 _KINDS = {
     stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a character device",
@@ -60,7 +61,7 @@ _KINDS = {
 def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
     """Return the content of a file of at most `most` bytes, or raise SourceError.
 
-    Use `pipes=True`, which also reads pipes and devices, only for a path that the user named.
+    With `pipes=True`, for paths that the user named, the function also reads pipes and devices.
     """
     data = read_start(path, most + 1, pipes=pipes)
     if len(data) > most:
@@ -150,7 +151,7 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists, or is too long: then the error occurs when the file is read."""
+    """Return whether a path exists; True for a path that is too long, so that reading reports the error."""
     try:
         return path.exists()
     except OSError:
@@ -166,7 +167,7 @@ def is_folder(path: Path) -> bool:
 
 
 def at_home(name: str | os.PathLike[str]) -> Path:
-    """Expand `~` to the home folder; a name whose `~` cannot be expanded stays as it is."""
+    """Expand `~` to the home folder, if the home folder is known."""
     try:
         return Path(name).expanduser()
     except RuntimeError:
@@ -201,9 +202,10 @@ def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
 
 
 def _first_of_pipe(descriptor: int, path: Path) -> bytes:
-    """Return the first available bytes of a pipe, or b"" if a writer has connected but written nothing.
+    """Return the first available bytes of a pipe, or b"" if a connected writer has written nothing yet.
 
-    Raise SourceError if no process opens the pipe for writing in time.
+    Raises:
+        SourceError: no process opens the pipe for writing within `PATIENCE` seconds.
     """
     events = select.poll()
     events.register(descriptor, select.POLLIN)
@@ -212,9 +214,9 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
         try:
             if piece := os.read(descriptor, _AT_A_TIME):
                 return piece
-        except BlockingIOError:  # a writer is connected but has written nothing yet
+        except BlockingIOError:  # a writer is connected
             return b""
-        # POLLHUP means that a writer connected and closed the pipe.
+        # After POLLHUP, a writer has connected and closed the pipe.
         if any(event & select.POLLHUP for _, event in events.poll(0)):
             return b""
         time.sleep(0.01)
@@ -227,10 +229,12 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all: write a temporary file in the same folder and rename it.
+    """Write a file completely or not at all, through a temporary file in the folder that is then renamed.
 
-    A link is followed. A device or a pipe, such as `/dev/null`, is written directly. Raise SourceError on a
-    failure, for example without permission or on a full disk.
+    A link is followed. A device or a pipe, such as `/dev/null`, is written directly.
+
+    Raises:
+        SourceError: the file cannot be written, for example without permission or on a full disk.
     """
     name = ""
     try:

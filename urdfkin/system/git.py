@@ -1,7 +1,7 @@
 """Read files of an older version of a git repository.
 
 The module uses only git commands that read git objects. Commands that read the working tree (`diff`,
-`status`) run external programs. The settings of an untrusted repository could name any program.
+`status`) run external programs, and the settings of an untrusted repository could name any program.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ class Version:
     """The files of one commit of a git repository.
 
     Attributes:
-        root: The repository's root folder; names are relative to it.
-        files: Git's digest of the content of each file.
+        root: The repository's root folder.
+        files: Git's digest of the content of each file, by the name relative to `root`.
+        digests: The digests of all files.
         gone: Base names of the files that no longer exist in the working tree.
     """
 
@@ -43,7 +44,7 @@ class Version:
         )
 
     def changed(self, endings: tuple[str, ...]) -> bool:
-        """Return whether a file with one of these suffixes was changed or deleted since this version."""
+        """Return whether a file with one of the suffixes `endings` has changed since this version."""
         names = (name for name in self.files if name.endswith(endings))
         return not all(
             (self.root / name).is_file() and self.holds(read_bytes(self.root / name)) for name in names
@@ -52,7 +53,8 @@ class Version:
     def read(self, path: Path) -> bytes | None:
         """Return the content of a file in this version; None if the file did not exist.
 
-        Raise SourceError if git failed, or if the file was larger than `MOST` bytes.
+        Raises:
+            SourceError: git failed, or the file was larger than `MOST` bytes.
         """
         if (digest := self.files.get(self.name(path))) is None:
             return None
@@ -69,7 +71,8 @@ class Version:
 def version_before(reference: str, folder: Path) -> Version:
     """Return the merge base of the current commit and a reference (a branch, tag or commit).
 
-    Raise SourceError if git is not installed, the folder is in no repository, or there is no merge base.
+    Raises:
+        SourceError: git is not installed, the folder is in no repository, or there is no merge base.
     """
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
     try:

@@ -1,7 +1,7 @@
 """Lazy imports, versions of installed packages, and hooks.
 
-A hook is a function with a name; `urdfkin/__init__.py` registers the hooks. A module can call a hook without
-importing the module of the function.
+A hook is a function with a name, which a module can call without importing the function's module.
+`urdfkin/__init__.py` registers the hooks.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ def lazy_import(home: str) -> Callable[..., Any]:
 def is_a(x: object, home: str) -> bool:
     """Return whether an object is an instance of the class `module:name`, without importing the module."""
     module, _, name = home.partition(":")
-    # If the module is not imported yet, no object can be an instance of its class.
+    # Before a module is imported, no object can be an instance of a class of the module.
     return isinstance(x, getattr(sys.modules.get(module), name, ()))
 
 
 @cache
 def installed_version(package: str) -> str | None:
-    # The name of the metadata folder begins with the package's name.
-    # This loop is faster than `importlib.metadata`, which takes 15 ms to import.
+    # A search of the metadata folders is faster than `importlib.metadata`, which takes 15 ms to import.
     start, end = f"{package.replace('-', '_')}-", ".dist-info"
     for entry in filter(os.path.isdir, sys.path):
         for name in os.listdir(entry):  # noqa: PTH208  the function of pathlib is slower
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    # A file in the current folder could replace modules that `metadata` imports.
+    # `metadata` imports many modules, which files in the current folder could replace at the start of
+    # urdfkin.
     from importlib import metadata
 
     try:
@@ -56,7 +56,7 @@ def installed_version(package: str) -> str | None:
         return None
 
 
-#: Each extra for users in pyproject.toml adds this requirement.
+#: Requirement of each extra for users in pyproject.toml.
 EXTRAS = {
     "xacro": "xacrodoc>=2",
     "plots": "matplotlib>=3.10.7",
@@ -69,9 +69,7 @@ EXTRAS = {
 
 
 def install_remedy(extra: str) -> str:
-    """Return the command that installs the package of an extra.
-
-    The command names the package, not `urdfkin[...]`: no package index has urdfkin yet.
+    """Return the command that installs the package of an extra; no package index has `urdfkin[...]` yet.
 
     >>> install_remedy("usd")
     "pip install 'usd-core>=25.5'"

@@ -1,8 +1,8 @@
 """Locks that are unlocked in a child process after a fork.
 
-A fork copies all locks, but only the thread that calls `fork`. Another thread's lock would stay locked in the
-child for ever. `import urdfkin` imports this module first. This module imports nothing that an untrusted
-current folder could replace.
+A fork copies all locks, but only the thread that calls `fork`. A lock that another thread holds would stay
+locked in the child for ever. `import urdfkin` imports this module first, so this module imports nothing that
+an untrusted current folder could replace.
 """
 
 from __future__ import annotations
@@ -11,18 +11,17 @@ import os
 import threading
 
 _locks: list[threading.RLock] = []
-#: This dictionary maps the identifier of a forking thread to the locks that it acquired before the fork.
+#: Locks that a thread acquired before a fork, by the identifier of the thread.
 _acquired: dict[int, list[threading.RLock]] = {}
 
 
 def lock_over_forks() -> threading.RLock:
     """Return a lock that is unlocked in a child process after a fork.
 
-    A fork waits until the lock is free. It acquires the locks in reverse order of their creation, so a thread
-    that needs two of these locks must also acquire the newer lock first.
+    A fork waits until the lock is free. A fork acquires all locks in reverse order of their creation, so a
+    thread that needs two locks must also acquire the newer lock first.
 
-    Use this function only for locks that are module variables. This module never removes a lock from its
-    list, so a lock of a deleted object would stay in the list until the process ends.
+    Use this function only for module variables, because this module stores each lock until the process ends.
     """
     importing.register()
     lock = threading.RLock()
@@ -38,7 +37,7 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # The list is empty if another thread registered this function while the fork was already running.
+    # The list is empty if another thread registered this function during the fork.
     for lock in reversed(_acquired.pop(threading.get_ident(), [])):
         lock.release()
 
@@ -46,13 +45,12 @@ def _after_fork() -> None:
 class _ImportLock:
     """The lock that a thread holds during a lazy import.
 
-    Without this lock, another thread could fork a child during the import. The child would wait for ever for
-    the end of that import.
+    Without this lock, another thread could fork a child during the import, and the child would wait for ever
+    for the end of the import.
 
     A fork also acquires the lock of `logging`, which an imported module may need. To avoid a deadlock, a fork
-    must acquire the import lock before the lock of `logging`. Python calls the registered functions in
-    reverse order of their registration. For this reason, `register` imports `logging` first and then
-    registers `_before_fork`.
+    must acquire the import lock before the lock of `logging`. Python calls registered functions in reverse
+    order of registration, so `register` imports `logging` before it registers `_before_fork`.
     """
 
     def __init__(self) -> None:

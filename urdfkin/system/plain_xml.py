@@ -1,7 +1,6 @@
-"""Parse XML like urdfdom: names as written, with undeclared namespace prefixes allowed.
+"""Parse XML like urdfdom, which accepts undeclared namespace prefixes; ElementTree's parser rejects them.
 
-ElementTree's own parser refuses an undeclared prefix, which urdfdom accepts. The parser of this module is
-independent of `urdfkin.urdf.parser`, so it can check that parser's results.
+The parser of this module is independent of `urdfkin.urdf.parser`, whose results it checks.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ def plain_xml(text: str) -> Element:
 
 
 def order_words(urdf: str, joints: Sequence[str]) -> str:
-    """Return a sentence that compares the order of a URDF's joints with `joints`, in the order of q."""
+    """Return a sentence that compares the order of a URDF's joints with `joints`, the order of q."""
     known = set(joints)
     written = [e.get("name", "") for e in plain_xml(urdf) if e.tag == "joint" and e.get("name") in known]
     ours = [name for name in joints if name in set(written)]

@@ -1,8 +1,8 @@
 """Child processes, and threads with a large stack.
 
-Child processes of urdfkin do not import from the current folder. urdfkin runs in folders with untrusted
-robots, and `python -c` and `python -m` search the current folder first: a file `json.py` beside a robot would
-be run. Libraries also search the current folder for settings files.
+The current folder may contain untrusted files. Python's options -c and -m search the current folder for
+modules first, so a file `json.py` beside a robot would be run. Child processes of urdfkin therefore do not
+import from the current folder. Libraries also search the current folder for settings files.
 """
 
 from __future__ import annotations
@@ -17,23 +17,22 @@ from typing import TypeVar
 
 from urdfkin.system.locks import lock_over_forks
 
-#: A Python interpreter may need these environment variables to start.
+#: Environment variables that a Python interpreter may need to start.
 _NEEDED = ("LD_LIBRARY_PATH",)
-#: Linear algebra uses one thread, because a confined process has little address space for threads.
+#: One thread for linear algebra, because a confined process has little address space for threads.
 _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
-    """Return a command that runs code in a new interpreter.
+    """Return a command that runs code in a new interpreter with the given options.
 
-    The new interpreter imports from the same folders, except the current folder. `options` are its options.
+    The new interpreter imports from all folders of `sys.path`, except the current folder.
     """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_path()!r}; {code}"]
 
 
 def _path() -> list[str]:
     # Empty and relative entries refer to the current folder.
-    # Without the folder of urdfkin, the new interpreter may not find urdfkin.
     home = str(Path(__file__).resolve().parents[2])
     return [*(entry for entry in sys.path if Path(entry).is_absolute() and not _is_scratch(entry)), home]
 
@@ -44,10 +43,12 @@ def _is_scratch(entry: str) -> bool:
 
 
 def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:
-    """Run a process with a minimal environment, write a request to its standard input and read its output.
+    """Run a process with a minimal environment, and with a request on standard input.
 
-    The process is killed after `patience` seconds, and after more than `most` bytes of output. The result is
-    the output, with at most `most` + 1 bytes, and the exit status; the status is None after a timeout.
+    The process is killed after `patience` seconds, and after more than `most` bytes of output.
+
+    Returns:
+        The output, at most `most` + 1 bytes, and the exit status; None after a timeout.
     """
     import subprocess
 
@@ -81,10 +82,7 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
 
 @contextmanager
 def not_reading(settings: str) -> Iterator[None]:
-    """Hide a settings file in the current folder from libraries.
-
-    If the file exists, the current folder is `/` until the `with` block ends. Otherwise nothing changes.
-    """
+    """Hide a settings file in the current folder: if the file exists, make `/` the current folder."""
     if not os.path.lexists(settings):
         yield
         return
@@ -104,10 +102,9 @@ _stack_size_lock = lock_over_forks()
 
 
 def with_stack(size: int, function: Callable[[], _T]) -> _T:
-    """Call `function()` on a stack of at least `size` bytes; return its result or raise its exception.
+    """Return `function()`, called on a stack of at least `size` bytes.
 
-    Pinocchio and its parser traverse a robot recursively: a chain of about 3,000 links overflows a stack of
-    8 MiB, and a few hundred links overflow a smaller stack.
+    Pinocchio and its parser are recursive: a chain of about 3,000 links overflows a stack of 8 MiB.
 
     >>> with_stack(64 * 2**20, lambda: 6 * 7)
     42

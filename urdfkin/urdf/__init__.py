@@ -2,7 +2,7 @@
 
 | Step | Module | Result |
 |---|---|---|
-| Source | `sources`, `catalogue`, `xacro` | `Text`: bytes and a description of their origin |
+| Source | `sources`, `catalogue`, `xacro` | `Text`: the bytes of a URDF and information about their source |
 | Parser | `parser` | `Element`, then the `RobotRecord` of `records`; problems are `Finding`s of `findings` |
 | Tree | `reader` | `KinematicTree` |
 | Writer | `writer` | URDF text |

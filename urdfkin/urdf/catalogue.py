@@ -1,16 +1,16 @@
 """Find robots by name in the catalogue and in robot_descriptions, and find ROS packages without ROS.
 
-The catalogue has the robots of example-robot-data and urdfkin's own. robot_descriptions is a Python package
-that clones the repository of a robot into its own cache at the first use. urdfkin imports a module of
-robot_descriptions only if the list `DESCRIPTIONS` of this package contains its name.
+The catalogue has the robots of example-robot-data and urdfkin's own robots. robot_descriptions is a Python
+package that clones the repository of a robot into a cache at the first use. urdfkin imports a module of
+robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`.
 
-The search for a package uses the first of these folders that exists:
+The folder of a package `name` is the first of these folders that exists:
 
-1. Each folder in `ROS_PACKAGE_PATH`, for example `src`. If `src` itself has the package's name, it is the
-   package. Otherwise the search tries `src/name` and `src/*/name`.
-2. `AMENT_PREFIX_PATH`: `share/name` below an entry.
-3. Each folder above the file. If the folder or its `package.xml` has the package's name, the folder is the
-   package. Otherwise the search tries the subfolder `name`.
+1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself if this is the name of the package, then
+   `src/name`, then `src/*/name`.
+2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
+3. For each folder above the file: the folder itself if the folder or its `package.xml` has the name of the
+   package, then the subfolder `name`.
 """
 
 from __future__ import annotations
@@ -38,12 +38,11 @@ class Entry:
 
     Attributes:
         family: arm, hand, humanoid, quadruped, ...
-        relative_path: The path of the URDF, relative to the robots folder of urdfkin or of
-            example-robot-data.
-        limbs: (base frame, tip frame) of each arm, leg or finger; the first pair is the default.
-        mimic: Whether the mimic rules of the URDF are valid. If not, urdfkin ignores them by default.
-        reason: The reason why the mimic rules are not valid, or None.
-        poses: Named poses: joint values (rad or m) by joint name. All other joints are at 0.
+        relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
+        limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
+        mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
+        reason: The reason why the mimic rules are invalid, or None.
+        poses: Joint values (rad or m) by joint name, for each named pose. The value of other joints is 0.
         own: True for a robot of urdfkin, False for a robot of example-robot-data.
     """
 
@@ -71,7 +70,7 @@ class Entry:
 
 @cache
 def catalogue() -> Mapping[str, Entry]:
-    """Return all entries by name: first the robots of example-robot-data, then urdfkin's own robots."""
+    """Return all robots by name: first the robots of example-robot-data, then urdfkin's own robots."""
     return {**_read("catalogue.toml", own=False), **_read("own.toml", own=True)}
 
 
@@ -79,7 +78,8 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     """Return the robot names that `load` accepts.
 
     Args:
-        family: Return one family only: arm, biped, gripper, hand, humanoid, quadruped, text, ...
+        family: The family of the robots: arm, biped, gripper, hand, humanoid, quadruped, text, ... None for
+            all robots.
 
     Raises:
         UnknownNameError: there is no such family.
@@ -105,19 +105,12 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
 
     with path.open("rb") as stream:
         table = tomllib.load(stream)
-    return {
-        name: Entry(
-            name=name,
-            family=row["family"],
-            relative_path=Path(row["path"]),
-            limbs={limb: (base, tip) for limb, (base, tip) in row.get("limbs", {}).items()},
-            mimic=row.get("mimic", True),
-            reason=row.get("reason"),
-            poses=row.get("poses", {}),
-            own=own,
-        )
-        for name, row in table.items()
-    }
+    entries = {}
+    for name, row in table.items():
+        limbs = {limb: (base, tip) for limb, (base, tip) in row.pop("limbs", {}).items()}
+        place = Path(row.pop("path"))
+        entries[name] = Entry(name=name, relative_path=place, limbs=limbs, own=own, **row)
+    return entries
 
 
 #: Environment variables with search paths.
@@ -125,7 +118,7 @@ VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: A URI with one of these schemes names a package and a path inside it.
+#: Schemes of URIs that consist of the name of a package and a path in the package.
 SCHEMES = ("package://", "model://")
 
 
@@ -148,23 +141,23 @@ def find_package(
     environ: Mapping[str, str] = os.environ,
     accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
-    """Return the folder of a package, or None; the module docstring describes the search.
+    """Return the folder of a package, or None; the docstring of this module describes the search.
 
     The search includes the folders above the file `beside`. `accepts` filters the candidate folders.
     """
     if not name or name in (".", "..") or "\0" in name:
         return None
     found = filter(is_folder, _candidates(name, beside, environ))
-    return next((folder for folder in found if accepts(folder)), None)
+    return next(filter(accepts, found), None)
 
 
 def _candidates(name: str, beside: Path | None, environ: Mapping[str, str]) -> Iterator[Path]:
-    for entry in _entries(environ.get("ROS_PACKAGE_PATH")):
+    for entry in search_path("ROS_PACKAGE_PATH", environ):
         if entry.name == name:
             yield entry
         yield entry / name
         yield from (folder / name for folder in _folders(entry))
-    for entry in _entries(environ.get("AMENT_PREFIX_PATH")):
+    for entry in search_path("AMENT_PREFIX_PATH", environ):
         yield entry / "share" / name
     if beside is not None:
         for folder in beside.absolute().parents:
@@ -181,8 +174,8 @@ def _declares(manifest: Path, name: str) -> bool:
     return match is not None and match[1].decode("utf-8", "replace").strip() == name
 
 
-def _entries(variable: str | None) -> list[Path]:
-    return [Path(entry) for entry in (variable or "").split(os.pathsep) if entry]
+def search_path(variable: str, environ: Mapping[str, str] = os.environ) -> list[Path]:
+    return [Path(entry) for entry in environ.get(variable, "").split(os.pathsep) if entry]
 
 
 def _folders(entry: Path) -> list[Path]:
@@ -203,7 +196,7 @@ class Described:
 
 
 def described(source: object) -> Described | None:
-    """Return the file of a robot description, by its module or name; None for any other source.
+    """Return the file of a robot description for its module or its name; None for any other source.
 
     Raises:
         InputError: the package is not installed, or the description has no URDF and no MJCF.
@@ -213,15 +206,14 @@ def described(source: object) -> Described | None:
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
         if source in catalogue() or exists(Path(source)):
             return None
-        source = _module(source)
+        source = _description(source)
     return _file(source) if isinstance(source, ModuleType) else None
 
 
-def _module(name: str) -> ModuleType:
+def _description(name: str) -> ModuleType:
     if importlib.util.find_spec(_PACKAGE) is None:
-        raise InputError(
-            f"{_PACKAGE} is not installed", where=name, remedy=f"pip install {_PACKAGE}, or name a file"
-        )
+        remedy = f"pip install {_PACKAGE}, or name a file"
+        raise InputError(f"{_PACKAGE} is not installed", where=name, remedy=remedy)
     from robot_descriptions import DESCRIPTIONS
 
     if name not in DESCRIPTIONS:
@@ -239,14 +231,9 @@ def _module(name: str) -> ModuleType:
 
 
 def _file(module: Any) -> Described:
-    if hasattr(module, "URDF_PATH"):
-        return Described(Path(module.URDF_PATH))
-    if hasattr(module, "XACRO_PATH"):
-        return Described(Path(module.XACRO_PATH), dict(getattr(module, "XACRO_ARGS", {})))
-    if hasattr(module, "MJCF_PATH"):
-        return Described(Path(module.MJCF_PATH))
-    raise InputError(
-        "this module has neither URDF_PATH nor XACRO_PATH nor MJCF_PATH",
-        where=module.__name__,
-        remedy=f"pass a description module of {_PACKAGE}",
-    )
+    for name in ("URDF_PATH", "XACRO_PATH", "MJCF_PATH"):
+        if hasattr(module, name):
+            arguments = getattr(module, "XACRO_ARGS", {}) if name == "XACRO_PATH" else {}
+            return Described(Path(getattr(module, name)), dict(arguments))
+    message = "this module has neither URDF_PATH nor XACRO_PATH nor MJCF_PATH"
+    raise InputError(message, where=module.__name__, remedy=f"pass a description module of {_PACKAGE}")

@@ -1,9 +1,9 @@
 """Confine the current process, so that it can only compute and read allowed files.
 
-The operating system limits the memory and time of the process, and prevents it from writing files and from
-starting other processes. Python raises an audit event for each opened file, new process, socket and import,
-and an audit hook refuses every event that is not allowed. The process can remove neither the limits nor the
-hook. A xacro file with full control of the interpreter could circumvent the hook, but not the limits.
+The operating system limits the memory and time of the process, and prevents the process from writing files
+and from starting other processes. Python raises an audit event for each opened file, new process, socket and
+import, and an audit hook refuses all events except the allowed ones. The process cannot remove the limits or
+the hook. A xacro file that controls the Python interpreter could circumvent the hook, but not the limits.
 
 This confinement is the second defence. The first defence is the module `expressions`, which evaluates the
 expressions of a file without Python's `eval`.
@@ -20,23 +20,23 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Memory limit in bytes. The interpreter and its libraries need about a tenth of this memory.
+#: Maximum memory of the process in bytes. Python and the imported libraries need about a tenth.
 MEMORY = 2 * 1024**3
 
-#: These audit events are allowed without a check.
+#: Audit events that are always allowed.
 _HARMLESS = {"builtins.id", "compile", "glob.glob", "glob.glob/2", "object.__getattr__", "sys._getframe"}
-#: These audit events are allowed only for files that the process may read.
+#: Audit events that are allowed for files that the process may read.
 _READING = {"open", "os.listdir", "os.scandir"}
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
 @dataclass(slots=True)
 class Ground:
-    """The files that an expansion may read.
+    """The files that a confined process may read.
 
     Attributes:
-        roots: Folders and files that may be read, without the hidden folders and files below them. The target
-            of a symbolic link must also be one of these files, or lie in one of these folders.
+        roots: Folders and files that may be read, except hidden folders and files in these folders. The
+            target of a symbolic link must also be one of these files, or be in one of these folders.
         installed: Folders in which a symbolic link may point to a package in any other folder. An example is
             the install folder of `colcon build --symlink-install`.
     """
@@ -59,8 +59,7 @@ class Ground:
 
     def holds(self, path: str) -> bool:
         real = os.path.realpath(path)
-        # The search for a package reads every package.xml.
-        if os.path.basename(real) == "package.xml":  # noqa: PTH119  `real` is a string
+        if os.path.basename(real) == "package.xml":  # noqa: PTH119  the search for packages reads this file
             return True
         roots = self.roots
         as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
@@ -70,12 +69,12 @@ class Ground:
 
 
 def _package_of(path: str) -> list[str]:
-    """Return the folder of a file's package as a list of one entry, which is empty without a package."""
+    """Return a list with the folder of a file's package; an empty list if the file is in no package."""
     return [str(folder) for folder in Path(path).parents if _exists(folder / "package.xml")][:1]
 
 
 def _lies_in(root: str, path: str) -> bool:
-    """Return whether a path is `root`, or lies below it without a hidden file or folder on the way."""
+    """Return whether a path is `root`, or is in the folder `root` and has no hidden parts below `root`."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -90,7 +89,7 @@ def _exists(path: Path) -> bool:
 
 
 def limit(seconds: int) -> None:
-    """Limit the memory and time of this process; forbid it to write files and start processes."""
+    """Limit the memory and time of this process, and forbid the process to write files or start processes."""
     import resource
 
     bounds = {

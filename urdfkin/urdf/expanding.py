@@ -1,7 +1,7 @@
-"""Expand a xacro file with xacrodoc, inside the confined process. No other module imports xacrodoc.
+"""Expand a xacro file with xacrodoc, in the confined process.
 
-xacro lets a file run Python code and read environment variables. Here, the module `expressions` evaluates the
-expressions, and `confinement` limits the files that the process can read.
+xacro lets a file run Python code and read environment variables. In this process, the module `expressions`
+evaluates the expressions of the file, and `confinement` limits the files that the process can read.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import importlib
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +19,21 @@ from urdfkin.urdf.confinement import MEMORY, Ground, confine, limit
 from urdfkin.urdf.expressions import RefusedError, evaluate
 from urdfkin.urdf.xacro import arguments_of
 
-#: These functions of xacro would give an expression access to types and attributes.
-_NEVER = ("type", "vars")
+#: Functions of xacro that would give an expression access to types and attributes.
+_FORBIDDEN = ("type", "vars")
 
-#: xacro's own function evaluates this expression; urdfkin's function refuses it.
+#: Expression that xacro itself evaluates, but urdfkin refuses.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
-    """Read a request from standard input and write the answer as the last line of standard output."""
+    """Read a request from standard input, and write the result as the last line of standard output."""
     request = json.load(sys.stdin)
     limit(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # an include may be relative to this folder
+    os.chdir(Path(request["path"]).parent)  # the names of included files may be relative to this folder
     ground = Ground(**request["ground"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
@@ -51,32 +51,33 @@ def _expand(
 ) -> dict[str, Any]:
     """Return the URDF, and the names of the arguments that the file declares.
 
-    The names are None without arguments from the user, or if an include cannot be read.
+    The names are None if the user gives no arguments, or if an included file cannot be read.
     """
     import xacrodoc
 
     _replace_evaluation(path, search, ground)
-    importlib.import_module("xml.dom.expatbuilder")  # minidom would import this module later
+    importlib.import_module("xml.dom.expatbuilder")  # xacro cannot import this module after `confine`
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()
-    takes = arguments_of(path, _finder(path, search, ground)) if arguments else None
-    return {"urdf": urdf, "takes": None if takes is None else sorted(takes)}
+    declared = arguments_of(path, _finder(path, search, ground)) if arguments else None
+    return {"urdf": urdf, "arguments": None if declared is None else sorted(declared)}
 
 
 def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -> None:
     """Make xacro and xacrodoc call urdfkin's functions to evaluate expressions and to find packages.
 
-    Raise RefusedError if the replacement has no effect.
+    Raise RefusedError if xacro still evaluates expressions itself.
     """
     import xacro
     import xacrodoc.packages
     from xacro import substitution_args
 
     symbols = xacro._global_symbols
-    for name in _NEVER:
+    for name in _FORBIDDEN:
         dict.pop(symbols["python"], name, None)
-    functions = [value for table in _tables(symbols) for value in dict.values(table) if callable(value)]
+    namespaces = [dict(symbols), *(value for value in symbols.values() if isinstance(value, dict))]
+    functions = [value for names in namespaces for value in dict.values(names) if callable(value)]
 
     def value_of(expression: str, names: Mapping[str, Any], local: object = None) -> object:
         try:
@@ -103,17 +104,11 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     )
 
 
-def _tables(symbols: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the global names for expressions, then the names of each namespace."""
-    yield dict(symbols)
-    yield from (value for value in symbols.values() if isinstance(value, dict))
-
-
 def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[str], str]:
     """Return the function that finds packages for xacro's $(find name)."""
 
     def is_package(folder: Path) -> bool:
-        """Return whether a folder is allowed or has a package.xml. `$(find etc)` must not find /etc."""
+        """Accept a folder that is allowed or has a package.xml, because `$(find etc)` must not find /etc."""
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:

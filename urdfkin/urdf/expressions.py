@@ -1,14 +1,16 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro itself passes expressions to `eval`. It searches for forbidden names only in the outermost code object,
-so a lambda, a comprehension or a chain of attributes can run any program. This module interprets the syntax
-tree. It allows values, operators, the functions of xacro and the methods listed below, and nothing else.
+xacro itself passes expressions to `eval`. xacro searches for forbidden names only in the outermost code
+object, so a lambda, a comprehension or a chain of attributes can run any program. This module interprets the
+syntax tree of an expression. An expression may contain only values, operators, the functions of xacro and the
+methods in `_METHODS`.
 """
 
 from __future__ import annotations
 
 import ast
 import operator
+from collections import ChainMap
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
@@ -53,7 +55,7 @@ _CONTAINERS = (str, list, tuple, dict, range)
 
 
 class RefusedError(Exception):
-    """A xacro file does something that an expansion does not allow."""
+    """A xacro file does something that is not allowed."""
 
 
 def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
@@ -71,7 +73,7 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
 
 
 class _Evaluation:
-    """Evaluate a syntax tree; the method for a node has the name of the node's class."""
+    """Evaluate a syntax tree. The method that evaluates a node has the name of the node's class."""
 
     def __init__(self, names: Mapping[str, Any], functions: Collection[object]) -> None:
         self._names, self._functions = names, functions
@@ -100,7 +102,7 @@ class _Evaluation:
                 return getattr(owner, name)
         if isinstance(owner, dict) and not name.startswith("_"):
             try:
-                return owner[name]  # a xacro namespace, or a YAML file
+                return owner[name]  # xacro's namespaces and YAML files are dictionaries
             except (KeyError, AttributeError):
                 raise NameError(f"{name!r} is not defined in '{ast.unparse(node.value)[:80]}'") from None
         raise RefusedError(
@@ -166,39 +168,22 @@ class _Evaluation:
         return self.value(node.body if self.value(node.test) else node.orelse)
 
     def ListComp(self, node: ast.ListComp | ast.GeneratorExp) -> list[Any]:
-        return [inner.value(node.elt) for inner in self._rounds(node.generators)]
+        return [inner.value(node.elt) for inner in self._iterations(node.generators)]
 
     GeneratorExp = ListComp
 
-    def _rounds(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
+    def _iterations(self, loops: list[ast.comprehension]) -> Iterator[_Evaluation]:
         """Yield an `_Evaluation` with the loop variables for each iteration of nested loops."""
         if not loops:
             yield self
             return
         loop, *others = loops
         for value in self.value(loop.iter):
-            inner = _Evaluation(_Scope(self._names, dict(_bound(loop.target, value))), self._functions)
+            # xacro evaluates a property when its name is read, so the outer scope must not be copied.
+            scope = ChainMap(dict(_bound(loop.target, value)), self._names)  # type: ignore[arg-type]
+            inner = _Evaluation(scope, self._functions)
             if all(inner.value(condition) for condition in loop.ifs):
-                yield from inner._rounds(others)
-
-
-class _Scope(Mapping[str, Any]):
-    """The names of a loop, then the names of the scope around the loop.
-
-    xacro evaluates a name when it is read. A copy of the outer scope would read every name.
-    """
-
-    def __init__(self, outer: Mapping[str, Any], own: Mapping[str, Any]) -> None:
-        self._outer, self._own = outer, own
-
-    def __getitem__(self, name: str) -> Any:
-        return self._own[name] if name in self._own else self._outer[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter({**self._own, **self._outer})
-
-    def __len__(self) -> int:
-        return len(list(iter(self)))
+                yield from inner._iterations(others)
 
 
 def _bound(target: ast.expr, value: Any) -> Iterator[tuple[str, Any]]:

@@ -1,18 +1,17 @@
-"""Define findings: problems in a URDF, each with a code, a position, the found text and a remedy.
+"""Define findings: problems in a URDF, each with a code, a position, the wrong text and a remedy.
 
-The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. A finding is plain
-data: it can be printed, compared, converted to JSON or SARIF and sent to another process. A byte order mark
-has no effect on positions.
+The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. Line and column
+numbers do not count a byte order mark.
 
-A comment in a URDF names the codes that it silences, and gives a reason.
+A comment in a URDF can silence findings. The comment names the codes of the findings and gives a reason:
 
     <!-- urdfkin: ignore[URDF601] the vendor's own digits -->
 
-| Position of the comment | It applies to |
+| Position of the comment | Silenced findings |
 |---|---|
-| after other text on the same line | this line |
-| on its own line, before an element | this element and its content |
-| before the root element | the whole file |
+| after other text on the same line | findings on this line |
+| on its own line, before an element | findings in this element |
+| before the root element | findings in the whole file |
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from urdfkin.errors.escape import log_line, printable
 from urdfkin.system.files import Edit, edited
 from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_LIMITS, START_TAG, Element, Limits
 
-#: A message quotes at most this number of characters of a file.
+#: Maximum number of characters of a file that a message quotes.
 QUOTED = 60
 
 
@@ -47,21 +46,21 @@ def quoted(text: str, limit: int = QUOTED) -> str:
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: An excerpt of a long line has `SHOWN` characters; at most `BEFORE` of them precede the marked text.
+#: Number of characters that are printed of a longer line, and how many of them may precede the marked text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
 
 
 class Excerpts:
-    """Excerpts of a file without a byte order mark: lines of findings, with carets below the marked text."""
+    """The lines of a file, without its byte order mark, that are printed below findings."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
 
     def of(self, finding: Finding) -> str | None:
-        """Return a line of the file and a line with carets; None for a finding about the whole file.
+        """Return the line of a finding, with carets below the wrong text; None without a position.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -71,7 +70,7 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # a line may be megabytes long, so it is decoded once
+        if self.number != finding.line:  # decode a line once, because one line may have megabytes
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -92,7 +91,7 @@ def _cells(text: str) -> int:
     )
 
 
-#: Rounding an angle of at most one revolution to a double has at most this error (rad).
+#: Upper bound (rad) on the error of rounding an angle of at most one revolution to a double.
 ROUNDING = 2.0**-50
 
 
@@ -101,9 +100,9 @@ class Fix:
     """The automatic fix of a finding.
 
     Attributes:
-        edits: The edits of the text, in file order, without overlap.
-        turns: Upper bound on the angle (rad) by which the fix rotates the joint frame; 0 if the fix does not
-            change the robot.
+        edits: Edits of the text, in file order, without overlap.
+        turns: Upper bound on the angle (rad) by which the fix rotates the frame of a joint; 0 if the fix does
+            not change the robot.
     """
 
     edits: tuple[Edit, ...]
@@ -132,9 +131,9 @@ def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
 class Severity(Enum):
     """The severity of a finding.
 
-    A file with an error is unusable: it describes no robot, or different URDF readers would build different
-    robots from it. A warning is about legal content. This content is almost certainly a mistake, or some
-    readers interpret it differently. A note is information.
+    - Error: the file describes no robot, or different URDF readers build different robots from the file.
+    - Warning: legal content that is almost certainly a mistake, or that URDF readers interpret differently.
+    - Note: information.
     """
 
     ERROR = "error"
@@ -148,7 +147,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """How Pinocchio differs from the URDF specification for content that the specification allows."""
+    """Deviation of Pinocchio from the URDF specification: legal content is refused or read differently."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -159,20 +158,20 @@ class Finding:
     """A problem at one position of a file.
 
     Attributes:
-        code: The stable code, for example `URDF502`.
+        code: Code of the kind of problem, for example `URDF502`. Codes do not change between versions.
         severity: Error, warning or note.
         message: The problem in one clause, without a full stop.
         found: The wrong text in the file, in quotes, or None.
         remedy: The remedy, or None.
-        file: The name of the file as given by the user, or `<text>`, `<stdin>`.
-        line: Line, from 1.
-        column: Column in characters, from 1.
+        file: The name of the file as the user wrote it, or `<text>`, `<stdin>`.
+        line: Line number, from 1.
+        column: Column number in characters, from 1.
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
-        oracle: None if Pinocchio accepts the content and follows the specification. Otherwise Pinocchio
-            refuses the file or reads the content differently, and urdfkin cannot verify any result of this
+        oracle: None if Pinocchio reads the content as the URDF specification defines. Otherwise Pinocchio
+            refuses the file or reads the content differently, and urdfkin cannot verify any result of the
             robot with Pinocchio.
-        also: Line numbers of other findings with the same code, if urdfkin combines them with this finding.
+        also: Line numbers of further findings with the same code that this finding represents.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
@@ -215,7 +214,7 @@ class Finding:
 
     @property
     def count(self) -> int:
-        """The number of findings that this object represents: 1 plus the length of `also`.
+        """Number of findings that this object represents: 1 plus the length of `also`.
 
         >>> import urdfkin
         >>> finding = urdfkin.check('<robot name="r"><link name="a"/><link name="a"/></robot>')[0]
@@ -225,8 +224,8 @@ class Finding:
         return 1 + len(self.also)
 
     @property
-    def _others(self) -> str:
-        """The line numbers in `also` as text, for example "also on lines 3, 7"."""
+    def _other_lines(self) -> str:
+        """Text about the line numbers in `also`, for example "also on lines 3, 7"."""
         others = tuple(sorted(set(self.also) - {self.line}))
         if len(others) == len(self.also):
             return f"also on {_lines(others)}"
@@ -245,7 +244,7 @@ class Finding:
         """
         subject = f"{self.subject}: " if self.element and self.name is not None else ""
         found = f": found {self.found}" if self.found else ""
-        also = f" ({self._others})" if self.also else ""
+        also = f" ({self._other_lines})" if self.also else ""
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{subject}{self.message}{found}{also}{remedy}"
 
@@ -300,12 +299,12 @@ class UrdfError(UrdfkinError, ValueError):
     >>> import urdfkin
     >>> try:
     ...     robot = urdfkin.load('<robot name="r"><link name="a"/><link name="a"/></robot>')
-    ... except ValueError as error:  # a UrdfError is one
+    ... except ValueError as error:  # UrdfError is a subclass of ValueError
     ...     print(error.findings[0].code)
     URDF402
     """
 
-    #: The message lists at most this number of errors, and counts the others.
+    #: Maximum number of errors that the message lists.
     SHOWN = 5
 
     def __init__(self, findings: Iterable[Finding]) -> None:
@@ -346,10 +345,11 @@ class Rule:
     """A kind of finding.
 
     Attributes:
-        id: The code: `URDF` and three digits. A code is never reused. The first digit shows the topic of the
-            rule. 1: text and XML. 2: elements and attributes. 3: numbers. 4: names and structure. 5: joints.
+        id: The code of the findings: `URDF` and three digits. A code is never reused. The first digit is the
+            topic. 1: text and XML. 2: elements and attributes. 3: numbers. 4: names and structure. 5: joints.
             6: probable mistakes. 7: inertials, geometry and materials.
-        oracle: Pinocchio's behaviour, if it differs from the specification.
+        slug: The short name, in words with hyphens.
+        oracle: Pinocchio's behaviour, if Pinocchio does not follow the specification.
     """
 
     id: str
@@ -358,18 +358,18 @@ class Rule:
     oracle: PinocchioReading | None = None
 
 
-#: A comment with an instruction for urdfkin begins with this word, after any spaces.
+#: First word of a comment with an instruction for urdfkin.
 MARK = "urdfkin:"
 
 
 @dataclass(slots=True)
 class Comment:
-    """A comment for urdfkin.
+    """A comment with an instruction for urdfkin.
 
     Attributes:
         text: The text between `<!--` and `-->`.
         behind: Whether the line has other text before the comment.
-        element: The next element, or None.
+        element: The element that begins after the comment, or None.
     """
 
     text: str
@@ -381,7 +381,7 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """The codes that a comment silences; `used` are the codes that have silenced at least one finding."""
+    """A comment that silences findings with the codes `codes`. The codes `used` have silenced a finding."""
 
     comment: Comment
     codes: tuple[str, ...]
@@ -389,68 +389,54 @@ class Silence:
     used: set[str] = field(default_factory=set)
 
 
-#: Each code has the first comment that silences it.
-Codes = dict[str, Silence]
-
-
 @dataclass(slots=True)
 class Silences:
-    """The silencing comments of a file.
+    """The comments of a file that silence findings."""
 
-    Attributes:
-        everywhere: Comments for the whole file.
-        lines: Comments for a line, by line number.
-        elements: Comments for an element, by the element's `id()`.
-    """
-
-    everywhere: Codes = field(default_factory=dict)
-    lines: dict[int, Codes] = field(default_factory=dict)
-    elements: dict[int, Codes] = field(default_factory=dict)
     all: list[Silence] = field(default_factory=list)
-
-    def __bool__(self) -> bool:
-        return bool(self.all)
+    #: The first comment for a code at a line (by number), an element (by `id`), or the file.
+    _first: dict[tuple[str, int, str], Silence] = field(default_factory=dict)
 
     def add(self, silence: Silence) -> None:
         self.all.append(silence)
-        place = self._place(silence.comment)
-        for code in silence.codes:
-            place.setdefault(code, silence)
-
-    def _place(self, comment: Comment) -> Codes:
+        comment = silence.comment
         if comment.behind:
-            return self.lines.setdefault(comment.line, {})
-        if comment.element is None:
-            return {}
-        if comment.element.parent is None:
-            return self.everywhere
-        return self.elements.setdefault(id(comment.element), {})
+            place = "line", comment.line
+        elif comment.element is None:
+            return
+        elif comment.element.parent is None:
+            place = "file", 0
+        else:
+            place = "element", id(comment.element)
+        for code in silence.codes:
+            self._first.setdefault((*place, code), silence)
 
     def reason(self, code: str, line: int, at: Element | None) -> str | None:
         """Return the reason of the nearest comment that silences a finding; None if there is none."""
-        silence = self.lines.get(line, {}).get(code)
-        while silence is None and at is not None:
-            silence = self.elements.get(id(at), {}).get(code)
+        places = [("line", line)]
+        while at is not None:
+            places.append(("element", id(at)))
             at = at.parent
-        silence = silence or self.everywhere.get(code)
-        if silence is None:
-            return None
-        silence.used.add(code)
-        return silence.reason
+        for place in (*places, ("file", 0)):
+            if (silence := self._first.get((*place, code))) is not None:
+                silence.used.add(code)
+                return silence.reason
+        return None
 
 
-#: urdfkin searches the correct spelling of at most `SEARCHES` misspelt names in a file.
-#: Each search compares at most `CANDIDATES` known names; `WORK` is the argument `work` of `nearest`.
-SEARCHES, CANDIDATES, WORK = 20, 5_000, 250_000
+#: Maximum number of misspelt names in a file for which similar names are searched.
+SEARCHES = 20
+#: Maximum number of known names that one search compares, and the argument `work` of `nearest`.
+CANDIDATES, WORK = 5_000, 250_000
 
-#: `FOLDED` or more warnings (or notes) with one code become one finding.
-#: For the codes URDF7xx (content that kinematics does not use), `FOLDED_EXTRAS` findings are enough.
+#: If a file has this number of warnings (or notes) with one code, they become one finding.
+#: `FOLDED_EXTRAS` is the number for the codes URDF7xx, about content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: At most this number of errors with one code is reported separately; the last lists the other lines.
+#: Maximum number of errors with one code that are reported separately.
 ERRORS_SHOWN = 100
 
-#: At most this number of findings with one code is stored; of further ones, only the line numbers.
+#: Maximum number of findings with one code that are stored. Of further findings only the line is stored.
 WRITTEN_OUT = 10_000
 
 
@@ -459,7 +445,7 @@ class _Kind:
     """The findings of one code and severity.
 
     `found` has at most `WRITTEN_OUT` findings, each with its weight (see `Reporter.add`). `lines` are the
-    line numbers of the others.
+    line numbers of all further findings.
     """
 
     severity: Severity
@@ -472,11 +458,10 @@ class Reporter:
     """The findings of one file.
 
     Attributes:
-        file: The name of the file, for the findings.
-        data: The bytes of the file, for the positions of attributes.
-        comments: The comments for urdfkin.
-        silenced: The findings that a comment silences, each with the reason in this comment.
-        silences: The parsed comments.
+        file: The name of the file in the findings.
+        data: The bytes of the file, in which attributes are located.
+        comments: The comments with an instruction for urdfkin.
+        silenced: The findings that a comment silences, each with the reason in the comment.
     """
 
     file: str
@@ -500,7 +485,7 @@ class Reporter:
         attribute: str | None = None,
         found: str | None = None,
         remedy: str | None = None,
-        owner: str | None = None,
+        misplaced: bool = False,
         severity: Severity | None = None,
         position: tuple[int, int] = (1, 1),
         weight: float = 0.0,
@@ -508,56 +493,41 @@ class Reporter:
     ) -> None:
         """Add a finding with a message, the wrong text `found` (in quotes) and a remedy.
 
-        - `at` is the element with the problem. Without `at`, the finding is at `position` (line and column).
-        - `attribute` is the attribute of `at` that the printed excerpt of the file underlines.
-        - `owner` is the tag that the finding names, if `at` is a link or joint in the wrong place.
-          By default, the finding names the link or joint that contains `at`.
+        - `at` is the element with the problem, and `attribute` the name of the wrong attribute.
+        - `position` is the line and column of a finding without an element.
+        - The finding has the tag and the name of the child of `<robot>` that contains `at`. If `at` is
+          `misplaced`, the finding has the tag and the name of `at`.
         - `severity` replaces the severity of the rule.
-        - `weight`: if findings of one kind are combined, the finding with the greatest weight is reported.
+        - `weight`: if findings with one code are combined, the finding with the greatest weight is reported.
         - `fix` returns the automatic fix, or None.
         """
         severity = rule.severity if severity is None else severity
-        # A comment cannot silence an error.
-        reason = (
-            None if severity is Severity.ERROR else self._silenced_by(rule.id, position[0], at, attribute)
-        )
+        reason = None
+        if self.silences.all and severity is not Severity.ERROR:  # a comment cannot silence an error
+            start = position[0] if at is None else self._place(at, attribute)[0]
+            reason = self.silences.reason(rule.id, start, at)
         kind = self._kinds.setdefault((rule.id, severity), _Kind(severity))
         if len(kind.found if reason is None else self.silenced) >= WRITTEN_OUT:
             if reason is None:
                 kind.lines.append(position[0] if at is None else at.line)
             return
         line, column, width = (*position, 0) if position == (1, 1) else (*position, 1)
-        name = None
+        element, name = None, None
         if at is not None:
             line, column, width = self._place(at, attribute)
-            name = at.label if owner is None else at.attributes.get("name")
+            subject = at if misplaced else at.holder
+            element, name = subject.tag, subject.attributes.get("name") if at.parent is not None else None
         finding = Finding(
-            rule.id,
-            severity,
-            message,
-            found,
-            remedy,
-            self.file,
-            line,
-            column,
-            owner if owner or at is None else at.owner,
-            name,
-            rule.oracle,
-            width=width,
-            fix=None if fix is None or reason is not None else fix(),
-        )
+            rule.id, severity, message, found, remedy, self.file, line, column, element, name, rule.oracle,
+            width=width, fix=None if fix is None or reason is not None else fix(),
+        )  # fmt: skip
         if reason is None:
             kind.found.append((finding, weight))
         else:
             self.silenced.append((finding, reason))
 
-    def _silenced_by(self, code: str, line: int, at: Element | None, attribute: str | None) -> str | None:
-        if not self.silences:
-            return None
-        return self.silences.reason(code, line if at is None else self._place(at, attribute)[0], at)
-
     def silence(self, silences: Silences) -> None:
-        """Apply comments to the findings that are already in the reporter, and to all later findings."""
+        """Apply comments to the findings of the reporter, and to all findings that are added later."""
         self.silences = silences
         for (code, severity), kind in self._kinds.items():
             if severity is not Severity.ERROR:
@@ -566,7 +536,7 @@ class Reporter:
                 kind.found = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three similar names; [] after `SEARCHES` calls, because the search is slow."""
+        """Return up to three known names similar to a word; [] after `SEARCHES` calls, for speed."""
         self._searches += 1
         if self._searches > SEARCHES:
             return []
@@ -586,38 +556,35 @@ class Reporter:
     ) -> tuple[Finding, ...]:
         """Return the findings by line.
 
-        `fold` combines many warnings with one code into one finding; of more than a hundred errors with one
-        code, the hundredth lists the lines of the others. `wanted` is called once for each finding, in file
-        order, and returns whether to report it.
+        `fold` combines many warnings with one code into one finding. If there are more than a hundred errors
+        with one code, the hundredth error lists the lines of all further errors. `wanted` is called once for
+        each finding, in file order, and returns whether the finding is reported.
         """
-        kinds = [kind for kind in self._kinds.values() if kind.found]
+        pairs = [pair for kind in self._kinds.values() for pair in kind.found]
         if wanted is not None:
-            pairs = sorted(
-                (pair for kind in kinds for pair in kind.found), key=lambda p: _place_in_file(p[0])
-            )
-            selected = {id(pair) for pair in pairs if wanted(pair[0])}
-            kinds = [
-                _Kind(kind.severity, chosen, kind.lines)
-                for kind in kinds
-                if (chosen := [pair for pair in kind.found if id(pair) in selected])
-            ]
-        found = (finding for kind in kinds for finding in _combine(kind, fold=fold))
+            pairs.sort(key=lambda pair: _place_in_file(pair[0]))
+            pairs = [pair for pair in pairs if wanted(pair[0])]
+        reported = {id(pair) for pair in pairs}
+        found: list[Finding] = []
+        for kind in self._kinds.values():
+            if own := [pair for pair in kind.found if id(pair) in reported]:
+                found += _combine(_Kind(kind.severity, own, kind.lines), fold=fold)
         return tuple(sorted(found, key=_place_in_file))
 
     @property
     def has_raw_blanks(self) -> bool:
-        """Whether an attribute value contains characters that an XML parser replaces (see `_RAW_BLANK`)."""
+        """Whether the file has an attribute value with characters that XML parsers replace."""
         if self._raw_blanks is None:
             self._raw_blanks = _RAW_BLANK.search(self.data) is not None
         return self._raw_blanks
 
     def raw(self, at: Element, attribute: str) -> str | None:
-        """Return the value of an attribute as written, before an XML parser replaces its characters."""
+        """Return the text of an attribute value in the file, which the XML parser may have changed."""
         span = self._spans(at).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
     def _spans(self, at: Element) -> dict[str, _AttributeSpan]:
-        """Return the positions of an element's attributes. The last result is cached."""
+        """Return the positions of an element's attributes. The positions of the last element are cached."""
         if self._element is not at:
             self._element, self._attributes = at, dict(_attributes(self.data, at))
         return self._attributes
@@ -635,15 +602,15 @@ class Reporter:
         return None if span is None else Fix((Edit(*span.value, value),), turns)
 
     def without(self, at: Element, *attributes: str) -> Fix | None:
-        """Return the fix that removes attributes, each with the white space before it."""
+        """Return the fix that removes attributes, and the white space before each attribute."""
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         return (
-            Fix(tuple(Edit(_blanks_before(self.data, start), end) for start, end in spans)) if spans else None
+            Fix(tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)) if spans else None
         )
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element, or the whole line if it has nothing else."""
+        """Return the fix that removes an empty element, and its line if the line contains nothing else."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -653,7 +620,7 @@ class Reporter:
             if (closed := closing.match(self.data, end)) is None:
                 return None
             end = closed.end()
-        start = _blanks_before(self.data, at.offset, b" \t")
+        start = blanks_before(self.data, at.offset, b" \t")
         rest = _REST_OF_LINE.match(self.data, end)
         alone = rest is not None and self.data[start - 1 : start] in (b"\n", b"\r")
         return Fix((Edit(start, rest.end()) if rest is not None and alone else Edit(at.offset, end),))
@@ -667,7 +634,7 @@ class _AttributeSpan:
         line: Line, from 1.
         column: Column in characters, from 1.
         start: Index of the first byte of the attribute's name.
-        value: Index of the first byte of the value, and index of the closing quote.
+        value: Index of the first byte of the value, and index of the closing quotation mark.
     """
 
     line: int
@@ -676,8 +643,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: An XML parser replaces tabs, line ends and references such as `&amp;` in a value.
-#: Possessive quantifiers keep the matching time linear.
+#: Regular expression for a value with a tab, a line end or a reference such as `&amp;`.
+#: An XML parser replaces these characters. Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 NEWLINE = re.compile(rb"\r\n|\r|\n")
@@ -685,7 +652,7 @@ _REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
 def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]]:
-    """Yield the attributes of an element's start tag with their positions, in one pass."""
+    """Yield the name and the position of each attribute in an element's start tag."""
     tag = START_TAG.match(data, at.offset)
     if tag is None:
         return
@@ -697,8 +664,8 @@ def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]
         yield match[1].decode(), _AttributeSpan(line, column, cursor, (match.start(2) + 1, match.end(2) - 1))
 
 
-def _blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
-    """Return the index at which the white space directly before `start` begins."""
+def blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
+    """Return the index of the first byte of the white space that ends at `start`."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start
@@ -709,7 +676,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings with one code and severity; many become one finding that lists all lines."""
+    """Return the findings of one kind; of many findings, one finding lists the lines of the others."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

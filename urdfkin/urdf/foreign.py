@@ -1,6 +1,6 @@
 """Convert objects of other libraries to URDF: ElementTree, lxml, yourdfpy, and Pinocchio's Model.
 
-The library is recognized by the object's attributes and module name, so that no library is imported.
+The attributes and the module name of an object identify its library, so no library is imported.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from urdfkin.urdf.writer import to_urdf
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Largest number of names in one finding.
+#: Maximum number of joint names in a finding.
 _NAMED = 5
 
-_NOWHERE = Element("", {}, None, 0, 0, 0)
+#: Element of records that do not come from a file.
+_NO_ELEMENT = Element("", {}, None, 0, 0, 0)
 
 
 class XmlElement(Protocol):
@@ -47,9 +48,9 @@ class XmlTree(Protocol):
 
 
 def text_of(source: Any) -> tuple[str, str] | None:
-    """Return the URDF text of an object and its name in messages; None for any other source.
+    """Return the URDF text of an object of another library, and the object's name in messages; else None.
 
-    Raise InputError if an element cannot be written as XML, or a yourdfpy robot is not a tree.
+    Raise InputError if an element cannot be written as XML, or if a yourdfpy robot is not a tree.
     """
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
@@ -60,10 +61,10 @@ def text_of(source: Any) -> tuple[str, str] | None:
 
 
 def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a finding for a yourdfpy robot whose rotations may be lost; none for any other source.
+    """Return a finding if yourdfpy may have lost rotations. `file` is the robot's name in messages.
 
     yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text of the file. If a joint in
-    the file has quat_xyzw, yourdfpy loses the rotation of this joint. `file` is the robot's name in messages.
+    the file has quat_xyzw, yourdfpy therefore loses the rotation of this joint.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -77,17 +78,17 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
         return ()
     more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
     message = (
-        f"yourdfpy ignores quat_xyzw: if the file has one at {', '.join(joints[:_NAMED])}{more}, its rotation"
-        " is missing here"
+        f"yourdfpy ignores quat_xyzw, so the rotation of joint {', '.join(joints[:_NAMED])}{more} is lost if"
+        " the file gives the rotation by quat_xyzw"
     )
     remedy = "load the file itself if it contains quat_xyzw"
     return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 
 def urdf_of(robot: yourdf.Robot) -> str:
-    """Return the URDF of a yourdfpy robot. The writer of yourdfpy (0.0.60) omits mimic rules.
+    """Return the URDF of a yourdfpy robot, with mimic rules, which yourdfpy's own writer (0.0.60) omits.
 
-    The axes are not normalised, so that the checks can report their lengths.
+    The axes are not normalised, so that `check` can report their lengths.
 
     Raises:
         InputError: the joints form no tree, mimic joints form a circle, required limits are missing, or a
@@ -113,15 +114,15 @@ def _record(joint: yourdf.Joint) -> JointRecord:
     limit, rule = joint.limit, joint.mimic
     xyz, rpy = tuple(T[:3, 3]), tuple(rpy_of(T[:3, :3]))
     return JointRecord(
-        _NOWHERE, joint.name, joint.type, joint.parent, joint.child, xyz, rpy,
+        _NO_ELEMENT, joint.name, joint.type, joint.parent, joint.child, xyz, rpy,
         axis=axis,
-        limit=limit and LimitRecord(_NOWHERE, limit.lower, limit.upper, limit.effort, limit.velocity),
-        mimic=rule and MimicRecord(_NOWHERE, rule.joint, rule.multiplier, rule.offset),
+        limit=limit and LimitRecord(_NO_ELEMENT, limit.lower, limit.upper, limit.effort, limit.velocity),
+        mimic=rule and MimicRecord(_NO_ELEMENT, rule.joint, rule.multiplier, rule.offset),
     )  # fmt: skip
 
 
 def _text(root: Any) -> str:
-    """Write elements, attributes and text without comments, whose tag is not a string."""
+    """Write an element tree as XML without comments and processing instructions."""
     if not isinstance(root.tag, str):
         raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:
@@ -131,15 +132,14 @@ def _text(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                if isinstance(child.tag, str):
+                if isinstance(child.tag, str):  # the tag of a comment or an instruction is a function
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
     except (TypeError, AttributeError, RecursionError) as error:
         raise InputError("this ElementTree cannot be written as XML", found=str(error)) from None
 
 
-_ROOT = "universe"
-#: The axis of a joint of these classes is the x, y or z axis of the joint frame.
+#: Names of Pinocchio's joint classes whose axis is the x, y or z axis of the joint frame.
 #: R is a revolute joint, RUB a revolute joint without limits, and P a prismatic joint.
 _ALIGNED = re.compile(r"JointModel(R|RUB|P)([XYZ])")
 _KINDS = {
@@ -152,17 +152,17 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: A limit above this number counts as missing: Pinocchio stores the largest double for no limit.
+#: Limits above this number are treated as infinite. Pinocchio stores the largest double for no limit.
 _ENDLESS = 1e300
 
 
 @dataclass(frozen=True, slots=True)
 class Modelled:
-    """The tree of a model.
+    """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: The index of a Pinocchio joint, by each link whose frame is the frame of this joint.
-        frames: The index of a Pinocchio frame, by each other link.
+        joints: Index of the Pinocchio joint whose frame is the frame of a link, by the name of the link.
+        frames: Index of the Pinocchio frame of each other link, by the name of the link.
     """
 
     tree: KinematicTree
@@ -192,19 +192,18 @@ class _ModelReader:
         self.bodies = dict(self._bodies_on_joints())
         joints = range(int(model.njoints))
         bodies = self.bodies
-        names = {j: self.frames[bodies[j]].name if j in bodies else self._default_name(j) for j in joints}
+        default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
+        names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
+        #: The link that each joint moves, and the link of each frame that has been converted.
         self.carriers = {j: unique(name, self.link_names) for j, name in names.items()}
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """For each joint, yield the joint and the first body whose frame coincides with the joint's frame."""
+        """Yield each joint with a body whose frame is the joint's frame, in the reverse order of bodies."""
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i
-
-    def _default_name(self, joint: int) -> str:
-        return f"{self.model.names[joint]}_link" if joint else _ROOT
 
     def read(self) -> Modelled:
         """Convert all frames, then all moving joints. In a model, parent frames precede child frames."""
@@ -224,7 +223,7 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return a frame's parent link and its pose in this link. T is its pose in its parent joint."""
+        """Return the parent link of a frame and the frame's pose in the link; T is the pose in the joint."""
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T
@@ -269,7 +268,7 @@ class _ModelReader:
         axis = np.eye(3)["XYZ".index(aligned[2])] if aligned else np.array([1.0, 0.0, 0.0])
         if class_name.endswith("Unaligned"):
             # Some joint classes of Pinocchio 4.1 have no attribute `axis` in Python.
-            # The motion subspace S contains the axis.
+            # The motion subspace S of the joint contains the axis.
             linear, angular = np.split(np.ravel(joint.createData().S), 2)
             axis = linear + angular
         if not kind.has_axis:

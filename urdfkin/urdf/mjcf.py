@@ -2,19 +2,18 @@
 
 MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model:
 
-- A body becomes a link with the body's frame. A site with a name becomes a link, which a fixed joint connects
-  to the link of its body.
+- Each body becomes a link with the body's frame. Each site with a name becomes a link; a fixed joint connects
+  this link with the link of the site's body.
 - The joints of a body move one after the other, each about its anchor p_k: F <- F Trans(p_k) J_k Trans(-p_k).
-  A body with several joints becomes a chain of joints and links. The last link of this chain represents the
-  body.
+  A body with several joints becomes a chain of joints and links. The last link of the chain is the body.
 - The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
-  MuJoCo's qpos. Only the order of quaternion numbers differs: MuJoCo writes the scalar part of a quaternion
-  first.
+  MuJoCo's qpos. Only the order of quaternion numbers differs: in MuJoCo, the scalar part of a quaternion is
+  the first number.
 
-The result lists the parts of the file that a kinematic tree cannot represent, for example tendons.
+Parts of the file that a kinematic tree cannot represent, for example tendons, are listed in `Mjcf.listed`.
 
-MuJoCo can align the frame of a free body with its inertial frame (`align`, `alignfree`). The inertial frame
-depends on the shapes. To compile a file with this option, MuJoCo therefore needs the meshes.
+MuJoCo can align the frame of a free body with the body's inertial frame (options `align` and `alignfree`).
+The inertial frame depends on the shapes, so MuJoCo needs the meshes to compile a file with such an option.
 """
 
 from __future__ import annotations
@@ -44,12 +43,12 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: A slide joint without limits gets these limits (+- m), because a prismatic joint of a URDF needs limits.
+#: Limits (+- m) in the URDF of a prismatic joint without limits, because URDF requires limits.
 UNBOUNDED = 1000.0
-#: An MJCF text begins with this pattern. Possessive quantifiers keep the matching time linear.
+#: Regular expression for the beginning of an MJCF text. The matching time is linear in the text's length.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
-_ENDINGS = (".xml", ".mjcf")
-#: This number of bytes of a file is read to recognize MJCF.
+_SUFFIXES = (".xml", ".mjcf")
+#: Number of bytes of a file in which the root element of MJCF is searched.
 _HEAD = 65_536
 
 
@@ -59,9 +58,9 @@ class Listed:
 
     Attributes:
         what: A description in one clause.
-        where: The tag and the name of the element, or the tag alone; None for the file.
-        moves: Whether this part of the file affects the motion of the links.
-        remedy: The remedy of a probable mistake; None for a part that is left out.
+        where: The tag and the name of the element, or the tag alone; None for the whole file.
+        moves: Whether the part of the file affects the motion of the links.
+        remedy: The remedy for a probable mistake; None for a part that is left out.
     """
 
     what: str
@@ -76,13 +75,13 @@ class Mjcf:
 
     Attributes:
         model: MuJoCo's compiled model with all bodies.
-        fused: The compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
-        frames: "body" or "site" of each link, and the index of this body or site in MuJoCo's model.
-        coordinates: The index of each moving joint, including mimic joints, in MuJoCo's qpos.
-        rules: The mimic joint of each equality that is a mimic rule, by index in MuJoCo's model.
+        fused: MuJoCo's compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
+        frames: "body" or "site", and the index of this body or site in MuJoCo's model, for each link.
+        coordinates: Index in MuJoCo's qpos of each moving joint, including mimic joints.
+        rules: Name of the mimic joint for each equality that is a mimic rule, by the equality's index.
         apart: Indices of the active equalities between joints that the tree cannot represent.
         whole: Whether `model` contains the shapes and inertias of the file.
-        aligns: Whether MuJoCo aligns the frame of a free body with its inertial frame.
+        aligns: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
     """
 
     tree: KinematicTree
@@ -107,16 +106,14 @@ class Mjcf:
                 unit = q[:, at + 3 : at + 7] / np.linalg.norm(q[:, at + 3 : at + 7], axis=1, keepdims=True)
                 full[:, to : to + 3], full[:, to + 3 : to + 7] = q[:, at : at + 3], np.roll(unit, 1, axis=1)
             else:
-                own = q[:, at]
-                full[:, to] = (
-                    own if joint.mimic is None else joint.mimic.multiplier * own + joint.mimic.offset
-                )
+                rule = joint.mimic
+                full[:, to] = q[:, at] if rule is None else rule.multiplier * q[:, at] + rule.offset
         return full
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), by `mj_kinematics`.
+        """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
 
-        The fused model, if there is one, computes the frames that it contains.
+        If there is a fused model, the placements of its frames are computed with the fused model.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -126,7 +123,7 @@ class Mjcf:
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """Return the body or site in `fused` with the same name as a frame of `model`, or None."""
+        """Return the body or site in `fused` that has the name of a frame of `model`, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
@@ -134,10 +131,9 @@ class Mjcf:
         return (kind, index) if index >= 0 else None
 
     def lengths(self, q: FloatArray) -> FloatArray:
-        """Return an upper bound (n, frames), in m, of each frame's distance from the world's origin.
+        """Return an upper bound (n, frames), in m, on each frame's distance from the world's origin.
 
-        The bound is the sum of the lengths of all translations from the world to the frame. Bounds on
-        rounding errors use it.
+        The bound is the sum of the lengths of all translations from the world to the frame.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -155,8 +151,8 @@ class Mjcf:
     def reference_angles(self, q: FloatArray) -> FloatArray:
         """Return a sum of joint angles (n, frames), in rad, for bounds on rounding errors.
 
-        The sum of a frame contains |q| + |ref| for each hinge between the world and the frame that has a
-        reference value `ref`.
+        The sum has a summand |q| + |ref| for each hinge between the world and the frame, if the reference
+        value `ref` of the hinge is not 0.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -168,18 +164,16 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """For each joint of a body, yield its index in the model, its kind, and its index in qpos."""
+        """Yield the index in the model, the kind, and the index in qpos of each joint of a body."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
-        first = int(m.body_jntadr[body])
-        for j in range(first, first + int(m.body_jntnum[body])):
+        for j in _joint_indices(m, body):
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Convert `at_body` (n, bodies) to a quantity per frame (n, frames).
+        """Return the quantity (n, frames) of each frame, from the quantities `at_body` (n, bodies) of bodies.
 
-        The frame of a body has the quantity of this body. The frame of a site has the quantity of its body,
-        plus the quantity of the site in `own`.
+        A site has the quantity of its body plus the site's entry in `own` (sites,).
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -190,7 +184,7 @@ class Mjcf:
     def residuals(self, q: FloatArray) -> FloatArray:
         """Return MuJoCo's residuals `efc_pos` (n, equalities) of the equalities between joints.
 
-        The result is NaN for an equality that is inactive, or that is not between joints.
+        The residual is NaN for an equality that is inactive or that does not concern joints.
         """
         mujoco, m = library(), self.model
         off = mujoco.mjtDisableBit
@@ -209,9 +203,9 @@ class Mjcf:
     def rule_sizes(self, q: FloatArray) -> FloatArray:
         """Return the size (n, equalities) of each mimic rule, for bounds on rounding errors.
 
-        The size of the rule y = y0 + c0 + c1 (x - x0) is s = |y0| + |c0| + |c1| (size of x + |x0|). If x is
-        not a mimic joint, the size of x is |x|. Otherwise it is the value of s for the rule of x. The result
-        is s (k + 1), where k is the number of rules from the mimic joint y to an independent joint.
+        For the rule y = y0 + c0 + c1 (x - x0), the size of y is s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The
+        size of an independent joint x is s(x) = |x|. The result for a rule is s(y) (k + 1), where k is the
+        number of rules from the mimic joint y to an independent joint.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
@@ -222,8 +216,8 @@ class Mjcf:
                 chain.append(above)
             for one in reversed(chain):
                 y, x = (int(m.jnt_qposadr[j]) for j in (m.eq_obj1id[one], m.eq_obj2id[one]))
-                free = qpos[:, x], 0
-                size, depth = known.get(by_joint.get(int(m.eq_obj2id[one]), -1), free)
+                independent = qpos[:, x], 0
+                size, depth = known.get(by_joint.get(int(m.eq_obj2id[one]), -1), independent)
                 y0, x0 = abs(m.qpos0[y]), abs(m.qpos0[x])
                 c0, c1 = np.abs(m.eq_data[one, :2])
                 known[one] = y0 + c0 + c1 * (size + x0), depth + 1
@@ -234,7 +228,7 @@ class Mjcf:
 
 
 def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]) -> FloatArray:
-    """Return the placements (n, frames, 4, 4), by `mj_kinematics`."""
+    """Return the placements (n, frames, 4, 4) of bodies and sites, computed by `mj_kinematics`."""
     mujoco = library()
     data = mujoco.MjData(model)
     out = np.zeros((len(qpos), len(frames), 4, 4))
@@ -249,7 +243,7 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 
 
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
-    """Return whether a source has the root element <mujoco>: text, bytes, or a .xml or .mjcf file.
+    """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>.
 
     >>> is_mjcf("<mujoco/>"), is_mjcf(b"<mujoco/>"), is_mjcf("<robot/>"), is_mjcf("panda")
     (True, True, False, False)
@@ -258,20 +252,19 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
         return _ROOT.match(source.decode("utf-8-sig", "replace")) is not None
     if is_text(source):
         return _ROOT.match(str(source).lstrip("\ufeff")) is not None
-    if not isinstance(source, str | os.PathLike) or Path(source).suffix.lower() not in _ENDINGS:
+    if not isinstance(source, str | os.PathLike) or Path(source).suffix.lower() not in _SUFFIXES:
         return False
     try:
-        head = read_start(at_home(source), _HEAD)
+        return is_mjcf(read_start(at_home(source), _HEAD))
     except OSError:
-        return False  # the reader of the file reports the error
-    return _ROOT.match(head.decode("utf-8-sig", "replace")) is not None
+        return False  # `load` reports the error when it reads the file
 
 
 def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
-    With `whole`, MuJoCo compiles the unchanged file with its meshes. Otherwise urdfkin first removes the
-    shapes and the inertias, so that MuJoCo needs no mesh files. `name` is the name of the source in messages.
+    If `whole` is True, MuJoCo compiles the unchanged file with its meshes. Otherwise urdfkin first removes
+    the shapes and inertias, so that MuJoCo needs no mesh files. `name` is the name of the source in messages.
     Raise InputError if MuJoCo is not installed or does not accept the file, or if the robot has a ball joint.
     """
     mujoco = library()
@@ -280,23 +273,22 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         spec = _spec(mujoco, source)
         aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if whole and fuses:
-            _refuse_fused(aligned, name)
+            if merged := [body for body in aligned if body.bodies]:
+                what = "MuJoCo fuses static bodies into a free body and aligns its frame with their inertia"
+                where, remedy = f"{name}: body {merged[0].name}", 'write fusestatic="false" or align="false"'
+                raise InputError(what, where=where, remedy=remedy)
             fused = compiled(_spec(mujoco, source))
         spec.compiler.fusestatic = False
         notes = list(_left_out(mujoco, spec))
         if not whole:
             _strip(mujoco, spec)
         model = compiled(spec)
-        title = spec.modelname or "robot"
-        reader = _MjcfReader(mujoco, model, title, name)
+        reader = _MjcfReader(mujoco, model, spec.modelname or "robot", name)
         tree = reader.tree()
     except UnicodeDecodeError as error:
-        raise InputError(
-            "this MJCF contains a name that is not UTF-8",
-            where=name,
-            found=repr(error.object)[:80],
-            remedy="save the file as UTF-8",
-        ) from None
+        message = "this MJCF contains a name that is not UTF-8"
+        remedy = "save the file as UTF-8"
+        raise InputError(message, where=name, found=repr(error.object)[:80], remedy=remedy) from None
     except InputError:
         raise
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
@@ -304,31 +296,22 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
     notes += [_align_note(body.name, whole=whole) for body in aligned]
     notes += _angle_unit(mujoco, model) if spec.compiler.degree else ()
-    listed = (*reader.listed, *notes)
     return Mjcf(
-        tree,
-        model,
-        fused,
-        reader.frames,
-        reader.coordinates,
-        reader.mimic_equalities,
-        frozenset(reader.apart),
-        listed,
-        whole,
-        bool(aligned),
-    )
+        tree, model, fused, reader.frames, reader.coordinates, reader.mimic_equalities,
+        frozenset(reader.apart), (*reader.listed, *notes), whole, bool(aligned),
+    )  # fmt: skip
 
 
 def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # a confined process cannot start threads
-    # -1 ignores large memory sizes in the file, which only dynamics needs.
+    # The value -1 replaces large memory sizes in the file, which only dynamics needs.
     spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
 
 
 def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield each free body that MuJoCo aligns with its inertial frame. It has no moving descendants."""
+    """Yield each free body that MuJoCo aligns with its inertial frame; the body has no moving descendants."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
@@ -340,34 +323,17 @@ def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
 
 
 def _moving_below(body: Any) -> bool:
-    open_ = list(body.bodies)
-    while open_:
-        one = open_.pop()
-        if list(one.joints):
-            return True
-        open_ += one.bodies
-    return False
-
-
-def _refuse_fused(aligned: list[Any], name: str) -> None:
-    for body in aligned:
-        if body.bodies:
-            raise InputError(
-                "MuJoCo fuses static bodies into a free body and aligns its frame with their common inertia",
-                where=f"{name}: body {body.name}",
-                remedy='write fusestatic="false" or align="false"',
-            )
+    descendants = list(body.bodies)
+    for one in descendants:
+        descendants += one.bodies
+    return any(list(one.joints) for one in descendants)
 
 
 def _align_note(body: str, *, whole: bool) -> Listed:
-    where = f"body {body}" if body else "body"
-    if whole:
-        return Listed("MuJoCo aligns this free body: its frame is its inertial frame", where)
-    what = (
-        "MuJoCo aligns the frame of this free body with its inertial frame, which depends on its shapes;"
-        " urdfkin uses the frame in the file"
-    )
-    return Listed(what, where, moves=True)
+    what = "MuJoCo aligns the frame of this free body with its inertial frame"
+    if not whole:
+        what += ", which depends on its shapes; urdfkin uses the frame in the file"
+    return Listed(what, f"body {body}" if body else "body", moves=not whole)
 
 
 def name_of(source: str | bytes | os.PathLike[str]) -> str:
@@ -388,7 +354,7 @@ def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
-    """Yield the parts of a file that the tree does not represent, except equalities between joints."""
+    """Yield the parts of the file that the tree does not represent, except equalities between joints."""
     for i, one in enumerate(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
             kind, names = str(one.type).rpartition("_")[2].lower(), _join_names(one.name1, one.name2)
@@ -407,7 +373,8 @@ def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
     """Yield a finding if a file is in degrees, but the limits of its hinges are probably in radians.
 
     The angle unit applies to the whole file, so the limits of all hinges must be implausibly small in
-    degrees. The opposite mistake is not reported: all hinges of some robots turn several times.
+    degrees. Limits in degrees in a file in radians are not reported, because the hinges of some robots turn
+    several times.
     """
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
@@ -428,7 +395,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # MuJoCo must not align the frame with the placeholder inertia from the next loop.
+        # MuJoCo must not align the frame with the placeholder inertia, which the next loop sets.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -439,9 +406,14 @@ def _join_names(*names: str) -> str:
     return " and ".join(name for name in names if name)
 
 
+def _joint_indices(model: Any, body: int) -> range:
+    first = int(model.body_jntadr[body])
+    return range(first, first + int(model.body_jntnum[body]))
+
+
 @dataclass(slots=True)
 class _MjcfReader:
-    """Convert one compiled model; `source` is its name in messages."""
+    """Convert one compiled model with the name `name`; `source` is the name of the file in messages."""
 
     mujoco: Any
     model: Any
@@ -481,17 +453,16 @@ class _MjcfReader:
         self._joints.append((fixed_joint(name, T), parent, child))
 
     def _body(self, i: int) -> None:
-        """Add the joints of a body one after the other, then its own link."""
+        """Add the joints of a body one after the other, then the link of the body."""
         m, here = self.model, self._links[self.model.body_parentid[i]]
         T, link = _pose(m.body_pos[i], m.body_quat[i]), self._links[i]
         if m.body_mocapid[i] >= 0:
-            self.listed.append(
-                Listed("a mocap body is fixed at its pose in the file", f"body {link}", moves=True)
-            )
-        first, count = int(m.body_jntadr[i]), int(m.body_jntnum[i])
-        for j in range(first, first + count):
+            what = "a mocap body is fixed at its pose in the file"
+            self.listed.append(Listed(what, f"body {link}", moves=True))
+        joints = _joint_indices(m, i)
+        for j in joints:
             anchor, name = pose(p=m.jnt_pos[j]), self._hinges[j]
-            ends_here = j == first + count - 1 and not m.jnt_pos[j].any()
+            ends_here = j == joints[-1] and not m.jnt_pos[j].any()
             child = link if ends_here else unique(f"{name}_link", self._link_names)
             joint, back = self._joint(j, name, T @ anchor)
             self._joints.append((joint, here, child))
@@ -501,15 +472,13 @@ class _MjcfReader:
             self._fix(T, here, link)
 
     def _joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Return joint number `j` with the origin T, and the pose of the body's frame in the joint frame."""
+        """Return the joint with index `j` and origin T, and the pose of the body in the joint frame."""
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:
-            raise InputError(
-                "urdfkin does not support ball joints",
-                where=f"{self.source}: joint {name}",
-                remedy="use three hinges in one body (singular where the middle one is at a right angle)",
-            )
+            message = "urdfkin does not support ball joints"
+            remedy = "use three hinges in one body (singular where the middle one is at a right angle)"
+            raise InputError(message, where=f"{self.source}: joint {name}", remedy=remedy)
         at = int(m.jnt_qposadr[j])
         if kind == kinds.mjJNT_FREE:
             place = ", ".join(f"{x:g}" for x in m.qpos0[at : at + 3])
@@ -544,7 +513,7 @@ class _MjcfReader:
         return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
 
     def _rules(self) -> Iterator[tuple[str, Mimic]]:
-        """Yield the mimic rules: the equalities y = m x + c of two joints. Chains are resolved."""
+        """Yield the mimic rules, which are equalities y = m x + c of two joints. Chains are resolved."""
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
@@ -569,10 +538,10 @@ class _MjcfReader:
             yield name, resolve(rules, name)
 
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Return the name of the mimic joint y and its rule from an equality y - y0 = c0 + c1 (x - x0).
+        """Return the name and the rule of the mimic joint y in the equality y - y0 = c0 + c1 (x - x0).
 
-        x0 and y0 are the reference values of the joints. The result is None if the equality is not linear, or
-        concerns only one joint.
+        Here x0 and y0 are the reference values of the joints. The result is None if the equality is not
+        linear, or has only one joint.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])

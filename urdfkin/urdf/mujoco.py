@@ -1,4 +1,4 @@
-"""Import MuJoCo on demand. No other module imports it."""
+"""Import MuJoCo on demand."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def library() -> Any:
 
 
 def compiled(spec: Any) -> Any:
-    """Compile a MuJoCo specification without its warnings, which concern dynamics."""
+    """Compile a MuJoCo specification without warnings, because MuJoCo's warnings are about dynamics."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return spec.compile()

@@ -1,12 +1,11 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-The XML parser is expat. It does not change names (`xacro:macro`), reports the position of every start tag,
-needs no stack for deep nesting, and opens no file. If a document type declaration defines entities or refers
-to an external file, parsing stops with an error. No entity is expanded.
+The XML parser is expat: it keeps namespace prefixes (`xacro:macro`), reports the position of every start tag,
+parses deep nesting without recursion, and opens no file. If a document type declaration defines entities or
+refers to an external file, parsing stops with an error. No entity is expanded.
 
-Each attribute must have the right count of numbers, which are ASCII and finite: the grammar is `xs:double`
-without its special values, as in urdfdom. Nothing is guessed or repaired; every problem is a finding.
-`urdfkin.urdf.lint` checks the records further.
+A number is a finite decimal number in ASCII, as in urdfdom: `xs:double` of XML Schema without NaN and INF.
+The parser repairs nothing; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
 """
 
 from __future__ import annotations
@@ -34,6 +33,7 @@ from urdfkin.urdf.findings import (
     Reporter,
     Rule,
     Severity,
+    blanks_before,
     quoted,
     shortened,
 )
@@ -56,47 +56,38 @@ DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
-#: Byte order marks of encodings other than UTF-8.
-#: The UTF-32 marks come first, because one of them begins with a UTF-16 mark.
-_MARKS = (
-    (codecs.BOM_UTF32_LE, "UTF-32"),
-    (codecs.BOM_UTF32_BE, "UTF-32"),
-    (codecs.BOM_UTF16_LE, "UTF-16"),
-    (codecs.BOM_UTF16_BE, "UTF-16"),
-)
-
-#: An XML file in UTF-32 or UTF-16 without a byte order mark begins with these bytes of '<'.
-_WIDE = ((b"<\0\0\0", "UTF-32"), (b"\0\0\0<", "UTF-32"), (b"<\0", "UTF-16"), (b"\0<", "UTF-16"))
+#: First bytes of XML files in UTF-32 and UTF-16: a byte order mark, or the character '<'.
+#: The encoding UTF-32 comes first, because some of its first bytes begin with those of UTF-16.
+_WIDE = {
+    "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
+    "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
+}
 
 _DECLARATION = re.compile(rb"""<\?xml(?=\s)[^>]*?\?>""")
 _ENCODING = re.compile(rb"""\sencoding\s*=\s*["']([^"']*)["']""")
 _XML_VERSION = re.compile(rb"""\sversion\s*=\s*["']([^"']*)["']""")
 
-#: In these encodings, ASCII characters have the same bytes as in UTF-8.
+#: Names of encodings in which ASCII characters have the same bytes as in UTF-8.
 _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
 def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
-    """Return the bytes without a byte order mark if they are UTF-8; None after an error."""
+    """Return the bytes of UTF-8 text without a byte order mark; None after an error."""
     if not data.strip():
         what = "the file is empty" if not data else "the file contains only white space"
         report.add(EMPTY, what, remedy="check the program that wrote the file")
         return None
-    wide = next((name for mark, name in (*_MARKS, *_WIDE) if data.startswith(mark)), None)
+    wide = next((encoding for encoding, begins in _WIDE.items() if data.startswith(begins)), None)
     if wide is not None:
         report.add(ENCODING, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
         return None
-    marked = data.startswith(codecs.BOM_UTF8)
     text = data.removeprefix(codecs.BOM_UTF8)
     declared = _declared_encoding(text)
     if not (_is_utf8(report, text, declared) and _agrees(report, text, declared)):
         return None
-    if marked:
-        report.add(
-            BYTE_ORDER_MARK,
-            "the text begins with a byte order mark",
-            remedy="remove the byte order mark if you can",
-        )
+    if len(text) < len(data):
+        what = "the text begins with a byte order mark"
+        report.add(BYTE_ORDER_MARK, what, remedy="remove the byte order mark if you can")
     return text
 
 
@@ -109,24 +100,18 @@ def _declared_encoding(text: bytes) -> str | None:
 def _is_utf8(report: Reporter, text: bytes, declared: str | None) -> bool:
     zero = text.find(b"\0")
     if zero >= 0:
-        report.add(
-            ENCODING,
-            "the text contains a zero byte: some readers stop there, others continue",
-            remedy="check the file: it is not a text file, or it is damaged",
-            position=line_and_column(text, zero),
-        )
+        message = "the text contains a zero byte: some readers stop there, others continue"
+        remedy = "check the file: it is not a text file, or it is damaged"
+        report.add(ENCODING, message, remedy=remedy, position=line_and_column(text, zero))
         return False
     try:
         text.decode("utf-8")
     except UnicodeDecodeError as error:
         claim = f", although the file declares {declared}" if declared else ""
-        report.add(
-            ENCODING,
-            f"a byte is not UTF-8{claim}",
-            found=f"0x{text[error.start]:02x}",
-            remedy="save the file as UTF-8",
-            position=line_and_column(text, error.start),
-        )
+        message = f"a byte is not UTF-8{claim}"
+        remedy = "save the file as UTF-8"
+        found = f"0x{text[error.start]:02x}"
+        report.add(ENCODING, message, found=found, remedy=remedy, position=line_and_column(text, error.start))
         return False
     return True
 
@@ -141,20 +126,14 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
     if declared is None or _codec(declared) in ("utf-8", "ascii"):
         return True
     if text.isascii() and _ASCII_SUPERSETS.match(_codec(declared) or ""):
-        report.add(
-            DECLARED_ASCII,
-            "the declared encoding is not UTF-8, but every character is ASCII",
-            found=quoted(declared),
-            remedy='write encoding="UTF-8"',
-            fix=lambda: Fix((Edit(*match.span(1), "UTF-8"),)) if (match := _ENCODING.search(text)) else None,
-        )
+        message = "the declared encoding is not UTF-8, but every character is ASCII"
+        match = _ENCODING.search(text)
+        fix = None if match is None else Fix((Edit(*match.span(1), "UTF-8"),))
+        remedy, found = 'write encoding="UTF-8"', quoted(declared)
+        report.add(DECLARED_ASCII, message, found=found, remedy=remedy, fix=lambda: fix)
         return True
-    report.add(
-        DECLARED,
-        "the declared encoding is not UTF-8",
-        found=quoted(declared),
-        remedy='save the file as UTF-8 and write encoding="UTF-8"',
-    )
+    remedy = 'save the file as UTF-8 and write encoding="UTF-8"'
+    report.add(DECLARED, "the declared encoding is not UTF-8", found=quoted(declared), remedy=remedy)
     return False
 
 
@@ -187,65 +166,54 @@ NAME_TOO_LONG = Rule("URDF117", "name-too-long", ERROR)
 INSTRUCTION = Rule("URDF118", "processing-instruction", WARNING, REFUSES)
 MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 
-#: Older versions of libxml2 accept at most this depth of nested elements.
+#: Maximum depth of nested elements in older versions of libxml2.
 COMMON_DEPTH = 256
-_COMMON = ("older readers built on libxml2 refuse", COMMON_DEPTH)
 
-#: Bytes per call of the parser.
+#: Number of bytes that one call of the parser gets.
 _PIECE = 1_000_000
 
-#: The parser stores at most this number of characters of an element's text. A message quotes fewer.
+#: Maximum number of characters that the parser stores of an element's text.
 _STORED = 2 * QUOTED
 
 #: Attributes whose value is the name of a link or joint.
 _NAMES = frozenset({"name", "link", "joint"})
 
 
-class _Stop(Exception):  # noqa: N818  the exception is no error of the caller
-    """Stop the parser after an error, if urdfkin cannot interpret the rest of the file."""
+class _StopError(Exception):
+    """Stop the parser, because urdfkin cannot interpret the rest of the file after an error."""
 
 
 def read_document(report: Reporter) -> Element | None:
     """Parse the reporter's file and return its root element. If this fails, add a finding and return None."""
     data, most = report.data, report.limits.bytes
     if len(data) > most:
-        report.add(
-            TOO_LARGE,
-            "the file is too large",
-            found=f"{len(data)} bytes, more than {most}",
-            remedy="if the file is correct, raise the limit with --max-bytes",
-        )
+        message = "the file is too large"
+        remedy = "if the file is correct, raise the limit with --max-bytes"
+        report.add(TOO_LARGE, message, found=f"{len(data)} bytes, more than {most}", remedy=remedy)
         return None
     text = utf8_bytes(report, data)
     if text is None:
         return None
     report.data = text
-    return _parse(report)
-
-
-def _parse(report: Reporter) -> Element | None:
     builder = _Builder(report)
     try:
-        builder.read(report.data)
-    except _Stop:
+        builder.read(text)
+    except _StopError:
         return None
     except expat.ExpatError as error:
         builder.syntax_error(error)
         return None
     if builder.deepest > COMMON_DEPTH:
-        refused = builder.deepest > ORACLE_DEPTH
-        reader, most = ("urdfdom refuses", ORACLE_DEPTH) if refused else _COMMON
-        report.add(
-            TOO_DEEP_FOR_ORACLE if refused else DEEP_NESTING,
-            f"elements are nested {builder.deepest} deep",
-            builder.deepest_element,
-            remedy=f"{reader} more than {most}",
-        )
+        rule, reader, most = DEEP_NESTING, "older readers built on libxml2 refuse", COMMON_DEPTH
+        if builder.deepest > ORACLE_DEPTH:
+            rule, reader, most = TOO_DEEP_FOR_ORACLE, "urdfdom refuses", ORACLE_DEPTH
+        what = f"elements are nested {builder.deepest} deep"
+        report.add(rule, what, builder.deepest_element, remedy=f"{reader} more than {most}")
     return builder.root
 
 
 class _Builder:
-    """The handlers of the parser, which build the tree and check the limits."""
+    """Build the tree of elements from the events of expat, and check the limits."""
 
     def __init__(self, report: Reporter) -> None:
         self.report, self.limits = report, report.limits
@@ -267,7 +235,7 @@ class _Builder:
         parser.SkippedEntityHandler = self.skipped
 
     def read(self, data: bytes) -> None:
-        """Feed the parser in pieces. expat reads incomplete markup again with the next piece."""
+        """Parse the file in pieces. expat reads incomplete markup again together with the next piece."""
         whole, size = memoryview(data), min(_PIECE, self.limits.markup)
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
@@ -277,13 +245,12 @@ class _Builder:
                 self.refuse(MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found)
         self.parser.Parse(b"", True)
 
-    def here(self) -> tuple[int, int]:
+    def position(self) -> tuple[int, int]:
         return self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        line, column = self.here()
         parent = self.open[-1] if self.open else None
-        element = Element(tag, attributes, parent, line, column, self.parser.CurrentByteIndex)
+        element = Element(tag, attributes, parent, *self.position(), self.parser.CurrentByteIndex)
         if parent is None:
             self.root, self.begun = element, True
             if not self.marked:
@@ -323,8 +290,8 @@ class _Builder:
 
     def refuse(self, code: Rule, limit: str, message: str, found: str) -> None:
         remedy = f"if the file is correct, raise the limit with --max-{limit}"
-        self.report.add(code, message, found=found, remedy=remedy, position=self.here())
-        raise _Stop
+        self.report.add(code, message, found=found, remedy=remedy, position=self.position())
+        raise _StopError
 
     def end(self, tag: str) -> None:
         self.waiting.clear()
@@ -340,66 +307,45 @@ class _Builder:
     def comment(self, text: str) -> None:
         self.begun = True
         if text.lstrip().startswith(MARK):
-            comment = Comment(text, *self.here(), self._is_behind_something())
+            start = blanks_before(self.report.data, self.parser.CurrentByteIndex, b" \t")
+            behind = start > 0 and self.report.data[start - 1] not in b"\r\n"
+            comment = Comment(text, *self.position(), behind)
             self.report.comments.append(comment)
             self.waiting.append(comment)
 
-    def _is_behind_something(self) -> bool:
-        """Return whether the current line has text other than white space before the parser's position."""
-        data, start = self.report.data, self.parser.CurrentByteIndex
-        while start > 0 and data[start - 1] in b" \t":
-            start -= 1
-        return start > 0 and data[start - 1] not in b"\r\n"
-
     def instruction(self, target: str, text: str) -> None:
-        """Report a processing instruction after the beginning of the file, which urdfdom refuses."""
         if self.begun:
-            self.report.add(
-                INSTRUCTION,
-                "a processing instruction is not at the beginning of the file; urdfdom refuses the file",
-                found=quoted(f"<?{target} {text}".strip() + "?>"),
-                remedy="remove the instruction, or move it to the beginning, where only other"
-                " instructions may precede it",
-                position=self.here(),
-            )
+            message = "a processing instruction is not at the beginning of the file; urdfdom refuses the file"
+            remedy = "remove the instruction, or move it before all other content"
+            found = quoted(f"<?{target} {text}".strip() + "?>")
+            self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration. If it refers to or has definitions, stop the parser."""
+        """Report a document type declaration; stop the parser if the declaration contains definitions."""
         self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
         if system is None and public is None and not has_subset:
-            self.report.add(
-                DOCTYPE,
-                "a document type declaration has no use in a URDF",
-                found=quoted(f"<!DOCTYPE {name}>"),
-                remedy="remove the declaration, which is ignored",
-                position=position,
-            )
+            message = "a document type declaration has no use in a URDF"
+            remedy, found = "remove the declaration, which is ignored", quoted(f"<!DOCTYPE {name}>")
+            self.report.add(DOCTYPE, message, found=found, remedy=remedy, position=position)
             return
         what = "contains definitions" if has_subset else "refers to an external definition"
         found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
-        self.report.add(
-            ENTITY,
-            f"the document type declaration {what}",
-            found=found,
-            remedy="remove the declaration and write the values directly; nothing was expanded or opened",
-            position=position,
-        )
-        raise _Stop
+        message = f"the document type declaration {what}"
+        remedy = "remove the declaration and write the values directly; nothing was expanded or opened"
+        self.report.add(ENTITY, message, found=found, remedy=remedy, position=position)
+        raise _StopError
 
     def skipped(self, name: str, is_parameter: int) -> None:
         self.undefined_entity(name)
-        raise _Stop
+        raise _StopError
 
     def undefined_entity(self, name: str | None) -> None:
-        self.report.add(
-            ENTITY,
-            "the file uses an entity that XML does not define",
-            found=quoted(f"&{name};") if name else None,
-            remedy="write the character itself, or one of &lt; &gt; &amp; &quot; &apos;",
-            position=self.here(),
-        )
+        message = "the file uses an entity that XML does not define"
+        remedy = "write the character itself, or one of &lt; &gt; &amp; &quot; &apos;"
+        found = quoted(f"&{name};") if name else None
+        self.report.add(ENTITY, message, found=found, remedy=remedy, position=self.position())
 
     def syntax_error(self, error: expat.ExpatError) -> None:
         reason = expat.errors.messages[error.code]
@@ -414,17 +360,12 @@ class _Builder:
                 remedy = f"close {opened} first"
             elif reason in (expat.errors.XML_ERROR_NO_ELEMENTS, expat.errors.XML_ERROR_UNCLOSED_TOKEN):
                 message, remedy = "the file ends too early", f"close {opened}"
-        ended = reason == expat.errors.XML_ERROR_NO_ELEMENTS
-        self.report.add(
-            SYNTAX,
-            f"not well-formed XML: {message}",
-            found=None if ended else self._around(),
-            remedy=remedy,
-            position=(error.lineno, error.offset + 1),
-        )
+        found = None if reason == expat.errors.XML_ERROR_NO_ELEMENTS else self._around()
+        message, position = f"not well-formed XML: {message}", (error.lineno, error.offset + 1)
+        self.report.add(SYNTAX, message, found=found, remedy=remedy, position=position)
 
     def _entity_name(self) -> str | None:
-        """Return the name of the first entity after an error that XML does not define."""
+        """Return the first entity name after the error position that XML does not define."""
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
@@ -438,7 +379,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: Each message of expat has a clearer message and a remedy here.
+#: A clearer message and a remedy for each message of expat.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -468,13 +409,12 @@ WHITESPACE = Rule("URDF303", "whitespace-in-number", WARNING, REFUSES)
 UNDERFLOW = Rule("URDF304", "underflow", WARNING)
 NUMBER_TOO_LONG = Rule("URDF305", "number-too-long", ERROR)
 
-#: Splitting at this white space takes time linear in the length of the text.
 _BLANKS = re.compile(r"[ \t\r\n]+")
 
 
 @dataclass(slots=True)
 class NumberReader:
-    """Reader of numbers in attributes, which reports invalid numbers.
+    """Read numbers in attributes, and report invalid numbers.
 
     `bad_number` is the rule for an invalid number, `bad_vector` the rule for a wrong count of numbers. The
     default rules are for numbers that kinematics uses.
@@ -485,7 +425,7 @@ class NumberReader:
     bad_vector: Rule = BAD_VECTOR
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
-        """Return one number; `default` if the attribute is missing, None if its value is not a number."""
+        """Return a number; `default` if the attribute is missing, None if the value is not a number."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
@@ -516,13 +456,10 @@ class NumberReader:
                 return None
             values.append(value)
         if len(values) != count:
+            message = f"{attribute} needs {count} numbers, but has {len(values)}"
+            remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quoted(written)}"
             self.report.add(
-                self.bad_vector,
-                f"{attribute} needs {count} numbers, but has {len(values)}",
-                element,
-                attribute=attribute,
-                found=f"{attribute}={quoted(written)}",
-                remedy=f"write {count} numbers separated by spaces",
+                self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
             )
             return None
         if self.report.has_raw_blanks:
@@ -532,48 +469,34 @@ class NumberReader:
     def _number(self, element: Element, attribute: str, piece: str) -> float | None:
         value = float(piece) if DECIMAL.fullmatch(piece) else None
         if value is not None and math.isfinite(value):
-            if value == 0.0 and any(digit in _NOT_ZERO for digit in re.split("[eE]", piece)[0]):
-                self.report.add(
-                    UNDERFLOW,
-                    f"{attribute} contains a number too small for a double; it is read as zero",
-                    element,
-                    attribute=attribute,
-                    found=quoted(piece),
-                    remedy="check the exponent",
-                )
+            if value == 0.0 and re.search("[1-9]", re.split("[eE]", piece)[0]):
+                message = f"{attribute} contains a number too small for a double, which is read as zero"
+                remedy, found = "check the exponent", quoted(piece)
+                self.report.add(UNDERFLOW, message, element, attribute=attribute, found=found, remedy=remedy)
             return value
         what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
+        part = "" if piece == element.attributes[attribute] else "a part of "
+        message, remedy = f"{part}{what} is not a number", _remedy(piece)
         if value is not None:
-            message, remedy = "is too large for a double", "check the exponent"
-        else:
-            message, remedy = "is not a number", _remedy(piece)
-        self.report.add(
-            self.bad_number,
-            f"{what} {message}" if piece == element.attributes[attribute] else f"a part of {what} {message}",
-            element,
-            attribute=attribute,
-            found=quoted(piece),
-            remedy=remedy,
-        )
+            message, remedy = f"{part}{what} is too large for a double", "check the exponent"
+        found = quoted(piece)
+        self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Return whether a text is too long for a number, because its conversion takes quadratic time."""
+        """Report a text that is too long for a number: the conversion of long texts takes quadratic time."""
         if len(written) <= most:
             return False
+        found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
+        remedy = "write 17 digits, enough for every double, or raise the limit with --max-number"
         self.report.add(
-            NUMBER_TOO_LONG,
-            f"{attribute} is too long for a number",
-            element,
-            attribute=attribute,
-            found=f"{quoted(written, 30)} of {len(written)} characters, more than {most}",
-            remedy="write 17 digits, enough for every double, or raise the limit with --max-number",
-            severity=self.bad_number.severity,
-        )
+            NUMBER_TOO_LONG, f"{attribute} is too long for a number", element,
+            attribute=attribute, found=found, remedy=remedy, severity=self.bad_number.severity,
+        )  # fmt: skip
         return True
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
-        """Report tabs and newlines in a value, which urdfdom refuses. XML parsers replace them by spaces."""
+        """Report tabs and line ends, which urdfdom refuses, although XML parsers replace them by spaces."""
         raw = self.report.raw(element, attribute)
         if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
             return
@@ -583,30 +506,28 @@ class NumberReader:
             self._report_refused(element, attribute, "a tab or line end between or after the numbers")
 
     def _report_refused(self, element: Element, attribute: str, what: str) -> None:
-        needed = self.bad_number is BAD_NUMBER
+        value = element.attributes[attribute]
+        rule, message = WHITESPACE, f"{attribute} has {what}, which urdfdom refuses"
+        if self.bad_number is not BAD_NUMBER:  # kinematics does not use the number
+            rule, message = self.bad_number, f"{attribute} has {what}, which urdfdom does not read"
         self.report.add(
-            # urdfdom accepts a file with a wrong number that kinematics does not use.
-            WHITESPACE if needed else self.bad_number,
-            f"{attribute} has {what}, which urdfdom {'refuses' if needed else 'does not read'}",
+            rule,
+            message,
             element,
             attribute=attribute,
-            found=quoted(self.report.raw(element, attribute) or element.attributes[attribute]),
+            found=quoted(self.report.raw(element, attribute) or value),
             remedy="write single spaces between numbers and none around them",
-            fix=lambda: self.report.rewritten(
-                element, attribute, " ".join(element.attributes[attribute].split())
-            ),
+            fix=lambda: self.report.rewritten(element, attribute, " ".join(value.split())),
         )
 
 
-_NOT_ZERO = "123456789"
-
-#: Messages omit the tags of these elements.
+#: Elements whose tags are not in messages about numbers.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Python cannot convert a character reference with thousands of leading zeros.
+#: Leading zeros of a character reference. `html.unescape` fails if there are thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: The first pattern that matches an invalid number determines the remedy.
+#: Patterns of invalid numbers with remedies; the first pattern that matches determines the remedy.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
@@ -643,14 +564,14 @@ IGNORED = Rule("URDF510", "ignored-value", WARNING)
 QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
 QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
 BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
-#: The joint types of the specification.
+
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 
 #: Newest URDF version that urdfdom 6 supports.
 NEWEST = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: The square of a length between these numbers neither underflows nor overflows.
+#: Bounds between which the square of a length neither underflows nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
 
 
@@ -678,7 +599,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     return robot
 
 
-#: Remedies for the root elements of other formats.
+#: Remedies for files of other formats, by the tag of the root element.
 _FORMATS = {
     "sdf": "this is an SDF file; convert it to a URDF first",
     "mujoco": "this is an MJCF file; `load` and all other commands read it if its suffix is .xml or .mjcf",
@@ -728,28 +649,19 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def named(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint; report a missing name and return an empty string."""
+    """Return the name of a link or joint; report a missing name, and then return an empty string."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
-        report.add(
-            MISSING_NAME,
-            f"a {element.tag} {what}",
-            element,
-            attribute="name",
-            remedy=f'write <{element.tag} name="...">',
-        )
+        remedy = f'write <{element.tag} name="...">'
+        report.add(MISSING_NAME, f"a {element.tag} {what}", element, attribute="name", remedy=remedy)
     return name or ""
 
 
 def report_duplicate(report: Reporter, element: Element, first: Element) -> None:
-    report.add(
-        DUPLICATE_NAME,
-        f"another {element.tag} has this name",
-        element,
-        attribute="name",
-        remedy=f"the first is on line {first.line}; rename one {element.tag}",
-    )
+    message = f"another {element.tag} has this name"
+    remedy = f"the first is on line {first.line}; rename one {element.tag}"
+    report.add(DUPLICATE_NAME, message, element, attribute="name", remedy=remedy)
 
 
 class JointReader:
@@ -758,7 +670,6 @@ class JointReader:
         self.numbers = NumberReader(report)
 
     def read(self, element: Element) -> JointRecord:
-        """Read one joint. A value that cannot be read is reported, and the record has its default."""
         joint = JointRecord(element, named(self.report, element))
         joint.kind = self._kind(element)
         joint.parent, joint.child = self._end(element, "parent"), self._end(element, "child")
@@ -770,20 +681,17 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute, or None after a finding that it is missing or empty.
+        """Return a required attribute; report a missing or empty attribute and return None.
 
-        `NumberReader` reports the empty value of a number.
+        With `number`, an empty attribute is not reported, because `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
+            empty = "" if value is None else ", which is empty"
+            message = f"<{element.tag}> needs the attribute {attribute}{empty}"
+            found, remedy = quoted(element.text) if element.text else None, f"write {example}"
             self.report.add(
-                MISSING_ATTRIBUTE,
-                f"<{element.tag}> needs the attribute {attribute}"
-                + ("" if value is None else ", which is empty"),
-                element,
-                attribute=attribute,
-                found=quoted(element.text) if element.text else None,
-                remedy=f"write {example}",
+                MISSING_ATTRIBUTE, message, element, attribute=attribute, found=found, remedy=remedy
             )
         return value or None
 
@@ -792,24 +700,18 @@ class JointReader:
         if written is None or written in JOINT_TYPES:
             return written
         close = nearest_tag(written, frozenset(JOINT_TYPES))
-        self.report.add(
-            UNKNOWN_TYPE,
-            "unknown joint type",
-            element,
-            attribute="type",
-            found=quoted(written),
-            remedy=f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}",
-        )
+        message = "unknown joint type"
+        remedy = f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}"
+        found = quoted(written)
+        self.report.add(UNKNOWN_TYPE, message, element, attribute="type", found=found, remedy=remedy)
         return None
 
     def _end(self, element: Element, tag: str) -> str | None:
-        end = element.first(tag)
-        if end is None:
-            self.report.add(
-                MISSING_ELEMENT, f"the joint has no <{tag}>", element, remedy=f'write <{tag} link="..."/>'
-            )
+        example = f'<{tag} link="..."/>'
+        if (end := element.first(tag)) is None:
+            self.report.add(MISSING_ELEMENT, f"the joint has no <{tag}>", element, remedy=f"write {example}")
             return None
-        return self.required(end, "link", f'<{tag} link="..."/>')
+        return self.required(end, "link", example)
 
     def _origin(self, joint: JointRecord) -> None:
         origin = joint.origin_element = joint.element.first("origin")
@@ -847,38 +749,30 @@ class JointReader:
         axis = joint.axis_element = joint.element.first("axis")
         if axis is None:
             return
-        if joint.kind in ("fixed", "floating"):
-            # No reader uses the axis of a fixed or floating joint.
-            numbers = NumberReader(self.report, IGNORED, IGNORED)
-            numbers.vector(axis, "xyz")
+        if joint.kind in ("fixed", "floating"):  # URDF readers do not use the axis of such a joint
+            NumberReader(self.report, IGNORED, IGNORED).vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
             joint.axis = self.numbers.vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # rule URDF212 reports this text
-        self.report.add(
-            EMPTY_AXIS,
-            "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom",
-            axis,
-            remedy='write the axis, for example <axis xyz="1 0 0"/>',
-            # A planar joint moves in the XY plane for every axis (URDF505).
-            severity=Severity.WARNING if joint.kind == "planar" else None,
-        )
+            return  # rule URDF212 reports text between tags
+        message = "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom"
+        remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
+        # A planar joint moves in the XY plane, whatever its axis is (URDF505).
+        severity = Severity.WARNING if joint.kind == "planar" else None
+        self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
     def _limit(self, joint: JointRecord) -> None:
         limit = joint.element.first("limit")
         bounded = joint.kind in ("revolute", "prismatic")
         if limit is None:
             if bounded:
-                self.report.add(
-                    MISSING_LIMIT,
-                    f"a {joint.kind} joint needs a <limit>",
-                    joint.element,
-                    remedy=f"write {_EXAMPLE_LIMIT}"
-                    if joint.kind == "prismatic"
-                    else f'write {_EXAMPLE_LIMIT}, or type="continuous" if it rotates without limits',
-                )
+                remedy = f"write {_EXAMPLE_LIMIT}"
+                if joint.kind == "revolute":
+                    remedy += ', or type="continuous" if the joint rotates without limits'
+                what = f"a {joint.kind} joint needs a <limit>"
+                self.report.add(MISSING_LIMIT, what, joint.element, remedy=remedy)
             return
         required = ("effort", "velocity") if self.version < (1, 2) else ("lower", "upper") if bounded else ()
         for attribute in required:
@@ -898,45 +792,41 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
     def _others(self, joint: JointRecord) -> None:
-        """Check elements that kinematics does not use. If they are invalid, urdfdom refuses the file."""
-        dynamics = joint.element.first("dynamics")
-        if dynamics is not None:
-            if not {"damping", "friction"} & dynamics.attributes.keys():
-                self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
-            for attribute in ("damping", "friction"):
-                self.numbers.scalar(dynamics, attribute)
-        safety = joint.element.first("safety_controller")
+        """Check elements that kinematics does not use, because urdfdom refuses a file if they are invalid."""
+        dynamics, safety = (joint.element.first(tag) for tag in ("dynamics", "safety_controller"))
+        if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
+            self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
         if safety is not None:
-            self.required(
-                safety,
-                "k_velocity",
-                '<safety_controller k_velocity="0"/>, or remove <safety_controller>',
-                number=True,
-            )
-            for attribute in ("k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"):
-                self.numbers.scalar(safety, attribute)
-        calibration = joint.element.first("calibration")
-        if calibration is not None:
-            for attribute in ("rising", "falling"):
-                self.numbers.scalar(calibration, attribute)
+            example = '<safety_controller k_velocity="0"/>, or remove <safety_controller>'
+            self.required(safety, "k_velocity", example, number=True)
+        for tag, attributes in _UNUSED_NUMBERS.items():
+            if (element := joint.element.first(tag)) is not None:
+                for attribute in attributes:
+                    self.numbers.scalar(element, attribute)
 
 
 _EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
 
-
-def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
-
-
-#: A longer word cannot be similar to a tag or an attribute of URDF.
-_LONGEST_WORD = 32
+#: Numeric attributes of a joint's elements that kinematics does not use.
+_UNUSED_NUMBERS = {
+    "dynamics": ("damping", "friction"),
+    "safety_controller": ("k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"),
+    "calibration": ("rising", "falling"),
+}
 
 
 @lru_cache(1024)
-def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
+def nearest_tag(word: str, known: frozenset[str]) -> str | None:
+    """Return the known tag or attribute that is most similar to a word, or None."""
+    if len(word) > _LONGEST_WORD:
+        return None
     folded = {name.lower(): name for name in known}
     close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.8)
     if close:
         return folded[close[0]]
     letters = sorted(word.lower())
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
+
+
+#: A longer word is not similar to any tag or attribute of URDF.
+_LONGEST_WORD = 32

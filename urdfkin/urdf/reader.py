@@ -26,10 +26,10 @@ from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRec
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
-    """Return the kinematic tree of a URDF, whose records have no errors (see `urdfkin.urdf.lint`).
+    """Return the kinematic tree of a URDF in which `urdfkin.urdf.lint` found no errors.
 
-    With `mimic`, mimic joints follow their mimicked joints, as URDF defines; otherwise they move freely. The
-    kind `root_joint`, "floating" or "planar", adds a joint `root_joint` above the root link.
+    If `mimic` is False, mimic joints move freely. If `root_joint` is "floating" or "planar", a joint of this
+    kind with the name `root_joint` connects the root link with the world.
 
     Raises:
         InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is another word.
@@ -47,7 +47,7 @@ def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tup
 
     Raise InputError if mimic joints form a circle, and UnknownNameError if a mimicked joint does not exist.
     """
-    rules = _rules(joints) if mimic else {}
+    rules = _mimic_rules(joints) if mimic else {}
     return [(_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
 
 
@@ -55,9 +55,8 @@ def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) ->
     """Return the link without a parent; raise InputError if there is none, or more than one."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
-        raise InputError(
-            "a robot must have one root link", where=name, found=", ".join(sorted(roots)) or "none"
-        )
+        found = ", ".join(sorted(roots)) or "none"
+        raise InputError("a robot must have one root link", where=name, found=found)
     return roots.pop()
 
 
@@ -65,7 +64,7 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
     roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
-    # `rotation_from_rpy` is not used, because it would check the numbers again after the parser.
+    # The parser has checked the numbers, so `rotation_from_rpy`, which checks numbers, is not called.
     T = np.eye(4)
     T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
     T[:3, 3] = joint.xyz
@@ -97,8 +96,8 @@ def _unit(axis: FloatArray, joint: str) -> FloatArray:
 def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     if limit is None or kind.nv == 0:
         return None
-    # A missing position limit is zero, as in urdfdom.
-    # By the specification, the position limits of a continuous joint have no effect.
+    # In urdfdom, the default of a position limit is zero.
+    # In the URDF specification, position limits of a continuous joint have no effect.
     return Limit(
         lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
         upper=(limit.upper or 0.0) if kind.bounded else math.inf,
@@ -107,35 +106,28 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     )
 
 
-def _rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
+def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return the mimic rule of each mimic joint, relative to a joint that moves independently.
 
-    In a file, a mimic joint may follow another mimic joint. This function combines such a chain into one
-    rule: y = m2 (m1 x + b1) + b2, where x is not a mimic joint. It combines the rules in the same order as
-    Pinocchio, beginning at x, so that urdfkin and Pinocchio have equal rounding errors.
+    A mimic joint z may follow another mimic joint y, which follows x. This function combines the chain into
+    one rule: z = m2 (m1 x + b1) + b2. Like Pinocchio, the function combines the rules from x upwards, so that
+    urdfkin and Pinocchio have equal rounding errors.
     """
-    named = {joint.name: joint for joint in joints}
+    names = dict.fromkeys(joint.name for joint in joints)
+    rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}
     resolved: dict[str, Mimic] = {}
-    for start in joints:
-        joint, pending = start, dict[str, MimicRecord]()
-        while (rule := _rule(joint)) is not None and joint.name not in resolved:
-            pending[joint.name] = rule
-            if rule.leader not in named:
-                raise UnknownNameError(
-                    "mimicked joint",
-                    str(rule.leader),
-                    named,
-                    where=f"joint {joint.name} (mimic=False, --no-mimic, lets it move freely)",
-                )
+    for start in rules:
+        name, pending = start, dict[str, MimicRecord]()
+        while name in rules and name not in resolved:
+            rule = pending[name] = rules[name]
+            if rule.leader not in names:
+                where = f"joint {name} (mimic=False, --no-mimic, lets it move freely)"
+                raise UnknownNameError("mimicked joint", str(rule.leader), names, where=where)
             if rule.leader in pending:
-                raise InputError("mimic joints follow each other in a circle", where=f"joint {start.name}")
-            joint = named[rule.leader]
-        end = resolved.get(joint.name, Mimic(joint.name, 1.0, 0.0))
+                raise InputError("mimic joints follow each other in a circle", where=f"joint {start}")
+            name = rule.leader
+        end = resolved.get(name, Mimic(name, 1.0, 0.0))
         for name, rule in reversed(pending.items()):
             offset = rule.multiplier * end.offset + rule.offset
             end = resolved[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
     return resolved
-
-
-def _rule(joint: JointRecord) -> MimicRecord | None:
-    return None if JointKind(joint.kind) is JointKind.FIXED else joint.mimic

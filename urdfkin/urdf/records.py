@@ -1,7 +1,7 @@
-"""Plain data for the elements, links and joints of a URDF, which `urdf.parser` reads. Size limits of a URDF.
+"""Define records for the XML elements and the joints of a URDF, and limits on the size of a URDF.
 
-If the parser cannot read a value of a link or joint, the value in the record is None. If the file omits a
-value, the record contains the default of the specification.
+`urdfkin.urdf.parser` creates the records. In the record of a joint, None marks a value that the parser cannot
+read. If a value is missing in the file, the record contains the default of the URDF specification.
 """
 
 from __future__ import annotations
@@ -10,23 +10,24 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-#: Pinocchio accepts at most this number of nested elements.
-#: Pinocchio's XML parser, tinyxml2, refuses level 500 and counts the document itself as level 1.
+#: Maximum depth of nested elements in a URDF that Pinocchio reads.
+#: Pinocchio's XML parser, tinyxml2, counts the document as level 1 and refuses level 500.
 ORACLE_DEPTH = 498
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The size limits for a file and its parts.
+    """Limits on the size of a URDF file and its content.
 
     Attributes:
-        bytes: Size of the file.
-        depth: Number of levels of nested elements; urdfdom's parser refuses more.
-        attributes: Number of attributes of one element.
-        name: Number of characters in the name of an element, an attribute, a link or a joint.
-        number: Number of characters of one number.
-        markup: Number of bytes of one tag, comment or processing instruction, as in libxml2. urdfkin measures
-            this size to within 10 %.
+        bytes: Maximum size of the file in bytes.
+        depth: Maximum number of levels of nested elements. Pinocchio reads at most the default number.
+        elements: Maximum number of elements.
+        attributes: Maximum number of attributes of one element.
+        name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
+        number: Maximum number of characters of one number.
+        markup: Maximum number of bytes of one tag, comment or processing instruction. The default is that of
+            libxml2. urdfkin measures this size with an error of at most 1 MB.
     """
 
     bytes: int = 100_000_000
@@ -41,20 +42,18 @@ class Limits:
 DEFAULT_LIMITS = Limits()
 
 
-#: This pattern matches a start tag at an element's offset. A quoted value may contain '>'.
+#: Regular expression for a start tag. A quoted attribute value may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 
 
 @dataclass(slots=True, eq=False)
 class Element:
-    """An element of a URDF.
+    """An XML element of a URDF.
 
     Attributes:
-        tag: The tag as written.
-        attributes: The attributes as written.
-        line: The line of the start tag, from 1.
-        offset: The position of the start tag in bytes.
+        line: Line number of the start tag, from 1.
+        offset: Index of the start tag's first byte in the file.
         above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
         text: The first characters of the text between the element's tags.
     """
@@ -70,7 +69,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child. The list of children is created with the first child, which saves memory."""
+        """Add a child. To save memory, an element without children has no list."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:
@@ -80,11 +79,11 @@ class Element:
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child with a tag, or None. All URDF readers ignore later ones."""
+        """Return the first child with a tag, or None. URDF readers ignore all later children with the tag."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[Element]:
-        """Yield this element and all elements below it, in file order, without recursion."""
+        """Yield the element and all its descendants in file order, without recursion."""
         stack = [self]
         while stack:
             element = stack.pop()
@@ -96,19 +95,10 @@ class Element:
         """The child of `<robot>` that contains this element, or the element itself."""
         return self.above or self
 
-    @property
-    def owner(self) -> str:
-        """The tag of the link or joint that contains the element; `joint` for an element inside a joint."""
-        return self.holder.tag
-
-    @property
-    def label(self) -> str | None:
-        return self.holder.attributes.get("name") if self.parent is not None else None
-
 
 Vector = tuple[float, ...]
 
-#: URDF defines these attributes of `<limit>` from version 1.2 on.
+#: Attributes of `<limit>` that URDF 1.2 introduced.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
 #: Joint types with an axis.
@@ -117,7 +107,7 @@ AXIAL = ("revolute", "continuous", "prismatic")
 
 @dataclass(slots=True)
 class LimitRecord:
-    """A `<limit>`; None marks an attribute that is not written."""
+    """A `<limit>` element. None is the value of a missing attribute."""
 
     element: Element
     lower: float | None
@@ -163,8 +153,8 @@ class RobotRecord:
 
     @property
     def by_name(self) -> dict[str, JointRecord]:
-        """The joints by name; of two joints with the same name, the first."""
-        found: dict[str, JointRecord] = {}
+        """The first joint with each name."""
+        first: dict[str, JointRecord] = {}
         for joint in self.joints:
-            found.setdefault(joint.name, joint)
-        return found
+            first.setdefault(joint.name, joint)
+        return first

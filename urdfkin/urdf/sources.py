@@ -1,7 +1,7 @@
-"""Read a robot from any source, and record how to load it again.
+"""Read the text of a robot from a source, and record how to load the robot again.
 
-A source is a path, a `package://` address, a catalogue name, text, bytes, an open file, or `-` (standard
-input).
+A source is a path, a `package://` address, a catalogue name, text, bytes, an open file, or `-` for standard
+input.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ class Origin:
     """The arguments of `load`, and properties of the source.
 
     Attributes:
-        source: A path, a catalogue name, or `-` for standard input. `<text>` and `<bytes>` stand for text,
-            bytes and streams without a name.
+        source: A path, a catalogue name, or `-` for standard input. For text, bytes and streams without a
+            name, the source is `<text>` or `<bytes>`.
         oracle: The name of the library that checks the results; None for the default library.
-        table: Whether the robot comes from a Denavit-Hartenberg table.
+        table: Whether the robot was created from a Denavit-Hartenberg table.
         sha256: The digest of an MJCF or USD file; empty for other sources.
-        lock: Name and value (rad or m) of each locked joint. Mimic joints are not listed; they are locked
-            with their mimicked joint.
+        lock: Name and value (rad or m) of each locked joint, without mimic joints. A mimic joint is locked
+            together with its mimicked joint.
         variants: Variant sets and variants that were selected in a USD stage.
         articulation: The articulation that was chosen in a USD stage, or None.
     """
@@ -57,12 +57,12 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """The source for a new call of `load`; `-` (standard input) if the source was a text."""
+        """The source for a new call of `load`. For a text, this is `-` (standard input)."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
     def options(self) -> str:
-        """The options on a command line.
+        """The options as written on a command line.
 
         >>> Origin("arm.xacro", mimic=False, xacro_args=(("arm", "left one"),)).options
         "--xacro-arg 'arm:=left one' --no-mimic"
@@ -82,7 +82,7 @@ class Origin:
 
     @property
     def words(self) -> str:
-        """The source and the options on a command line.
+        """The source and the options as written on a command line.
 
         >>> Origin("my arm.urdf", root_joint="floating").words
         "'my arm.urdf' --root-joint floating"
@@ -93,13 +93,13 @@ class Origin:
 
     @property
     def lock_words(self) -> str:
-        """The locked joints in words; empty if there are none.
+        """The locked joints in words; an empty string if there are none.
 
         >>> Origin("panda", lock=(("finger", 0.04), ("wrist", 0.0))).lock_words
         'finger locked at 0.04, wrist at 0'
         """
-        first, *others = (f"{name}{{}} at {value:.6g}" for name, value in self.lock) if self.lock else [""]
-        return ", ".join([first.format(" locked"), *(other.format("") for other in others)])
+        locks = enumerate(self.lock)
+        return ", ".join(f"{name}{'' if i else ' locked'} at {value:.6g}" for i, (name, value) in locks)
 
     @property
     def python(self) -> str:
@@ -131,8 +131,8 @@ class Text:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: The path or name from which the source can be read again; for a source without a name,
-            `<text>`, `<bytes>` or `<file>`.
+        source: The path or name from which the URDF can be read again; `<text>`, `<bytes>` or `<file>` for a
+            source without a name.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
         variants: Variant sets and variants that were selected in a USD stage.
         articulation: The articulation that was chosen in a USD stage, or None.
@@ -151,9 +151,9 @@ class Text:
 def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
     """Read a URDF from any source.
 
-    A catalogue name has priority over a file of the same name in the current folder. Write `./panda` for the
-    file. At most `most` + 1 bytes are read (characters of an open text file), also from an infinite device
-    such as `/dev/zero`. `xacro_args` are for a .xacro file, which is expanded.
+    A catalogue name has priority over a file with this name in the current folder. For a file `panda`, write
+    `./panda`. At most `most` + 1 bytes are read (characters of an open text file), also from an infinite
+    device such as `/dev/zero`. A .xacro file is expanded with the arguments `xacro_args`.
 
     Raises:
         SourceError: the file cannot be read.
@@ -168,9 +168,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     if is_xacro(source):
         return _expand_xacro(at_home(source), xacro_args or {})
     if xacro_args:
-        raise InputError(
-            "`xacro_args` needs the path of a .xacro file", found=", ".join(map(str, xacro_args))
-        )
+        names = ", ".join(map(str, xacro_args))
+        raise InputError("`xacro_args` needs the path of a .xacro file", found=names)
     if isinstance(source, bytes):
         return Text(source, "<bytes>", "<bytes>")
     if isinstance(source, os.PathLike):
@@ -200,7 +199,7 @@ def is_urdf_path(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Return whether the suffix of a path is one of USD files.
+    """Return whether a path has a suffix of USD files.
 
     >>> is_usd("arm.usda"), is_usd("arm.USDZ"), is_usd("arm.urdf"), is_usd("<robot/>")
     (True, True, False, False)
@@ -210,11 +209,10 @@ def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 def _suffix(source: object) -> str:
     """Return the suffix of a path in lower case; an empty string for text and any other source."""
-    if not isinstance(source, str | os.PathLike) or (
-        isinstance(source, str) and source.lstrip().startswith("<")
-    ):
+    if not isinstance(source, str | os.PathLike):
         return ""
-    return Path(source).suffix.lower()
+    is_text = isinstance(source, str) and source.lstrip().startswith("<")
+    return "" if is_text else Path(source).suffix.lower()
 
 
 def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
@@ -226,11 +224,8 @@ def _expand_xacro(path: Path, arguments: Mapping[str, object]) -> Text:
 
 def _read_string(word: str, most: int) -> Text:
     if not word.strip():
-        raise InputError(
-            "the robot's name is empty",
-            found=repr(word),
-            remedy="a path, a name that 'urdfkin robots' lists, or '-'",
-        )
+        remedy = "a path, a name that 'urdfkin robots' lists, or '-'"
+        raise InputError("the robot's name is empty", found=repr(word), remedy=remedy)
     if word == "-":
         return Text(read_start_of_standard_input(most + 1), "<stdin>", "-")
     if word.lstrip("\ufeff \t\r\n").startswith("<"):
@@ -245,7 +240,7 @@ def _read_string(word: str, most: int) -> Text:
 
 
 def _in_package(name: str, path: str) -> Path:
-    """Return the file of a `package://` address. The current folder is searched, too."""
+    """Return the file of a `package://` address. The search includes the folders above the current folder."""
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
@@ -258,8 +253,8 @@ def _in_package(name: str, path: str) -> Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> Text:
-    # A Python string may contain a lone surrogate, which UTF-8 does not allow.
-    # With "surrogatepass", the checks of the bytes report the surrogate.
+    # UTF-8 does not allow a lone surrogate, which a Python string may contain.
+    # With "surrogatepass", `encode` does not fail, and the check of the bytes reports the surrogate.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return Text(data, label, source)
 
@@ -271,20 +266,19 @@ def _read_file(path: Path, most: int) -> Text:
         if isinstance(error.__cause__, FileNotFoundError):
             raise SourceError("no such file", where=str(path), remedy=_nearest_file(path)) from None
         if isinstance(error.__cause__, IsADirectoryError):
-            raise SourceError(
-                "this is a folder, not a file", where=str(path), remedy="name the .urdf file in this folder"
-            ) from None
+            remedy = "name the .urdf file in this folder"
+            raise SourceError("this is a folder, not a file", where=str(path), remedy=remedy) from None
         raise
 
 
 def as_word(path: Path) -> str:
-    """Return a text that `load` reads as this path, not as an option, a URDF text or a catalogue name."""
+    """Return the path as text that `load` does not take for an option, a URDF text or a catalogue name."""
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word
 
 
 def entry_of(word: str) -> Entry | None:
-    """Return the catalogue entry of a name. Return None for a path, which contains a dot or a separator."""
+    """Return the catalogue entry of a name; None for a path, which contains a dot or a separator."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

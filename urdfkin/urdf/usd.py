@@ -1,18 +1,18 @@
-"""Convert the UsdPhysics joints of a USD stage to a kinematic tree.
+"""Convert the UsdPhysics joints of a USD stage (a scene of objects, called prims) to a kinematic tree.
 
-- A prim with `PhysicsRigidBodyAPI` becomes a link with the prim's frame, without its scale. A plain `Xform`
-  below a body also becomes a link, which a fixed joint connects to the body.
+- A prim with `PhysicsRigidBodyAPI` becomes a link with the prim's frame, without the prim's scale. A plain
+  `Xform` prim below a body also becomes a link; a fixed joint connects this link with the body.
 - A joint prim contains the pose A of the joint frame in the first body, and the pose B of the joint frame in
-  the second body. Let J(q) be the motion of the joint. The pose of the second body in the first body is A
-  J(q) B^-1. If the second body is the parent in the tree, urdfkin needs the inverse, B J(q)^-1 A^-1. The
-  inverse has the same form, with A and B exchanged and the opposite joint axis.
-- Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. A stage whose up axis is Y is
-  rotated, so that z is up.
-- Joints that close a loop, point to nothing or are excluded from the articulation are findings.
+  the second body. With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
+  If the second body is the parent in the tree, urdfkin needs the inverse, B J(q)^-1 A^-1. The inverse has the
+  same form, with A and B exchanged and the opposite joint axis.
+- Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. If the up axis is Y, the robot
+  is rotated, so that z is up.
+- Joints that close a loop, have no body, or are excluded from the articulation are reported.
 
-A stage may consist of many files, its layers. Before OpenUSD composes the layers, `files_of` reads each layer
-separately, and refuses references to network addresses and to files outside the robot's folder, package and
-repository.
+A stage may consist of many files, called layers. Before OpenUSD combines the layers, `files_of` reads each
+layer separately, and refuses references to network addresses and to files outside the robot's folder, package
+and repository.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from __future__ import annotations
 import math
 import os
 import re
-import stat
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
@@ -52,41 +51,41 @@ from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, leads, resolve, unique
 from urdfkin.urdf.sources import USD
 
-#: Largest number of layers of a stage.
+#: Maximum number of layers of a stage.
 _LAYERS = 1_000
-#: Largest number in single precision. A USD file contains this number or infinity if a joint has no limit.
+#: Largest number in single precision. If a joint has no limit, the file contains this number or infinity.
 _LARGEST = float(np.finfo(np.float32).max)
-#: The cosine between two axes of a frame without shear is at most this number times u n.
-#: n is the number of prims on the path to the frame's prim.
-#: u is the largest relative error of rounding to single precision.
+#: Largest cosine between two axes of a frame without shear, in multiples of u n.
+#: Here n is the number of prims on the path to the frame's prim.
+#: The factor u is the largest relative error of rounding to single precision.
 #: Each entry of a stored rotation matrix has an error of u.
 #: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: A joint with smaller limits hardly moves, whether the limits are in degrees or radians.
+#: Largest limit (degrees) of a joint that hardly moves, whether its limits are in degrees or in radians.
 _SMALLEST_ANGLE = 0.01
-_NONE = (-math.inf, math.inf)
-#: A file that Git LFS has not fetched begins with these bytes.
+_NO_LIMITS = (-math.inf, math.inf)
+#: First bytes of a pointer file, which Git LFS has not yet replaced by the real file.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: These relationships name the mimicked joint. The group is the direction in the name of PhysX's schema.
+#: Regular expression for relationships to the mimicked joint; the group is the direction in PhysX's schema.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: A type or applied schema with one of these words in its name couples joints or bodies.
+#: Words in the names of types and applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
-#: A tree cannot represent joints whose type names end with these words.
+#: Ends of the type names of joints that a tree cannot represent.
 #: OpenUSD recognizes such a joint only if the plugin that defines the type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: A mimic rule is linear, so it cannot contain these coefficients of a MuJoCo joint equality.
+#: Coefficients of a MuJoCo joint equality that a mimic rule, which is linear, cannot contain.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
-_FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
-#: Xforms with these names contain the shapes of a body.
+_DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+#: Names of Xform prims that contain the shapes of a body.
 _SHAPES = ("visual", "visuals", "collision", "collisions")
-#: This rotation matrix turns the up axis y to z.
+#: Rotation matrix that turns the up axis y to z.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: The kinds of remarks. `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
+#: Kinds of remarks. `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -113,13 +112,13 @@ class JointReading:
     """The numbers of a joint prim, in the stage's axes.
 
     Attributes:
-        free: The free directions, such as `rotZ`.
+        free: The directions in which the joint moves, such as `rotZ`.
         body0: Path of the first body; empty for the world. `body1` is the path of the second body.
-        p0: (3,) origin of the joint's frame in the first body, m. `p1` is the origin in the second body.
-        quat0: (4,) unit quaternion of the joint's frame in the first body, scalar last. `quat1` is that in
-            the second body.
+        p0: (3,) origin of the joint frame in the first body, m. `p1` is the origin in the second body.
+        quat0: (4,) unit quaternion of the joint frame in the first body, scalar last. `quat1` is the
+            quaternion in the second body.
         limits: Lower and upper limit, rad or m.
-        size: Sum of the lengths (m) of the vectors whose sums are `p0` and `p1`, for error bounds.
+        size: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`, for error bounds.
     """
 
     free: str
@@ -141,15 +140,15 @@ class Usd:
     """A robot from a USD stage.
 
     Attributes:
-        prims: The path of the prim of each link that represents a prim.
+        prims: The path of the prim for each link that represents a prim.
         rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
-        rest_q: (nq,) configuration of the robot in the stage.
-        single: Five numbers for each joint name that describe the effect of rounding to single precision.
+        rest_q: (nq,) configuration in which the stage shows the robot.
+        single: Five numbers, by joint name, that describe the effect of rounding to single precision.
             Number 1: a bound (m) on the error of the joint origins. Number 2: a bound (rad) on the error of
             the joint orientations. Number 3: the sum of the lengths (m) of the vectors that these orientation
-            errors rotate. Number 4: a bound on the relative error of the joint value if a mimic rule computes
-            it, otherwise 0. Number 5: the distance (m) between the joint frame and the frame of the child.
-        joints: The numbers of each joint prim of the tree, by the path of the prim.
+            errors rotate. Number 4: for a mimic joint, a bound on the relative error of its joint value;
+            otherwise 0. Number 5: the distance (m) between the joint frame and the frame of the child.
+        joints: The numbers of each joint prim in the tree, by the path of the prim.
         unit: metersPerUnit.
         remarks: Parts of the stage that the tree does not represent, and probable mistakes.
         files: The files of the stage.
@@ -176,7 +175,7 @@ def version() -> str:
 
 
 def library() -> Any:
-    """Return the modules of OpenUSD as attributes of one object; raise InputError without OpenUSD."""
+    """Return an object whose attributes are OpenUSD's modules; raise InputError if OpenUSD is missing."""
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
@@ -188,9 +187,9 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage. Each layer is read separately, before its references are followed.
 
     Raises:
-        InputError: there are too many layers, or a layer has a reference to a network address, an expression,
-            a file that is not USD, or a file outside the robot's folder, package and repository.
-        SourceError: a file is too large, or not a regular file.
+        InputError: there are too many layers, or a reference is a network address or an expression, or leads
+            to a file that is not USD, or to a file outside the robot's folder, package and repository.
+        SourceError: a file is too large or not a regular file, or cannot be read.
     """
     ground = Ground.around(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
@@ -199,16 +198,18 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
         identifier, where = open_.popleft()
         outer = pxr.Ar.SplitPackageRelativePathOuter(identifier)[0]
         if outer not in files:
-            total += _size(outer, where)
+            if read_start(Path(outer), len(_LFS)) == _LFS:
+                what = "this file is a pointer of Git LFS, not USD"
+                raise InputError(what, where=outer, remedy="run git lfs pull")
+            size = Path(outer).stat().st_size
+            if size > MOST:
+                found = f"{size} bytes, over {MOST}"
+                raise SourceError("the file is too large", where=outer, found=found)
+            total += size
             if total > MOST:
-                raise SourceError(
-                    "the files of this stage are too large", where=where, found=f"over {MOST} bytes"
-                )
+                what = "the files of this stage are too large"
+                raise SourceError(what, where=where, found=f"over {MOST} bytes")
             files[outer] = None
-        if read_start(Path(outer), len(_LFS)) == _LFS:
-            raise InputError(
-                "this file is a pointer of Git LFS, not USD", where=outer, remedy="run git lfs pull"
-            )
         layer = pxr.Sdf.Layer.FindOrOpen(identifier)
         if layer is None:
             raise InputError("OpenUSD does not accept this file", where=identifier)
@@ -225,7 +226,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips, because USD does not list their files as dependencies of a layer."""
+    """Refuse value clips, because USD does not list the files of value clips as dependencies of a layer."""
     found: list[str] = []
 
     def look(path: Any) -> None:
@@ -251,38 +252,21 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
-        # OpenUSD finds no such file beside the layer, and would look in the current folder.
+        # OpenUSD finds no such file beside the layer, and would search in the current folder.
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
-        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  a name may be no path
+        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  `outer` may be an invalid path
     if not ground.holds(outer):
-        raise _refused(
-            "a reference leads outside the folder, package and repository of the stage", where, written
-        )
+        what = "a reference leads outside the folder, package and repository of the stage"
+        raise _refused(what, where, written)
     if Path(inner or outer).suffix.lower() not in USD:
         raise _refused("a reference names a file that is not USD", where, written)
-    return address if os.path.exists(outer) else None  # noqa: PTH110  a name may be no path
+    return address if os.path.exists(outer) else None  # noqa: PTH110  `outer` may be an invalid path
 
 
 def _refused(what: str, where: str, found: str) -> InputError:
-    return InputError(
-        what,
-        where=where,
-        found=found[:200],
-        remedy="copy the file beside the stage, or flatten the stage: usdcat --flatten",
-    )
-
-
-def _size(path: str, where: str) -> int:
-    try:
-        found = os.stat(path)  # noqa: PTH116  a name may be no path
-    except OSError as error:
-        raise SourceError("the file cannot be read", where=path, found=error.strerror) from None
-    if not stat.S_ISREG(found.st_mode):
-        raise SourceError("this is not a regular file", where=path, found=f"named in {where}")
-    if found.st_size > MOST:
-        raise SourceError("the file is too large", where=path, found=f"{found.st_size} bytes, over {MOST}")
-    return found.st_size
+    remedy = "copy the file beside the stage, or flatten the stage: usdcat --flatten"
+    return InputError(what, where=where, found=found[:200], remedy=remedy)
 
 
 def read_usd(
@@ -290,24 +274,20 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    For one pair of `variants` after the other, the variant is selected in all prims that have the variant
-    set. `articulation` is the path or name of the articulation to read; None if there is only one.
+    `variants` are pairs of a variant set and a variant, which is selected in all prims that have the set.
+    `articulation` is the path or name of the articulation to read; None if there is only one.
 
     Raises:
         InputError: OpenUSD is not installed or does not accept the file, a reference is refused, the robot
-            has a joint that urdfkin does not support, or it is not clear which articulation is meant.
+            has a joint that urdfkin does not support, or the articulation is ambiguous.
     """
     pxr = library()
     try:
         files = files_of(pxr, path)
         stage = pxr.Usd.Stage.Open(path)
         opened = _select(pxr, stage, variants, name)
-        used = {
-            os.path.realpath(layer.realPath.partition("[")[0])
-            for layer in stage.GetUsedLayers()
-            if layer.realPath
-        }
-        if more := sorted(used - {os.path.realpath(file) for file in files}):
+        layers = [layer.realPath.partition("[")[0] for layer in stage.GetUsedLayers() if layer.realPath]
+        if more := sorted(set(map(os.path.realpath, layers)) - set(map(os.path.realpath, files))):
             raise _refused("the stage uses a file that none of its layers names", name, more[0])
         return _StageReader(pxr, stage, name, opened).read(articulation, files)
     except pxr.Tf.ErrorException as error:
@@ -319,9 +299,9 @@ def read_usd(
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
     """Select variants in the session layer, so that no file changes; return the paths of expanded instances.
 
-    OpenUSD cannot select a variant inside an instance. If an instance contains the variant set, this function
-    therefore makes the prim non-instanceable, also in the session layer, which expands the instance. Raise
-    UnknownNameError if no prim has such a variant set, or such a variant.
+    OpenUSD cannot select a variant inside an instance. An instance that contains the variant set is therefore
+    expanded: in the session layer, its prim becomes non-instanceable. Raise UnknownNameError for an unknown
+    variant set or variant.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     opened = set[str]()
@@ -347,7 +327,7 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
 
 
 def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
-    """Return the prims of each variant set, also those inside instances."""
+    """Return the prims that have each variant set, including prims inside instances."""
     sets: dict[str, list[Any]] = {}
     for prim in pxr.Usd.PrimRange.Stage(
         stage, pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
@@ -359,9 +339,7 @@ def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
 
 @dataclass(slots=True)
 class _Body:
-    path: str
     T: FloatArray
-    scale: FloatArray
     owner: str | None
 
 
@@ -369,8 +347,11 @@ class _Body:
 class _Edge:
     """A joint prim.
 
-    `ends` are the paths of the two bodies that the joint connects; None is the world. `frames` are the poses
-    of the joint frame in these bodies.
+    Attributes:
+        ends: The paths of the two bodies that the joint connects; None is the world.
+        frames: The poses of the joint frame in these bodies.
+        size: See `JointReading`.
+        rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
     prim: Any
@@ -394,7 +375,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Reader of one stage. `source` is its name in messages, `opened` the paths of expanded instances."""
+    """Read a stage. `source` is its name in messages, and `opened` are the paths of expanded instances."""
 
     pxr: Any
     stage: Any
@@ -405,7 +386,7 @@ class _StageReader:
     _edges: list[_Edge] = field(default_factory=list)
     _read: dict[str, JointReading] = field(default_factory=dict)
     _single: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
-    # `root_joint` and `universe` are Pinocchio's names for a moving base.
+    # `root_joint` and `universe` are Pinocchio's names for the joint of a moving base and for the world.
     _link_names: set[str] = field(default_factory=lambda: {"universe"})
     _joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _unit: float = 1.0
@@ -418,37 +399,34 @@ class _StageReader:
         pxr, stage = self.pxr, self.stage
         self._unit = float(pxr.UsdGeom.GetStageMetersPerUnit(stage))
         if not (math.isfinite(self._unit) and self._unit > 0.0):
-            raise InputError(
-                "metersPerUnit must be a positive number", where=self.source, found=f"{self._unit:g}"
-            )
+            what = "metersPerUnit must be a positive number"
+            raise InputError(what, where=self.source, found=f"{self._unit:g}")
         if pxr.UsdGeom.GetStageUpAxis(stage) == "Y":
             self._up = _Y_UP
         self._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
-        self._missing()
+        for error in stage.GetCompositionErrors():
+            words = " ".join(str(error).split())[:300]
+            self._report("missing-layer", "", f"OpenUSD cannot compose a part of this stage: {words}")
         prims = self._prims()
         self._collect(prims)
         found = self._articulations()
         chosen = self._choose(found, articulation)
         tree, links = self._tree(chosen)
-        self._loose(chosen, found)
+        self._report_loose_bodies(chosen, found)
         rest = np.array([self._placed(stage.GetPrimAtPath(path))[0] for path in links.values()])
         rest_q = self._rest(tree, chosen, links, rest)
-        self._of_the_stage(rest)
-        self._layers([*links.values(), *self._read])
-        self._unused(prims)
+        self._report_unit_and_up_axis(rest)
+        self._report_layers([*links.values(), *self._read])
+        if count := sum(prim.IsA(pxr.UsdGeom.Gprim) for prim in prims):
+            self._report("unused-in-usd", "", f"kinematics does not use the {count} shapes")
         return Usd(
             tree, links, rest, rest_q, self._single, self._read, stage, self._unit, tuple(self.remarks), files
         )
 
     # -- the stage -----------------------------------------------------------------------------------
 
-    def _say(self, kind: Kind, where: str, what: str, remedy: str | None = None) -> None:
+    def _report(self, kind: Kind, where: str, what: str, remedy: str | None = None) -> None:
         self.remarks.append(Remark(kind, where, what, remedy))
-
-    def _missing(self) -> None:
-        for error in self.stage.GetCompositionErrors():
-            words = " ".join(str(error).split())[:300]
-            self._say("missing-layer", "", f"OpenUSD cannot compose a part of this stage: {words}")
 
     def _prims(self) -> list[Any]:
         """Return the prims of the stage, without the prototypes of point instancers."""
@@ -467,16 +445,14 @@ class _StageReader:
             joints = sum(one.IsA(physics.Joint) for one in below)
             if bodies or joints:
                 what = f"the prototypes of this PointInstancer have {bodies} bodies and {joints} joints"
-                self._say(
-                    "left-out-of-usd", path, f"{what}, which are not read",
-                    "write each copy as a prim of its own, with a reference",
-                )  # fmt: skip
+                remedy = "write each copy as a prim of its own, with a reference"
+                self._report("left-out-of-usd", path, f"{what}, which are not read", remedy)
             else:
-                self._say("unused-in-usd", path, "kinematics does not use this PointInstancer")
+                self._report("unused-in-usd", path, "kinematics does not use this PointInstancer")
         return prims
 
     def _value(self, prim: Any, name: str) -> Any:
-        """Return the value of an attribute, or its default; None if there is neither.
+        """Return the value of an attribute, or else its default, or else None.
 
         A value that a stronger layer blocks (`None` in the file) is treated as missing.
         """
@@ -486,10 +462,10 @@ class _StageReader:
         value = attribute.Get()
         if value is None and attribute.HasFallbackValue():
             value = prim.GetPrimDefinition().GetAttributeFallbackValue(name)
-        self._timed(attribute, f"urdfkin takes {value}")
+        self._report_timed(attribute, f"urdfkin takes {value}")
         return value
 
-    def _timed(self, attribute: Any, instead: str) -> None:
+    def _report_timed(self, attribute: Any, instead: str) -> None:
         """Report an attribute that has time samples or a spline, but no default value."""
         path = str(attribute.GetPath())
         if path in self._looked_at:
@@ -499,26 +475,24 @@ class _StageReader:
         if kind == "time samples" and not attribute.GetNumTimeSamples():
             return
         if not attribute.GetResolveInfo(self.pxr.Usd.TimeCode.Default()).HasAuthoredValue():
-            self._say(
-                "time-samples", str(attribute.GetPrim().GetPath()),
-                f"{attribute.GetName()} has {kind}, but no default value, so {instead}",
-                "write a default value",
-            )  # fmt: skip
+            where = str(attribute.GetPrim().GetPath())
+            what = f"{attribute.GetName()} has {kind}, but no default value, so {instead}"
+            self._report("time-samples", where, what, "write a default value")
 
-    def _timed_transform(self, prim: Any) -> None:
-        """Report operations without a default value in the transforms of a prim and of the prims above it."""
+    def _report_timed_transforms(self, prim: Any) -> None:
+        """Report transform operations without a default value, for a prim and all prims above it."""
         while prim and (path := str(prim.GetPath())) not in self._looked_at:
             self._looked_at.add(path)
             if prim.IsA(self.pxr.UsdGeom.Xformable):
                 placed = self.pxr.UsdGeom.Xformable(prim)
                 for one in placed.GetOrderedXformOps():
-                    self._timed(one.GetAttr(), "urdfkin leaves it out")
+                    self._report_timed(one.GetAttr(), "urdfkin leaves it out")
                 if placed.GetResetXformStack():
                     return
             prim = prim.GetParent()
 
-    def _uneven(self, prim: Any) -> str | None:
-        """Return a text about the nearest ancestor with a non-uniform scale, or None."""
+    def _uneven_scale(self, prim: Any) -> str | None:
+        """Return a text about the scale of the nearest ancestor with a non-uniform scale, or None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -528,48 +502,43 @@ class _StageReader:
 
     def _placed(self, prim: Any) -> tuple[FloatArray, FloatArray]:
         """Return the pose of a prim in the world (4, 4), in m with z up, and its scale (3,)."""
-        self._timed_transform(prim)
+        self._report_timed_transforms(prim)
+        where = f"{self.source}: {prim.GetPath()}"
         M = np.array(self._cache.GetLocalToWorldTransform(prim)).T
         if not np.isfinite(M).all():
-            raise InputError(
-                "the transform of a prim is not finite", where=f"{self.source}: {prim.GetPath()}"
-            )
+            raise InputError("the transform of a prim is not finite", where=where)
         scale = np.linalg.norm(M[:3, :3], axis=0)
         if not (scale > 0.0).all():
-            raise InputError("the scale of a prim is zero", where=f"{self.source}: {prim.GetPath()}")
+            raise InputError("the scale of a prim is zero", where=where)
         if np.linalg.det(M[:3, :3]) < 0.0:
             scale = -scale
         R = M[:3, :3] / scale
         if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR * SINGLE * prim.GetPath().pathElementCount:
-            raise InputError(
-                "the frame of a prim has shear, so it is no frame of a rigid body",
-                where=f"{self.source}: {prim.GetPath()}",
-                found=self._uneven(prim),
-                remedy="apply the scale to the shapes, not to a parent of a rotated body",
-            )
+            message = "the frame of a prim has shear, so it is no frame of a rigid body"
+            remedy = "apply the scale to the shapes, not to a parent of a rotated body"
+            raise InputError(message, where=where, found=self._uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)
         return pose(self._up @ (U @ V), self._up @ M[:3, 3] * self._unit), scale
 
     def _collect(self, prims: list[Any]) -> None:
         physics = self.pxr.UsdPhysics
         for prim in prims:
-            if (
-                not prim.HasAPI(physics.RigidBodyAPI)
-                or self._value(prim, "physics:rigidBodyEnabled") is False
-            ):
+            if not prim.HasAPI(physics.RigidBodyAPI):
+                continue
+            if self._value(prim, "physics:rigidBodyEnabled") is False:
                 continue
             path = str(prim.GetPath())
             T, scale = self._placed(prim)
             if scale[0] < 0.0:
-                what = "the transform of this body mirrors it"
-                self._say("mirrored-body", path, what, "mirror the shapes instead")
-            self._bodies[path] = _Body(path, T, scale, self._owner(prim))
+                what = "the transform of this body contains a reflection"
+                self._report("mirrored-body", path, what, "mirror the shapes instead")
+            self._bodies[path] = _Body(T, self._owner(prim))
         for prim in prims:
             if prim.IsA(physics.Joint) and (edge := self._edge(prim)) is not None:
                 self._edges.append(edge)
-            self._couplings(prim)
+            self._report_couplings(prim)
 
-    def _couplings(self, prim: Any) -> None:
+    def _report_couplings(self, prim: Any) -> None:
         """Report prims and schemas that couple joints or bodies and that urdfkin does not read."""
         path, schemas = str(prim.GetPath()), _schemas(prim)
         joint = prim.IsA(self.pxr.UsdPhysics.Joint)
@@ -577,31 +546,32 @@ class _StageReader:
         ends = any(prim.HasRelationship(f"physics:body{i}") for i in (0, 1))
         if not joint and (ends or any(word in kind for word in _COUPLINGS)):
             what = f"a tree cannot represent this {kind or 'prim with physics:body0 or physics:body1'}"
-            self._say("left-out-of-usd", path, what)
+            self._report("left-out-of-usd", path, what)
         for rule in prim.GetRelationships() if joint else ():
-            # The direction in "physxMimicJoint:rotX:referenceJoint" may be another one.
+            # The direction in "physxMimicJoint:rotX:referenceJoint" may differ from the joint's direction.
             own = _MIMIC_RULE.fullmatch(rule.GetName())
             if own is not None and rule.HasAuthoredTargets():
                 schema = f"PhysxMimicJointAPI:{own[1]}" if own[1] else "NewtonMimicAPI"
                 if schema not in schemas:
                     what = f"{rule.GetName()} has no effect, because {schema} is not applied"
-                    self._say("lost-mimic", path, what, "apply the schema, or remove the attributes")
+                    self._report("lost-mimic", path, what, "apply the schema, or remove the attributes")
         unread = []
         for schema in schemas:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # This schema repeats the rule of `NewtonMimicAPI`, and may add terms of higher degree.
+                # MjcEqualityJointAPI repeats the rule of NewtonMimicAPI, and may add terms of higher degree.
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
-                    self._say("left-out-of-usd", path, what)
+                    self._report("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # If the joint is not in the tree, `remarks` already contains the reason.
+        # If the joint is not in the tree, `remarks` already contains a remark about the joint.
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
-            self._say("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
+            self._report("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
+        """Return the path of the articulation root that is the prim or is above the prim, or None."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 return str(prim.GetPath())
@@ -614,77 +584,64 @@ class _StageReader:
         """Return a joint that connects two bodies, or a body and the world; report any other joint."""
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
-            self._say("left-out-of-usd", path, "this joint is disabled")
+            self._report("left-out-of-usd", path, "this joint is disabled")
             return None
         sides = []
         for i in (0, 1):
             targets = list(prim.GetRelationship(f"physics:body{i}").GetTargets())
             if len(targets) > 1:
-                self._say("left-out-of-usd", path, f"body{i} of this joint has {len(targets)} targets")
+                self._report("left-out-of-usd", path, f"body{i} of this joint has {len(targets)} targets")
                 return None
             side = self._side(prim, i, str(targets[0]) if targets else None)
             if side is None:
-                lost = (
-                    "is a prototype of a PointInstancer" if self._instanced(targets[0]) else "does not exist"
-                )
-                what = f"body{i} of this joint names a prim that {lost}: {targets[0]}"
-                self._say("outside-joint", path, what, "correct the relationship")
+                instanced = self._is_instanced(targets[0])
+                reason = "is a prototype of a PointInstancer" if instanced else "does not exist"
+                what = f"body{i} of this joint names a prim that {reason}: {targets[0]}"
+                self._report("outside-joint", path, what, "correct the relationship")
                 return None
             sides.append(side)
         (first, A, size_A, off_A), (second, B, size_B, off_B) = sides
         if first == second:
             where = "the world" if first is None else "one body"
-            self._say("left-out-of-usd", path, f"both ends of this joint are in {where}")
+            self._report("left-out-of-usd", path, f"both ends of this joint are in {where}")
             return None
-        called = str(prim.GetTypeName()).removeprefix("Physics")
-        if self._value(prim, "physics:excludeFromArticulation") or called.endswith(_NO_JOINTS):
-            what = f"a tree cannot represent this {called}, which is outside the articulation"
-            self._say("left-out-of-usd", path, what)
+        kind_name = str(prim.GetTypeName()).removeprefix("Physics")
+        if self._value(prim, "physics:excludeFromArticulation") or kind_name.endswith(_NO_JOINTS):
+            what = f"a tree cannot represent this {kind_name}, which is outside the articulation"
+            self._report("left-out-of-usd", path, what)
             return None
         kind, axis, limits, free = self._motion(prim)
-        rounded = off_A[0] + off_B[0], off_A[1] + off_B[1]
-        size, ends, frames = size_A + size_B, (first, second), (A, B)
-        edge = _Edge(prim, prim.GetName(), path, kind, axis, ends, frames, limits, size, rounded)
-        seen = [
-            quaternion_of(self._in_stage(end, T)[:3, :3])
-            for end, T in zip(edge.ends, edge.frames, strict=True)
-        ]
-        p0, p1 = (self._in_stage(end, T)[:3, 3] for end, T in zip(edge.ends, edge.frames, strict=True))
+        size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
+        # A pose in the world (the body is None) is converted back to the up axis of the stage.
+        C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._read[path] = JointReading(
-            free, first or "", second or "", p0, seen[0], p1, seen[1], limits, edge.size
-        )
-        return edge
-
-    def _in_stage(self, body: str | None, T: FloatArray) -> FloatArray:
-        """Convert a pose in the world (`body` is None) to the stage's up axis; other poses stay unchanged."""
-        return T if body is not None else pose(self._up.T) @ T
+            free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
+            D[:3, 3], quaternion_of(D[:3, :3]), limits, size,
+        )  # fmt: skip
+        return _Edge(prim, prim.GetName(), path, kind, axis, (first, second), (A, B), limits, size, rounded)
 
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return the first or second body of a joint with its joint frame; None if the target does not exist.
+        """Return the body with index `i` of a joint, and the joint frame; None if the target does not exist.
 
-        The result has four entries. The first entry is the path of the body; None is the world. The second
-        entry is the pose of the joint frame in the body (m). The origin of this pose is a sum of vectors; the
-        third entry is the sum of their lengths (m). The fourth entry is a pair of bounds on rounding to
-        single precision: how far it moves (m) and rotates (rad) the joint frame.
+        The result has four entries: the path of the body (None for the world), the pose of the joint frame in
+        the body (m), the number `size`, and the bounds `rounded` (see `_Edge`).
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
         size = float(np.linalg.norm(xyzw))
         if not (np.isfinite(p).all() and math.isfinite(size) and size > 0.0):
-            raise InputError(
-                f"localPos{i} or localRot{i} of a joint is not finite, or the quaternion is zero",
-                where=f"{self.source}: joint {prim.GetPath()}",
-                found=f"{p.tolist()}, {quaternion}",
-            )
+            message = f"localPos{i} or localRot{i} of a joint is not finite, or the quaternion is zero"
+            found = f"{p.tolist()}, {quaternion}"
+            raise InputError(message, where=f"{self.source}: joint {prim.GetPath()}", found=found)
         off = float(np.linalg.norm(_rounding(p))) * self._unit, _turned(xyzw)
         R, p = rotation_of(xyzw / size), p * self._unit
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)
-        if not other or not other.IsDefined() or self._instanced(target):
+        if not other or not other.IsDefined() or self._is_instanced(target):
             return None
         T, scale = self._placed(other)
         A, length = pose(R, scale * p), float(np.linalg.norm(scale * p))
@@ -695,44 +652,40 @@ class _StageReader:
         if body != target:
             T = T if body is None else inverse(self._bodies[body].T) @ T
             A, length = T @ A, length + float(np.linalg.norm(T[:3, 3]))
-            moved, turned = self._stored(target, body, length)
+            moved, turned = self._rounding_of_transforms(target, body, length)
             off = off[0] + moved, off[1] + turned
         return body, A, length, off
 
-    def _stored(self, path: str | None, body: str | None, length: float) -> tuple[float, float]:
+    def _rounding_of_transforms(self, path: str, body: str | None, length: float) -> tuple[float, float]:
         """Bound how far rounding to single precision moves (m) and rotates (rad) a prim relative to a body.
 
         The bounds are 0 if the file stores all transforms in double precision. If the file stores a rotation
-        in single precision, rounding rotates the prim, and moves the prims below. The function ignores
-        transforms in half precision. `length` is the sum of the lengths (m) of the translations from the body
-        to the prim. The body None is the world.
+        in single precision, rounding rotates the prim, and moves all prims below the prim. Transforms in half
+        precision are ignored. `length` is the sum of the lengths (m) of the translations from the body to the
+        prim. The body None is the world.
         """
         moved = turned = False
-        geometry, prim = self.pxr.UsdGeom, self.stage.GetPrimAtPath(path)
-        own = True
+        operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
         while prim and not prim.IsPseudoRoot() and str(prim.GetPath()) != body:
-            for one in geometry.Xformable(prim).GetOrderedXformOps():
-                if one.GetPrecision() == geometry.XformOp.PrecisionFloat:
-                    rotates = one.GetOpType() not in (
-                        geometry.XformOp.TypeTranslate,
-                        geometry.XformOp.TypeScale,
-                    )
+            for one in self.pxr.UsdGeom.Xformable(prim).GetOrderedXformOps():
+                if one.GetPrecision() == operation.PrecisionFloat:
+                    rotates = one.GetOpType() not in (operation.TypeTranslate, operation.TypeScale)
                     turned |= rotates
-                    moved |= not rotates or not own
-            prim, own = prim.GetParent(), False
+                    moved |= not rotates or str(prim.GetPath()) != path
+            prim = prim.GetParent()
         return SINGLE * length if moved else 0.0, 2.0 * SINGLE if turned else 0.0
 
-    def _instanced(self, path: object) -> bool:
+    def _is_instanced(self, path: object) -> bool:
         return any(str(path).startswith(one) for one in self._instancers)
 
     def _motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return the kind, the axis, the limits (rad or m) and the free directions of a joint.
 
-        Raise InputError if urdfkin has no such joint.
+        Raise InputError if urdfkin does not support the joint.
         """
         physics, path = self.pxr.UsdPhysics, f"{self.source}: joint {prim.GetPath()}"
         if prim.IsA(physics.FixedJoint):
-            return JointKind.FIXED, _unit(0), _NONE, ""
+            return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
         for schema, turns in ((physics.RevoluteJoint, True), (physics.PrismaticJoint, False)):
             if prim.IsA(schema):
                 letter = str(self._value(prim, "physics:axis"))
@@ -741,69 +694,52 @@ class _StageReader:
                 ends = (float(self._value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
                 return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
         if prim.IsA(physics.SphericalJoint):
-            raise InputError(
-                "urdfkin does not support spherical joints",
-                where=path,
-                remedy="use three revolute joints (singular where the middle one is at a right angle)",
-            )
+            remedy = "use three revolute joints (singular where the middle one is at a right angle)"
+            raise InputError("urdfkin does not support spherical joints", where=path, remedy=remedy)
         if prim.GetTypeName() != "PhysicsJoint":
-            raise InputError(
-                "urdfkin does not support this kind of joint",
-                where=path,
-                found=str(prim.GetTypeName()),
-                remedy="exclude it from the articulation, or use another joint",
-            )
-        return self._six(prim, path)
+            message = "urdfkin does not support this kind of joint"
+            remedy = "exclude it from the articulation, or use another joint"
+            raise InputError(message, where=path, found=str(prim.GetTypeName()), remedy=remedy)
+        return self._general_motion(prim, path)
 
-    def _unlimited(self, path: str, limits: Mapping[str, tuple[float, float]]) -> None:
-        """Report the limits of a planar or floating joint, which a tree cannot represent."""
-        if any(math.isfinite(end) for ends in limits.values() for end in ends):
-            self._say("unused-in-usd", path, "the limits of this planar or floating joint are not read")
-
-    def _six(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
+    def _general_motion(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         """Return the same tuple as `_motion` for a `PhysicsJoint`, which has limits for six directions.
 
         If the lower limit of a direction is above its upper limit, the joint does not move in this direction.
         """
-        free, limits = [], {}
-        for freedom in _FREEDOMS:
-            low, high = -math.inf, math.inf
-            if f"PhysicsLimitAPI:{freedom}" in _schemas(prim):
-                low, high = (self._end(prim, f"limit:{freedom}:physics:{end}") for end in ("low", "high"))
+        limits: dict[str, tuple[float, float]] = {}
+        for direction in _DIRECTIONS:
+            low, high = _NO_LIMITS
+            if f"PhysicsLimitAPI:{direction}" in _schemas(prim):
+                low, high = (self._end(prim, f"limit:{direction}:physics:{end}") for end in ("low", "high"))
             if low <= high:
-                free.append(freedom)
-                limits[freedom] = low, high
+                limits[direction] = low, high
+        free = tuple(limits)
         if not free:
-            return JointKind.FIXED, _unit(0), _NONE, ""
+            return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
         if len(free) == 1:
             return self._bounded(path, free[0], iter(limits[free[0]]))
-        if free == ["transX", "transY", "rotZ"]:
-            self._unlimited(path, limits)
-            return JointKind.PLANAR, _unit(0), _NONE, " ".join(free)
-        if len(free) == len(_FREEDOMS):
-            self._unlimited(path, limits)
-            return JointKind.FLOATING, _unit(0), _NONE, " ".join(free)
-        raise InputError(
-            "urdfkin does not support a joint with these degrees of freedom",
-            where=path,
-            found=", ".join(free),
-            remedy="leave one degree of freedom free, or write several joints with a body between them",
-        )
+        kind = {("transX", "transY", "rotZ"): JointKind.PLANAR, _DIRECTIONS: JointKind.FLOATING}.get(free)
+        if kind is None:
+            message = "urdfkin does not support a joint with these degrees of freedom"
+            remedy = "leave one degree of freedom free, or write several joints with a body between them"
+            raise InputError(message, where=path, found=", ".join(free), remedy=remedy)
+        if any(math.isfinite(end) for ends in limits.values() for end in ends):
+            self._report("unused-in-usd", path, "the limits of this planar or floating joint are not read")
+        return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _end(self, prim: Any, name: str) -> float:
         """Return the lower or upper limit of a `PhysicsJoint` in one of its six directions.
 
-        Raise InputError if a layer of the stage contains `None` for the limit. OpenUSD's parser of UsdPhysics
-        does not replace `None` by the default value, unlike other readers.
+        Raise InputError if a layer contains `None` for the limit. OpenUSD's parser of UsdPhysics does not
+        replace `None` by the default value, but other readers do.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            raise InputError(
-                "a limit of a joint is blocked, and OpenUSD's readers differ in its value",
-                where=f"{self.source}: joint {prim.GetPath()}",
-                found=f"{name} = None",
-                remedy="write a number; -inf and inf mean no limit",
-            )
+            message = "a limit of a joint is blocked, and OpenUSD's readers differ in its value"
+            where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
+            remedy = "write a number; -inf and inf mean no limit"
+            raise InputError(message, where=where, found=found, remedy=remedy)
         return float(self._value(prim, name))
 
     def _bounded(
@@ -811,11 +747,8 @@ class _StageReader:
     ) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
         lower, upper = (math.copysign(math.inf, end) if abs(end) >= _LARGEST else end for end in ends)
         if not lower <= upper:
-            raise InputError(
-                "the lower limit of a joint is above its upper limit",
-                where=path,
-                found=f"{lower:g} and {upper:g}",
-            )
+            message = "the lower limit of a joint is above its upper limit"
+            raise InputError(message, where=path, found=f"{lower:g} and {upper:g}")
         kind, factor = JointKind.PRISMATIC, self._unit
         if free.startswith("rot"):
             bounded = math.isfinite(lower) and math.isfinite(upper)
@@ -827,88 +760,76 @@ class _StageReader:
     def _articulations(self) -> list[_Articulation]:
         """Return the groups of bodies that joints connect.
 
-        A joint between two articulations is reported and does not merge their groups.
+        A joint between two articulations is reported and does not merge the groups of its two bodies.
         """
         above: dict[str, str] = {path: path for path in self._bodies}
 
         def top(path: str) -> str:
+            """Return the body that represents the group of a body (union-find)."""
             while above[path] != path:
                 above[path] = above[above[path]]
                 path = above[path]
             return path
 
         owner = {path: body.owner for path, body in self._bodies.items()}
-        kept = []
+        tree_edges = []
         for edge in self._edges:
             first, second = edge.ends
             if first is not None and second is not None:
                 a, b = top(first), top(second)
                 if a == b:
-                    self._closes(edge)
+                    self._report_loop(edge)
                     continue
                 owners = {one for one in (owner[a], owner[b]) if one is not None}
                 if len(owners) > 1:
-                    ours = " and ".join(sorted(owners))
-                    what = f"this {_called(edge)} connects two articulations: {ours}"
-                    self._say("outside-joint", edge.path, what)
+                    both = " and ".join(sorted(owners))
+                    what = f"this {edge.kind.value} joint connects two articulations: {both}"
+                    self._report("outside-joint", edge.path, what)
                     continue
                 above[b] = a
                 owner[a] = next(iter(owners), None)
-            kept.append(edge)
+            tree_edges.append(edge)
         groups: dict[str, _Articulation] = {}
-        for edge in kept:
-            body = next(end for end in edge.ends if end is not None)
-            key = top(body)
-            group = groups.setdefault(key, _Articulation(owner[key] or "", [], []))
-            group.edges.append(edge)
+        for edge in tree_edges:
+            key = top(next(end for end in edge.ends if end is not None))
+            groups.setdefault(key, _Articulation(owner[key] or "", [], [])).edges.append(edge)
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # A single body that is fixed to the world is not a robot.
-        found = [
-            group
-            for group in groups.values()
-            if group.path or len(group.bodies) > 1 or group.edges[0].kind is not JointKind.FIXED
-        ]
-        for group in found:
-            self._name(group)
         # If the base of an articulation is not a rigid body, several groups are attached to the world.
         merged: dict[str, list[_Articulation]] = {}
-        for group in found:
+        for group in groups.values():
+            single = not group.path and len(group.bodies) == 1
+            if single and group.edges[0].kind is JointKind.FIXED:
+                continue  # a single body that is fixed to the world is not a robot
+            self._name(group)
             merged.setdefault(self._root(group) or group.path, []).append(group)
-        found = [own[0] if len(own) == 1 else self._together(own, path) for path, own in merged.items()]
+        found = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
         paths = Counter(group.path for group in found)
         for group in found:
-            if paths[group.path] > 1:  # a joint between these groups is missing
+            if paths[group.path] > 1:  # no joint connects the groups of this articulation
                 group.path = self._root(group) or group.bodies[0]
         return found
 
     def _name(self, group: _Articulation) -> None:
-        """Name a group by its articulation root, or by its root body if it has no articulation root."""
-        api = self.pxr.UsdPhysics.ArticulationRootAPI
+        """Set the path of a group to its articulation root, or else to its root body."""
         for edge in group.edges:
-            if edge.prim.HasAPI(api):
+            if edge.prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 group.path = edge.path
         group.path = group.path or self._root(group) or group.bodies[0]
 
     def _choose(self, found: list[_Articulation], wanted: str | None) -> _Articulation:
         """Return the articulation with a path or name, or all articulations below another prim."""
         if not found:
-            raise InputError(
-                "this stage has no joint between bodies",
-                where=self.source,
-                found=f"{len(self._bodies)} bodies",
-                remedy="apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints",
-            )
+            message = "this stage has no joint between bodies"
+            remedy = "apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints"
+            raise InputError(message, where=self.source, found=f"{len(self._bodies)} bodies", remedy=remedy)
         paths = [group.path for group in found]
         if wanted is None:
             if len(found) > 1:
-                raise InputError(
-                    f"this stage has {len(found)} articulations",
-                    where=self.source,
-                    found=", ".join(paths[:8]),
-                    remedy="choose one with --articulation PATH, or all below the PATH of another prim",
-                )
+                message = f"this stage has {len(found)} articulations"
+                remedy = "choose one with --articulation PATH, or all below the PATH of another prim"
+                raise InputError(message, where=self.source, found=", ".join(paths[:8]), remedy=remedy)
             return found[0]
         if not wanted:
             raise UnknownNameError("articulation", wanted, paths, where=self.source)
@@ -918,17 +839,15 @@ class _StageReader:
         below = [group for group in found if group.path.startswith(wanted.rstrip("/") + "/")]
         if own or not below:
             raise UnknownNameError("articulation", wanted, paths, where=self.source)
-        return self._together(below, wanted.rstrip("/") or "/")
+        return self._merge(below, wanted.rstrip("/") or "/")
 
-    def _together(self, groups: list[_Articulation], path: str) -> _Articulation:
+    def _merge(self, groups: list[_Articulation], path: str) -> _Articulation:
         """Merge several articulations that are attached to the world into one articulation."""
         for group in groups:
             if len(groups) > 1 and self._root(group) is not None:
-                raise InputError(
-                    "this articulation is not attached to the world, so it cannot be joined with others",
-                    where=f"{self.source}: {group.path}",
-                    remedy="choose one articulation",
-                )
+                what = "this articulation is not attached to the world, so it cannot be joined with others"
+                where = f"{self.source}: {group.path}"
+                raise InputError(what, where=where, remedy="choose one articulation")
         bodies = [body for group in groups for body in group.bodies]
         return _Articulation(path, bodies, [edge for group in groups for edge in group.edges])
 
@@ -960,7 +879,7 @@ class _StageReader:
                     continue
                 used.add(edge.path)
                 if there in reached:
-                    self._closes(edge)
+                    self._report_loop(edge)
                     continue
                 reached.add(there)
                 ordered.append((edge, backwards))
@@ -970,36 +889,37 @@ class _StageReader:
             if path is not None:
                 links[path] = unique(self._short(path), self._link_names)
         names = {edge.path: unique(edge.name, self._joint_names) for edge, _ in ordered}
-        joints = [made for edge, back in ordered for made in self._joints(edge, names, links, backwards=back)]
+        rows = [row for edge, back in ordered for row in self._joints(edge, names, links, backwards=back)]
         rules = dict(self._mimics([edge for edge, _ in ordered], names))
-        joints = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in joints]
+        rows = [(replace(joint, mimic=rules.get(joint.name)), a, b) for joint, a, b in rows]
         for edge, _ in ordered:
             if self._is_outside(edge, group):
-                what = f"this {_called(edge)} leads to a body outside {group.path}"
-                self._say("outside-joint", edge.path, what)
+                what = f"this {edge.kind.value} joint leads to a body outside {group.path}"
+                self._report("outside-joint", edge.path, what)
         prims = {link: path for path, link in links.items() if path is not None}
         for path, parent in self._frames(list(prims.values())):
             link = unique(path.rpartition("/")[2], self._link_names)
             try:
                 T = inverse(self._bodies[parent].T) @ self._placed(self.stage.GetPrimAtPath(path))[0]
             except InputError as error:
-                self._say("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
+                self._report("unused-in-usd", path, f"this Xform is no link: {error.what}", error.remedy)
                 continue
             joint = fixed_joint(unique(f"{link}_fixed", self._joint_names), T)
-            self._single[joint.name] = *self._stored(path, parent, joint.length), joint.length, 0.0, 0.0
-            joints.append((joint, links[parent], link))
+            bounds = self._rounding_of_transforms(path, parent, joint.length)
+            self._single[joint.name] = *bounds, joint.length, 0.0, 0.0
+            rows.append((joint, links[parent], link))
             prims[link] = path
         self._read = {edge.path: self._read[edge.path] for edge, _ in ordered}
         tops = {path.split("/")[1] for path in (group.path, *group.bodies) if path != "/"}
         top = group.path.split("/")[1] or (tops.pop() if len(tops) == 1 else Path(self.source).stem)
-        return build_tree(top, links[root], joints), prims
+        return build_tree(top, links[root], rows), prims
 
-    def _closes(self, edge: _Edge) -> None:
-        what = f"this {_called(edge)} closes a loop, which a tree cannot represent"
-        self._say("left-out-of-usd", edge.path, what)
+    def _report_loop(self, edge: _Edge) -> None:
+        what = f"this {edge.kind.value} joint closes a loop, which a tree cannot represent"
+        self._report("left-out-of-usd", edge.path, what)
 
     def _is_outside(self, edge: _Edge, group: _Articulation) -> bool:
-        """Return whether a joint connects a body below the articulation's root with a body outside it."""
+        """Return whether exactly one of a joint's two bodies is below the articulation root."""
         inside = group.path + "/"
         if group.path in self._bodies or not any(path.startswith(inside) for path in group.bodies):
             return False
@@ -1007,7 +927,7 @@ class _StageReader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return the name of a prim. If other bodies have this name, add names of ancestors before it."""
+        """Return a prim's name, preceded by the names of ancestors if other bodies have the same name."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -1018,100 +938,85 @@ class _StageReader:
         self, edge: _Edge, names: Mapping[str, str], links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
         """Yield the joint with its two links, and a fixed joint if the child frame is not on the axis."""
-        (A, B), (parent, child) = edge.frames, edge.ends
-        axis = edge.axis
-        shares = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
+        (A, B), (parent, child), axis, kind = edge.frames, edge.ends, edge.axis, edge.kind
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
-        lever = float(np.linalg.norm(B[:3, 3]))
-        self._single[names[edge.path]] = *edge.rounded, edge.size, shares, lever
         name, here, there = names[edge.path], links[parent], links[child]
-        if edge.kind is JointKind.FIXED:
+        mimic_error = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
+        lever = float(np.linalg.norm(B[:3, 3]))
+        self._single[name] = *edge.rounded, edge.size, mimic_error, lever
+        if kind is JointKind.FIXED:
             yield fixed_joint(name, A @ inverse(B)), here, there
             return
-        if edge.kind in (JointKind.PLANAR, JointKind.FLOATING):
-            if backwards or (edge.kind is JointKind.FLOATING and parent is not None):
-                raise InputError(
-                    "urdfkin supports a joint with several degrees of freedom only from the root to a body",
-                    where=f"{self.source}: joint {edge.path}",
-                    found=edge.kind.value,
-                    remedy="exchange body0 and body1 of this joint, or write several joints",
-                )
-            direct = (np.eye(4) == B).all()
-            if edge.kind is JointKind.FLOATING:
-                A, direct = np.eye(4), True
-            yield from self._pair(Joint(name, edge.kind, 0, A, _unit(0)), here, there, B, direct=direct)
-            return
-        limit = self._limit(edge)
-        if edge.kind is JointKind.PRISMATIC or not B[:3, 3].any():
-            turn = B[:3, :3] @ axis
-            axis = turn / np.linalg.norm(turn)
-            yield Joint(name, edge.kind, 0, A @ inverse(B), axis, limit), here, there
-        else:
-            yield from self._pair(Joint(name, edge.kind, 0, A, axis, limit), here, there, B, direct=False)
-
-    def _pair(
-        self, joint: Joint, here: str, there: str, B: FloatArray, *, direct: bool
-    ) -> Iterator[tuple[Joint, str, str]]:
-        if direct:
+        free = kind in (JointKind.PLANAR, JointKind.FLOATING)
+        if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
+            raise InputError(
+                "urdfkin supports a joint with several degrees of freedom only if its parent is the root",
+                where=f"{self.source}: joint {edge.path}",
+                found=kind.value,
+                remedy="exchange body0 and body1 of this joint, or write several joints",
+            )
+        limit = None if free else self._limit(edge)
+        if kind is JointKind.FLOATING:
+            A = B = np.eye(4)
+        elif not free and (kind is JointKind.PRISMATIC or not B[:3, 3].any()):
+            axis = B[:3, :3] @ axis
+            axis, A, B = axis / np.linalg.norm(axis), A @ inverse(B), np.eye(4)
+        joint = Joint(name, kind, 0, A, axis, limit)
+        if (np.eye(4) == B).all():
             yield joint, here, there
             return
-        between = unique(f"{joint.name}_link", self._link_names)
+        between = unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield fixed_joint(unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
 
     def _limit(self, edge: _Edge) -> Limit | None:
         lower, upper = edge.limits
-        turns, prim = edge.kind is not JointKind.PRISMATIC, edge.prim
-        rates = (self._value(prim, name) for name in ("newton:velocityLimit", "physxJoint:maxJointVelocity"))
+        names = ("newton:velocityLimit", "physxJoint:maxJointVelocity")
+        rates = (self._value(edge.prim, name) for name in names)
         rate = next((float(x) for x in rates if x is not None), math.inf)
-        rate = math.inf if not 0.0 < rate < _LARGEST else rate * (math.pi / 180.0 if turns else self._unit)
+        rate = rate * self._factor(edge.kind) if 0.0 < rate < _LARGEST else math.inf
         if edge.kind is JointKind.CONTINUOUS:
             if math.isfinite(lower) or math.isfinite(upper):
-                what = "the joint has only one limit; a URDF has both limits or none, so it has none"
-                self._say("unused-in-usd", edge.path, what)
+                what = "the joint has only one limit; a URDF joint has two or none, so the limit is ignored"
+                self._report("unused-in-usd", edge.path, what)
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
+        turns = edge.kind is JointKind.REVOLUTE
         if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
-            self._say(
-                "limit-unit", edge.path, f"the limits of this joint are {words}: they are probably radians",
-                "write the limits in degrees",
-            )  # fmt: skip
+            what = f"the limits of this joint are {words}: they are probably radians"
+            self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
             what = f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
-            self._say("unused-in-usd", edge.path, what)
+            self._report("unused-in-usd", edge.path, what)
             lower, upper = (x if math.isfinite(x) else math.copysign(UNBOUNDED, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield the path of each plain Xform that becomes a link, and the path of its body.
+        """Yield the path of each plain Xform prim that becomes a link, and the path of the prim's body.
 
-        An Xform becomes no link if it only groups shapes, or if it is an instance.
+        An Xform that is an instance, or that only groups shapes, becomes no link.
         """
-        physics, geom = self.pxr.UsdPhysics, self.pxr.UsdGeom
+        body_api, shape = self.pxr.UsdPhysics.RigidBodyAPI, self.pxr.UsdGeom.Gprim
 
         def below(prim: Any, body: str) -> Iterator[tuple[str, str]]:
             for child in prim.GetChildren():
                 opened = str(child.GetPath()) in self.opened
-                if child.HasAPI(physics.RigidBodyAPI) or child.IsInstance() or opened:
+                if child.HasAPI(body_api) or child.IsInstance() or opened:
                     continue
                 kind = child.GetTypeName()
                 if kind == "Scope":
                     yield from below(child, body)
                 if kind != "Xform" or child.GetName().lower() in _SHAPES:
                     continue
-                children = list(child.GetChildren())
-                shapes = any(one.IsA(geom.Gprim) for one in children)
-                holds = any(one.HasAPI(physics.RigidBodyAPI) for one in self.pxr.Usd.PrimRange(child))
-                if (
-                    holds
-                    or shapes
-                    or not any(
-                        one.IsA(geom.Gprim)
-                        for one in self.pxr.Usd.PrimRange(child, self.pxr.Usd.TraverseInstanceProxies())
-                    )
-                ):
+                inside = self.pxr.Usd.PrimRange(child, self.pxr.Usd.TraverseInstanceProxies())
+                groups_shapes = (
+                    not any(one.HasAPI(body_api) for one in self.pxr.Usd.PrimRange(child))
+                    and not any(one.IsA(shape) for one in child.GetChildren())
+                    and any(one.IsA(shape) for one in inside)
+                )
+                if not groups_shapes:
                     yield str(child.GetPath()), body
                     yield from below(child, body)
 
@@ -1121,7 +1026,7 @@ class _StageReader:
     # -- mimic joints --------------------------------------------------------------------------------
 
     def _mimics(self, edges: Sequence[_Edge], names: Mapping[str, str]) -> Iterator[tuple[str, Mimic]]:
-        """Yield the mimic rules of Newton and PhysX; chains are resolved."""
+        """Yield the name and the rule of each mimic joint, with chains of rules resolved."""
         by_path = {edge.path: edge for edge in edges}
         rules: dict[str, Mimic] = {}
         for edge in edges:
@@ -1130,10 +1035,10 @@ class _StageReader:
                 if leader is None or leader.kind.nq != 1 or edge.kind.nq != 1 or leader is edge:
                     named = rule.leader or "nothing"
                     what = f"this joint mimics {named}, which is no joint with one coordinate"
-                    self._say("lost-mimic", edge.path, what, "correct the relationship")
+                    self._report("lost-mimic", edge.path, what, "correct the relationship")
                 elif edge.path in rules or leads(rules, rule.leader, edge.path):
                     what = "this joint has two mimic rules, or its rules form a circle"
-                    self._say("lost-mimic", edge.path, what, "remove a rule")
+                    self._report("lost-mimic", edge.path, what, "remove a rule")
                 else:
                     rules[edge.path] = rule
         for path in rules:
@@ -1146,7 +1051,7 @@ class _StageReader:
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
             if self._value(prim, "newton:mimicEnabled") is False:
-                self._say("left-out-of-usd", edge.path, "the mimic rule of this joint is disabled")
+                self._report("left-out-of-usd", edge.path, "the mimic rule of this joint is disabled")
                 return
             leader = _target(prim, "newton:mimicJoint")
             c0, c1 = self._value(prim, "newton:mimicCoef0"), self._value(prim, "newton:mimicCoef1")
@@ -1158,10 +1063,9 @@ class _StageReader:
             base, _, freedom = schema.partition(":")
             if base != "PhysxMimicJointAPI":
                 continue
-            leader = _target(prim, f"physxMimicJoint:{freedom}:referenceJoint")
-            gearing, offset = (
-                self._value(prim, f"physxMimicJoint:{freedom}:{word}") for word in ("gearing", "offset")
-            )
+            prefix = f"physxMimicJoint:{freedom}"
+            leader = _target(prim, f"{prefix}:referenceJoint")
+            gearing, offset = self._value(prim, f"{prefix}:gearing"), self._value(prim, f"{prefix}:offset")
             multiplier = -1.0 if gearing is None else -float(gearing)
             self._compare_units(edge, leader)
             yield Mimic(leader, multiplier, -float(offset or 0.0) * own)
@@ -1170,30 +1074,27 @@ class _StageReader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _compare_units(self, edge: _Edge, leader: str) -> None:
-        kinds = {edge.path: edge.kind for edge in self._edges}
-        slides = {kind is JointKind.PRISMATIC for kind in (edge.kind, kinds.get(leader, edge.kind))}
-        if len(slides) > 1:
-            self._say(
-                "lost-mimic",
-                edge.path,
-                "a mimic rule between an angle and a length has no unit in the schema; m and rad are used",
-                "compare the joint with the simulator",
-            )
+        """Report a mimic rule between an angle and a length."""
+        kind = next((one.kind for one in self._edges if one.path == leader), edge.kind)
+        if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
+            what = "a mimic rule between an angle and a length has no unit in the schema; m and rad are used"
+            self._report("lost-mimic", edge.path, what, "compare the joint with the simulator")
 
-    # -- the whole -----------------------------------------------------------------------------------
+    # -- the whole stage -----------------------------------------------------------------------------
 
-    def _loose(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
+    def _report_loose_bodies(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
+        """Report bodies that no joint connects and that are below the topmost prim of the articulation."""
         joined = {path for group in found for path in group.bodies}
         top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:
             if path not in joined and (path + "/").startswith(top):
                 what = "no joint connects this body with the robot"
-                self._say("loose-body", path, what, "add a joint, or remove PhysicsRigidBodyAPI")
+                self._report("loose-body", path, what, "add a joint, or remove PhysicsRigidBodyAPI")
 
     def _rest(
         self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
     ) -> FloatArray:
-        """Return the configuration (nq,) of the robot in the stage."""
+        """Return the configuration (nq,) in which the stage shows the robot."""
         q = np.zeros(tree.nq)
         placed = dict(zip(links.values(), rest, strict=True))
         values = {}
@@ -1216,17 +1117,17 @@ class _StageReader:
                 q[at] = values[by_name[joint.name]]
         return q
 
-    def _of_the_stage(self, rest: FloatArray) -> None:
+    def _report_unit_and_up_axis(self, rest: FloatArray) -> None:
         if not self.stage.HasAuthoredMetadata("metersPerUnit"):
             size = float(np.ptp(rest[:, :3, 3], axis=0).max(initial=0.0))
             what = f"the stage has no metersPerUnit, so a unit is a centimetre: the robot spans {size:.3g} m"
-            self._say("unit-scale", "", what, "write metersPerUnit = 1 if lengths are metres")
+            self._report("unit-scale", "", what, "write metersPerUnit = 1 if lengths are metres")
         if not self.stage.HasAuthoredMetadata("upAxis"):
             what = f"the stage has no upAxis, so {self.pxr.UsdGeom.GetStageUpAxis(self.stage)} is up"
-            self._say("up-axis", "", what, 'write upAxis = "Z"')
+            self._report("up-axis", "", what, 'write upAxis = "Z"')
 
-    def _layers(self, paths: Sequence[str]) -> None:
-        """Report each layer that describes one of the prims in another unit or up axis than the stage."""
+    def _report_layers(self, paths: Sequence[str]) -> None:
+        """Report each layer that describes one of the prims with another unit or up axis than the stage."""
         root = self.stage.GetRootLayer()
         known = {root, self.stage.GetSessionLayer()}
         above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
@@ -1236,42 +1137,34 @@ class _StageReader:
                 if layer not in known:
                     known.add(layer)
                     name = os.path.relpath(layer.identifier, Path(root.realPath).parent)
-                    self._layer(layer.pseudoRoot, name, prim)
+                    self._report_layer(layer.pseudoRoot, name, prim)
 
-    def _layer(self, root: Any, name: str, prim: Any) -> None:
-        """Compare the unit and the up axis of a layer, whose first prim is `prim`, with the stage."""
+    def _report_layer(self, root: Any, name: str, prim: Any) -> None:
+        """Compare the unit and the up axis of a layer with the stage; `prim` is the layer's topmost prim."""
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
             factor = unit / self._unit
             if abs(factor - 1.0) > SINGLE and not self._is_scaled(prim, factor):
-                self._say(
-                    "unit-scale",
-                    path,
-                    f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._unit:g};"
-                    " its lengths are not converted",
-                    f"scale this prim by {factor:g}, or write the layer in the unit of the stage",
-                )
+                what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._unit:g}"
+                remedy = f"scale this prim by {factor:g}, or write the layer in the unit of the stage"
+                self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
         up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
         if root.HasInfo(tokens.upAxis) and root.GetInfo(tokens.upAxis) != up and not self._is_resolved(prim):
-            self._say(
-                "up-axis",
-                path,
-                f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up};"
-                " the layer is not turned",
-                "turn this prim, or write the layer with the up axis of the stage",
-            )
+            what = f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up}"
+            remedy = "turn this prim, or write the layer with the up axis of the stage"
+            self._report("up-axis", path, f"{what}; the layer is not turned", remedy)
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
-        """Return whether the world scale of a prim is equal to a factor, up to single-precision rounding."""
+        """Return whether the scale of a prim in the world is a factor, up to rounding to single precision."""
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim or an ancestor has the operation `unitsResolve`.
+        """Return whether a prim or an ancestor has a transform operation with the suffix `unitsResolve`.
 
-        By convention, `unitsResolve` converts a referenced layer to the unit and the up axis of the stage.
+        By convention, such an operation converts a referenced layer to the unit and up axis of the stage.
         """
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
@@ -1279,27 +1172,20 @@ class _StageReader:
             prim = prim.GetParent()
         return False
 
-    def _unused(self, prims: list[Any]) -> None:
-        if count := sum(prim.IsA(self.pxr.UsdGeom.Gprim) for prim in prims):
-            self._say("unused-in-usd", "", f"kinematics does not use the {count} shapes")
-
 
 def _rounding(x: FloatArray) -> FloatArray:
-    """Return the largest error of each number by rounding to single precision; a zero is exact.
-
-    The error is half of the distance to the next number in single precision.
-    """
+    """Return the largest error (half an ulp) of rounding each number to single precision; 0 for a zero."""
     half = 0.5 * np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
     return np.asarray(np.where(x == 0.0, 0.0, half))
 
 
 def _turned(xyzw: FloatArray) -> float:
-    """Return a bound (rad) on the change of a rotation when its quaternion's numbers are rounded.
+    """Return a bound (rad) on the change of a rotation when the numbers of its quaternion are rounded.
 
-    The rotation changes by twice the angle between the exact and the rounded quaternion. Rounding changes
-    each of the four numbers by at most its rounding error, so the change is a vector in a four-dimensional
-    box. Only the component of this vector that is perpendicular to the quaternion changes the rotation. This
-    component is longest at a corner of the box, so the function compares all corners.
+    The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
+    numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a
+    four-dimensional box. The component of the vector that is perpendicular to the quaternion changes the
+    rotation. This component is longest at a corner of the box, so the function compares all corners.
     """
     unit = xyzw / np.linalg.norm(xyzw)
     corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))
@@ -1317,14 +1203,10 @@ def _target(prim: Any, name: str) -> str:
 
 
 def _schemas(prim: Any) -> list[str]:
-    """Return the applied API schemas as they are written, also those that this library does not know."""
+    """Return the applied API schemas as the file names them, including schemas unknown to OpenUSD."""
     return [str(one) for one in prim.GetPrimTypeInfo().GetAppliedAPISchemas()]
 
 
 def _unit(i: int) -> FloatArray:
     axis: FloatArray = np.eye(3)[i]
     return axis
-
-
-def _called(edge: _Edge) -> str:
-    return f"{edge.kind.value} joint"

@@ -1,9 +1,9 @@
 """Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
 Each number has enough digits to restore the same double. A joint's rotation is written as roll, pitch and
-yaw, from which a program computes the same rotation up to rounding.
+yaw, from which URDF readers compute the rotation up to rounding errors.
 
-The position of an insertion is computed from `Element.offset`, which does not count a byte order mark.
+Positions in an existing text do not count a byte order mark.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 has no notation for an infinite effort or velocity limit. If a joint has an infinite limit, the
-    file therefore declares version 1.2, in which the attribute may be missing.
+    URDF 1.0 requires finite limits of effort and velocity. If such a limit is infinite, the file therefore
+    declares version 1.2, in which these limits may be missing.
 
     Raises:
-        InputError: a revolute or prismatic joint has no finite limits, or XML does not allow a character of a
-            name.
+        InputError: a revolute or prismatic joint has no finite position limits, or a name contains a
+            character that XML does not allow.
 
     >>> from urdfkin.model.tree import build_tree
     >>> print(to_urdf(build_tree("stone", "only", [])))
@@ -36,8 +36,7 @@ def to_urdf(tree: KinematicTree) -> str:
     </robot>
     <BLANKLINE>
     """
-    new = any(_needs_newer(joint) for joint in tree.joints)
-    version = ' version="1.2"' if new else ""
+    version = ' version="1.2"' if any(_needs_newer_version(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{attribute(tree.name)}"{version}>']
     lines += [f'  <link name="{attribute(link)}"/>' for link in tree.links]
     for number, joint in enumerate(tree.joints):
@@ -46,12 +45,11 @@ def to_urdf(tree: KinematicTree) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _needs_newer(joint: Joint) -> bool:
-    limit = joint.limit
-    if limit is None:
+def _needs_newer_version(joint: Joint) -> bool:
+    if (limit := joint.limit) is None:
         return False
     infinite = [math.isinf(limit.effort), math.isinf(limit.velocity)]
-    # A joint without position limits needs no <limit> if all other limits are infinite.
+    # A joint without position limits has no <limit> element if all other limits are infinite.
     return any(infinite) and (joint.kind.bounded or not all(infinite))
 
 
@@ -66,8 +64,8 @@ def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
     elif joint.kind is JointKind.PLANAR:
         yield '    <axis xyz="0 0 1"/>'
     yield from _limit(joint, joint.limit)
-    if joint.mimic is not None:
-        leader, rule = attribute(joint.mimic.leader), joint.mimic
+    if (rule := joint.mimic) is not None:
+        leader = attribute(rule.leader)
         yield f'    <mimic joint="{leader}" multiplier="{rule.multiplier!r}" offset="{rule.offset!r}"/>'
     yield "  </joint>"
 
@@ -75,12 +73,10 @@ def _joint(joint: Joint, parent: str, child: str) -> Iterable[str]:
 def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
     bounded = joint.kind.bounded
     if bounded and (limit is None or math.isinf(limit.lower) or math.isinf(limit.upper)):
-        raise InputError(
-            "a URDF needs finite position limits for a revolute or prismatic joint",
-            where=f"joint {joint.name}",
-            found="none" if limit is None else f"{limit.lower} to {limit.upper}",
-            remedy="give the joint limits, or make it continuous if it rotates without limits",
-        )
+        message = "a URDF needs finite position limits for a revolute or prismatic joint"
+        remedy = "give the joint limits, or make it continuous if it rotates without limits"
+        found = "none" if limit is None else f"{limit.lower} to {limit.upper}"
+        raise InputError(message, where=f"joint {joint.name}", found=found, remedy=remedy)
     if limit is None:
         return
     named = [("effort", limit.effort), ("velocity", limit.velocity)]
@@ -92,7 +88,7 @@ def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Format numbers so that they read back bit for bit, separated by spaces.
+    """Write numbers, separated by spaces, with all digits that restore the same doubles.
 
     >>> numbers([0.1, -0.0, 1e-17])
     '0.1 -0.0 1e-17'
@@ -105,23 +101,21 @@ _ESCAPES = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "\t": "&#9;",
 
 def attribute(text: str) -> str:
     """Escape the value of an attribute; raise InputError for a character that XML does not allow."""
-    bad = next((c for c in text if not _is_xml(c)), None)
-    if bad is not None:
-        raise InputError("XML does not allow this character", where=repr(text), found=f"U+{ord(bad):04X}")
+    if bad := _NO_XML.search(text):
+        found = f"U+{ord(bad[0]):04X}"
+        raise InputError("XML does not allow this character", where=repr(text), found=found)
     return "".join(_ESCAPES.get(character, character) for character in text)
 
 
-def _is_xml(character: str) -> bool:
-    """Return whether XML 1.0 allows a character (production Char)."""
-    code = ord(character)
-    return code in (9, 10, 13) or 0x20 <= code <= 0xD7FF or 0xE000 <= code <= 0xFFFD or code >= 0x10000
+#: Regular expression for a character that XML 1.0 does not allow (production Char).
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 _INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
 
 
 def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iterator[Edit]:
-    """Yield the edits that set attributes of an element. New attributes follow the existing ones."""
+    """Yield the edits that set attributes of an element. New attributes follow the existing attributes."""
     name_end = at.offset + 1 + len(at.tag.encode())
     tag = START_TAG.match(data, at.offset)
     end = tag.end() if tag else name_end
@@ -139,6 +133,6 @@ def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iter
 
 
 def before(data: bytes, at: Element, element: str) -> Edit:
-    """Return the edit that inserts an element before another element, with the same indentation."""
+    """Return the edit that inserts the text `element` before the element `at`, with equal indentation."""
     indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
     return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))

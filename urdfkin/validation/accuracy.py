@@ -41,24 +41,29 @@ from urdfkin.verify.bounds import (
 from urdfkin.verify.call import Call
 from urdfkin.verify.exact.numbers import DIGITS, enough_digits, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move, on_base
-from urdfkin.verify.oracle import BaseNumbers, BaseRows, davenport
+from urdfkin.verify.oracle import BaseRows, davenport
 from urdfkin.verify.quantities import ANALYTICAL_JACOBIAN, JACOBIAN, PLACEMENT, Quantity, validated
 from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-_BALLS = np.vectorize(exact, otypes=[object])
-#: The table has one line for all sequences of Euler angles, and one line for quaternions.
+_INTERVALS = np.vectorize(exact, otypes=[object])
+#: Representations of the orientation in each of the two lines for analytical Jacobians.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
-#: urdfkin is called less accurate if its typical or worst error exceeds FACTOR * (Pinocchio's error).
+#: urdfkin is less accurate if its typical or worst error exceeds FACTOR times Pinocchio's error.
 FACTOR = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Errors of one library with respect to the values at fifty digits, in eps * scale: maximum and RMS."""
+    """Errors of one library relative to the values with fifty digits, in eps * scale.
+
+    Attributes:
+        worst: The largest error.
+        typical: Root mean square of the errors.
+    """
 
     worst: float
     typical: float
@@ -68,8 +73,10 @@ class Errors:
 class AccuracyLine:
     """The errors of urdfkin and of Pinocchio for one quantity in one reference frame.
 
-    The reference frame of a placement is None. For analytical Jacobians, `reference` is the representation of
-    the orientation. `numbers` is the number of compared values.
+    Attributes:
+        reference: Name of the reference frame; None for a placement. For analytical Jacobians: the
+            representation of the orientation.
+        numbers: Number of compared values.
     """
 
     quantity: str
@@ -88,7 +95,7 @@ class AccuracyLine:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class AccuracyStudy:
     """Result of the accuracy study of one robot, with one line for each quantity and reference frame."""
 
     robot: str
@@ -98,12 +105,15 @@ class Judgement:
     moving_base: bool = False
 
 
-def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None) -> Judgement:
+def accuracy_study(
+    robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | None = None
+) -> AccuracyStudy:
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
     The quantities are each link's placement, velocity, Jacobian, analytical Jacobians, Jacobian rate and
     acceleration. The configurations are the first random configurations of `validate`. One configuration
-    takes almost a second. The root link is fixed without `base`, which is one motion or (samples, ...).
+    takes almost a second. `base` is the motion of the root link: one motion, or (samples, ...). Without
+    `base`, the root link is fixed.
 
     The result has one line for the analytical Jacobians of all twelve sequences of Euler angles, and one line
     for the analytical Jacobians of quaternions. Angles about fixed axes (such as roll, pitch and yaw) are
@@ -119,9 +129,8 @@ def judge(robot: Robot, *, samples: int = 5, seed: int = 0, base: BaseMotion | N
     drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
     with precision(max(DIGITS, enough_digits(longest))):
-        return Judgement(
-            robot.name, samples, seed, tuple(_AccuracyBatch(robot, drawn, base).lines()), base is not None
-        )
+        lines = tuple(_AccuracyBatch(robot, drawn, base).lines())
+        return AccuracyStudy(robot.name, samples, seed, lines, base is not None)
 
 
 class _AccuracySamples(NamedTuple):
@@ -146,15 +155,13 @@ class _AccuracyBatch:
         )
         self.links = range(len(robot.tree.links))
         joints, moves = read_exact(robot.urdf, robot.tree), self.part.query.base
-        self.motions = [
-            move(
-                robot.tree,
-                joints,
-                *(batch[k] for batch in self.part.query.inputs),
-                base=None if moves is None else on_base(_one(moves, k)),
-            )
+        bases = [
+            None if moves is None
+            else on_base(BaseRows(moves.placement[k], moves.velocity[k], moves.acceleration[k]))
             for k in range(len(x.q))
-        ]
+        ]  # fmt: skip
+        rows = zip(*self.part.query.inputs, bases, strict=True)
+        self.motions = [move(robot.tree, joints, q, v, a, base=own) for q, v, a, own in rows]
 
     def lines(self) -> Iterator[AccuracyLine]:
         for reference in (None, *Reference):
@@ -174,7 +181,7 @@ class _AccuracyBatch:
         return _AccuracySamples(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
-        """Return the values with 50 digits (n, links, ...), in the order of urdfkin's results."""
+        """Return the values with 50 digits (n, links, ...)."""
         return np.array(
             [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
             dtype=object,
@@ -188,7 +195,7 @@ class _AccuracyBatch:
         jacobian = JACOBIAN.bound(plan, size, _ALIGNED)
         R, R_theirs = poses.urdfkin[..., :3, :3], poses.pinocchio[..., :3, :3]
         moving = _moving_columns(J_v.scale)
-        R_true, J_true = map(_BALLS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
+        R_true, J_true = map(_INTERVALS, (poses.true[..., :3, :3], _columns(J_v.true, moving)))
         for name in representations:
             if name == QUATERNION:
                 bound, quat = quaternion_jacobian_bound(jacobian), quaternion_of(R)
@@ -207,23 +214,19 @@ class _AccuracyBatch:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return indices (n, links, most) of the columns that move each link.
+    """Return indices (n, links, most) of the Jacobian's columns that move each link.
 
-    Here `most` is the largest number of columns that move a link. A link with fewer columns also has indices
-    of columns that are 0.
+    Here `most` is the largest number of columns that move a link. For a link with fewer such columns, the
+    remaining indices are those of zero columns.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
     return np.argsort(idle, axis=-1, kind="stable")[..., :most]
 
 
-def _columns(J: NDArray[Any], which: NDArray[np.intp]) -> NDArray[Any]:
-    """Return the selected columns of matrices (..., rows, nv)."""
-    return np.take_along_axis(J, which[..., np.newaxis, :], axis=-1)
-
-
-def _one(base: BaseNumbers, k: int) -> BaseNumbers:
-    return BaseRows(base.placement[k], base.velocity[k], base.acceleration[k])
+def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
+    """Return columns of matrices (..., rows, nv)."""
+    return np.take_along_axis(J, indices[..., np.newaxis, :], axis=-1)
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
@@ -235,13 +238,13 @@ def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.obj
 
 
 def _line(quantity: str, reference: str | None, compared: Sequence[_AccuracySamples]) -> AccuracyLine:
-    sides: tuple[list[FloatArray], list[FloatArray]] = [], []
+    errors_of_each: tuple[list[FloatArray], list[FloatArray]] = [], []
     for ours, theirs, true, scale in compared:
-        counted = scale > 0.0
-        units = np.maximum(EPS * scale[counted], LEAST_UNIT)
-        for errors, side in zip(sides, (ours, theirs), strict=True):
-            errors.append(_error(side[counted], true[counted]) / units)
-    own_errors, their_errors = map(np.concatenate, sides)
+        nonzero = scale > 0.0
+        units = np.maximum(EPS * scale[nonzero], LEAST_UNIT)
+        for errors, results in zip(errors_of_each, (ours, theirs), strict=True):
+            errors.append(_error(results[nonzero], true[nonzero]) / units)
+    own_errors, their_errors = map(np.concatenate, errors_of_each)
     return AccuracyLine(quantity, reference, len(own_errors), _errors(own_errors), _errors(their_errors))
 
 

@@ -1,7 +1,7 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-The file `judge.json` holds the settings. The result of each robot is a file in the folder of the chunks, with
-a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
+The file `judge.json` contains the settings. The result of each robot is a file in the folder of the chunks,
+with a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from dataclasses import asdict, dataclass, replace
 from urdfkin.errors import InputError
 from urdfkin.system.documents import typed
 from urdfkin.system.files import read_if_there
-from urdfkin.validation.accuracy import Judgement
-from urdfkin.validation.answer import DamagedError, packed, unpacked
+from urdfkin.validation.accuracy import AccuracyStudy
+from urdfkin.validation.answer import DamagedError, pack, unpack
 from urdfkin.validation.manifest import LAYOUT
-from urdfkin.validation.store import JUDGE, JUDGED, Store
+from urdfkin.validation.store import STUDY_FILE, STUDY_SUFFIX, Store
 from urdfkin.verify.oracles import version
 
 
 @dataclass(frozen=True, slots=True)
-class NotJudged:
+class FailedStudy:
     reason: str
 
 
@@ -35,7 +35,7 @@ class StudySettings:
     moving_base: bool
 
     @property
-    def words(self) -> str:
+    def options(self) -> str:
         """The settings as command-line options."""
         moving = " --judge-moving-base" if self.moving_base else ""
         return f"--judge-samples {self.samples} --seed {self.seed}{moving}"
@@ -49,58 +49,56 @@ class AccuracyResult:
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
         """Copy missing results from other stores; raise InputError if a store has other settings."""
         theirs = [results for results in map(cls.of, others) if results is not None]
-        if theirs:
-            own = cls.of(store) or cls(store, theirs[0]._settings)
-            for results in theirs:
-                own._demand_same(results)
-            own.begin()
-            for results in theirs:
-                own._copy_missing(results)
+        if not theirs:
+            return
+        own = cls.of(store) or cls(store, theirs[0]._settings)
+        for results in theirs:
+            own._check_same(results)
+        own.begin()
+        for results in theirs:
+            for robot in range(len(store.manifest.robots)):
+                if own.found(robot) is None and (found := results.found(robot)) is not None:
+                    own.keep(robot, found)
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
         """Return the results with the latest settings; None: no accuracy study was requested."""
         try:
-            if (content := read_if_there(store.folder / JUDGE)) is None:
+            if (content := read_if_there(store.folder / STUDY_FILE)) is None:
                 return None
             settings = typed(json.loads(content), StudySettings)
         except (OSError, ValueError, RecursionError) as error:
             store.tell(
-                f"{store.folder / JUDGE} cannot be read ({type(error).__name__}): the report has no"
+                f"{store.folder / STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
                 " accuracy results"
             )
             return None
         return cls(store, settings)
 
     def begin(self) -> None:
-        self._store.write(JUDGE, (json.dumps(asdict(self._settings)) + "\n").encode())
+        self._store.write(STUDY_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
 
-    def found(self, robot: int) -> Judgement | NotJudged | None:
-        return self._store.kept(self._key(robot), JUDGED, _read)
+    def found(self, robot: int) -> AccuracyStudy | FailedStudy | None:
+        return self._store.entry(self._key(robot), STUDY_SUFFIX, _decode)
 
     def has(self, robot: int) -> bool:
-        """Return whether the store has a file with the result of a robot; the file is not read."""
-        return self._store.has(self._key(robot), JUDGED)
+        """Return whether the store has a file with the result of a robot, without reading the file."""
+        return self._store.has(self._key(robot), STUDY_SUFFIX)
 
-    def keep(self, robot: int, found: Judgement | NotJudged) -> None:
+    def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
         key = self._key(robot)
-        self._store.keep_part(key, JUDGED, packed(key, {"judge": found}))
+        self._store.write_entry(key, STUDY_SUFFIX, pack(key, {"judge": found}))
 
     def stamp(self, robot: int) -> str:
         """Return the sha256 of the robot's text, which identifies the text to which a result belongs."""
         return self._store.manifest.robots[robot][1]
 
-    def _copy_missing(self, other: AccuracyResult) -> None:
-        for robot in range(len(self._store.manifest.robots)):
-            if self.found(robot) is None and (found := other.found(robot)) is not None:
-                self.keep(robot, found)
-
-    def _demand_same(self, other: AccuracyResult) -> None:
+    def _check_same(self, other: AccuracyResult) -> None:
         if other._settings != self._settings:
             raise InputError(
                 "the stores have accuracy results with different options",
                 where=str(other._store.folder),
-                found=f"{other._settings.words}, and {self._settings.words} in {self._store.folder}",
+                found=f"{other._settings.options}, and {self._settings.options} in {self._store.folder}",
                 remedy="use the same options of the accuracy study for all stores",
             )
 
@@ -112,11 +110,11 @@ class AccuracyResult:
         return hashlib.sha256(json.dumps([LAYOUT, "judge", *parts], sort_keys=True).encode()).hexdigest()
 
 
-def _read(key: str, content: bytes) -> Judgement | NotJudged:
-    data = unpacked(key, content).get("judge")
+def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
+    data = unpack(key, content).get("judge")
     try:
         if isinstance(data, dict) and "reason" in data:
-            return typed(data, NotJudged)
-        return typed(data, Judgement)
+            return typed(data, FailedStudy)
+        return typed(data, AccuracyStudy)
     except ValueError as error:
         raise DamagedError(f"not an accuracy result of urdfkin ({error})") from error

@@ -1,11 +1,11 @@
-"""Define the answer of a chunk (a result, or the reason of a failure), and the file format of answers.
+"""Answer of a worker to a chunk (a result, or the reason of a failure), and the files that contain answers.
 
-Every exception that a robot raises becomes an answer. An answer is plain data, because some exceptions cannot
-be sent between processes.
+Each exception of a robot becomes an answer. An answer is plain data, because some exceptions cannot be sent
+between processes.
 
-A file contains compressed JSON with the key of its chunk and a checksum (sha256). The file may come from
-another machine, so it contains only data and no code. Damaged, truncated, renamed and foreign files are
-detected before their data are used.
+A file contains an answer as compressed JSON, with the key of the chunk and a checksum (sha256). A file may
+come from another machine, so it contains no code. Damaged, truncated, renamed and foreign files are detected
+before their data are used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.error_stats import Key, Tally
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import RobotInput
-from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary, entries_of
+from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entries_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Failure:
 
     Attributes:
         verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
-        portrait: Summary of the parts of the robot that could be read.
+        summary: Summary of the readable parts of the robot.
         error: The traceback of an unexpected error; None otherwise.
         passing: Whether the process or the cluster caused the failure, not the robot. Such a failure is not
             stored, so that a resumed run computes the chunk again.
@@ -41,7 +41,7 @@ class Failure:
 
     verdict: ValidationVerdict
     reason: str
-    portrait: RobotSummary = NO_PORTRAIT
+    summary: RobotSummary = EMPTY_SUMMARY
     error: str | None = None
     passing: bool = False
 
@@ -58,32 +58,46 @@ def answer(chunk: Chunk) -> Answer:
 
 
 def failure(subject: RobotInput, error: Exception) -> Failure:
+    if not isinstance(error, UrdfkinError):
+        return unexpected_failure(error)
     if isinstance(error, UrdfError):
-        return Failure(
-            ValidationVerdict.BAD_INPUT, str(error), RobotSummary(findings=entries_of(error.findings))
-        )
-    if isinstance(error, OracleError):
-        return Failure(ValidationVerdict.NOT_VERIFIED, str(error), _portrait(subject))
-    if isinstance(error, UrdfkinError):
-        return Failure(ValidationVerdict.BAD_INPUT, str(error), _portrait(subject))
-    return Failure(ValidationVerdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error))
+        summary = RobotSummary(findings=entries_of(error.findings))
+    else:
+        summary = _unchecked_summary(subject)
+    is_oracle = isinstance(error, OracleError)
+    verdict = ValidationVerdict.NOT_VERIFIED if is_oracle else ValidationVerdict.BAD_INPUT
+    return Failure(verdict, str(error), summary)
 
 
-def unexpected_error(error: Exception) -> str:
-    message = " ".join(str(error).split()) or "no message"
-    return f"unexpected error in urdfkin, please report it: {type(error).__name__}: {message}"
-
-
-def format_traceback(error: Exception) -> str:
-    return "".join(traceback.format_exception(error))
-
-
-def _portrait(subject: RobotInput) -> RobotSummary:
-    """Return the summary of a robot without a check of its tables; the empty summary if it cannot be read."""
+def _unchecked_summary(subject: RobotInput) -> RobotSummary:
     try:
         return RobotSummary.of(subject.read(), None)
     except Exception:
-        return NO_PORTRAIT
+        return EMPTY_SUMMARY
+
+
+def unexpected_failure(error: Exception) -> Failure:
+    reason = f"unexpected error in urdfkin, please report it: {_name_and_message(error)}"
+    text = "".join(traceback.format_exception(error))
+    return Failure(ValidationVerdict.NOT_VERIFIED, reason, error=text)
+
+
+def lost_failure(what: str, error: Exception) -> Failure:
+    reason = f"{what}: {_name_and_message(error)}"
+    return Failure(ValidationVerdict.NOT_VERIFIED, reason, passing=True)
+
+
+def _name_and_message(error: Exception) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split()) or 'no message'}"
+
+
+#: Reasons in the report for a robot that crashed its process.
+CRASHED = "the process that validated the robot crashed"
+CRASHED_TWICE = "the process that validated the robot crashed twice; the second process computed nothing else"
+
+
+def crash_failure(subject: RobotInput, reason: str, cause: str) -> Failure:
+    return Failure(ValidationVerdict.NOT_VERIFIED, f"{subject.label}: {reason}: found {cause}")
 
 
 _MAGIC = b"urdfkin-chunk/1\n"
@@ -93,19 +107,19 @@ _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """Error for a file that does not contain the results of its chunk; the message states the reason."""
+    """A file does not contain the results of its chunk; the message states the reason."""
 
 
-def written(key: str, found: Answer) -> bytes:
+def encode_answer(key: str, found: Answer) -> bytes:
     if isinstance(found, Failure):
-        return packed(key, {"failure": found})
+        return pack(key, {"failure": found})
     rows = list(found.tallies.items())  # a key of a JSON object must be a string
-    return packed(key, {"tallies": rows, "result": replace(found, tallies={})})
+    return pack(key, {"tallies": rows, "result": replace(found, tallies={})})
 
 
-def read(key: str, content: bytes) -> Answer:
+def decode_answer(key: str, content: bytes) -> Answer:
     """Return the answer of a chunk; raise DamagedError if the file is damaged or belongs to another chunk."""
-    body = unpacked(key, content)
+    body = unpack(key, content)
     try:
         if "failure" in body:
             return typed(body["failure"], Failure)
@@ -115,18 +129,17 @@ def read(key: str, content: bytes) -> Answer:
         raise DamagedError(f"not a chunk of urdfkin ({error})") from error
 
 
-def packed(key: str, body: dict[str, Any]) -> bytes:
+def pack(key: str, body: dict[str, Any]) -> bytes:
     """Return results as the bytes of a file, with their key and a checksum.
 
-    JSON contains each double with enough decimals to read back the same double, and infinity as Python's word
-    `Infinity`.
+    Each double has enough decimals in JSON to be read back exactly. Infinity is Python's word `Infinity`.
     """
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 
 
-def unpacked(key: str, content: bytes) -> dict[str, Any]:
-    """Return the data in a file; raise DamagedError if the file is damaged or belongs to another key."""
+def unpack(key: str, content: bytes) -> dict[str, Any]:
+    """Return the data in a file; raise DamagedError if the file is damaged or has another key."""
     checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):
         raise DamagedError("not a chunk of urdfkin")

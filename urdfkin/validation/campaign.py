@@ -21,30 +21,30 @@ from urdfkin.compiled.preload import are_on_disk
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_str, safe_repr, whole_number
 from urdfkin.validation import memory
-from urdfkin.validation.answer import Answer, Failure, failure, format_traceback, unexpected_error
+from urdfkin.validation.answer import Answer, Failure, failure, unexpected_failure
 from urdfkin.validation.chunk import Cut
 from urdfkin.validation.collector import Progress, ResultCollector
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport, ValidationReport
-from urdfkin.validation.robot_input import Given, RobotInput, subjects
-from urdfkin.validation.store import Store, opened
+from urdfkin.validation.robot_input import RobotInput, RobotSource, subjects
+from urdfkin.validation.store import Store, open_store
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.comparison import load_kernels
 from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
 from urdfkin.verify.pinocchio import pinocchio
 
 if TYPE_CHECKING:
-    from urdfkin.validation.accuracy import Judgement
+    from urdfkin.validation.accuracy import AccuracyStudy
 
 
 class StoreWarning(UserWarning):
-    """Warning about a damaged file of a store; the chunk of this file is computed again."""
+    """A file of a store is damaged; the chunk of this file is computed again."""
 
 
 def validate(
-    robots: Given | Sequence[Given],
+    robots: RobotSource | Sequence[RobotSource],
     *,
     samples: int = 1000,
     seed: int = 0,
@@ -86,10 +86,10 @@ def validate(
             robot is reported as not verified with the reason, and the other robots continue.
         executor: An executor that runs the chunks; None: local processes run them. The executor has the
             interface of `concurrent.futures`, or is a cluster (`urdfkin.validation.cluster.connected`).
-        store: A folder in which each finished chunk is saved. After any interruption, the same call resumes
-            the run. The function `stored` makes a report from the folder at any time.
-        retry: "failed": repeat the check of robots that could not be checked before. Their files may have
-            changed since then.
+        store: Folder in which each finished chunk is saved. After any interruption, the same call resumes the
+            run. The function `stored` makes a report from the folder at any time.
+        retry: "failed": repeat the check of robots that could not be checked before. The files of these
+            robots may have changed since then.
         shard: "2/4": run only the second of four equal parts of the work. A store is required, and the report
             covers only this part of the work.
         progress: Callback, called before the work and after each chunk.
@@ -126,24 +126,25 @@ def validate(
     if oracle_library(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
     cut = Cut(samples)
-    collector = ResultCollector(found, cut, shares(len(found), cut, shard), progress)
-    # Each machine of an executor computes its own limit.
-    memory_limit = memory.share(jobs) if executor is None else None
+    collector = ResultCollector(found, cut, chunks_of_shard(len(found), cut, shard), progress)
+    # An executor may run chunks on other machines, and each machine computes its own memory limit.
+    memory_limit = memory.limit(jobs) if executor is None else None
     campaign = _Campaign(found, cut, seed, memory_limit, collector)
-    interrupted, open_store, begin = False, None, time.perf_counter()
+    interrupted, begin = False, time.perf_counter()
     with contextlib.ExitStack() as stack:
+        saved = None
         if folder is not None:
             manifest = Manifest.of(found, samples, seed, started.isoformat(timespec="seconds"))
-            opening = opened(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
-            open_store = stack.enter_context(opening)
+            context = open_store(folder, manifest, _warn, shard=shard, retry_failed=retry == "failed")
+            saved = stack.enter_context(context)
         try:
-            if open_store is not None:
-                campaign.use(open_store)
+            if saved is not None:
+                campaign.use(saved)
             for i, error in unread.items():
-                for index in collector.missing(i):  # one failed chunk fails the robot
+                for index in collector.missing(i):  # after one failed chunk, no chunk is missing
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
-            if _kernels_pay(len(missing) * samples) and (isolate or any(map(_is_robot, missing))):
+            if _kernels_pay(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
                 load_kernels()  # a compilation in a worker would count as a robot's computing time
                 begin = time.perf_counter()
             collector.begin()
@@ -153,11 +154,7 @@ def validate(
         except UrdfkinError as error:
             collector.give_up(Failure(ValidationVerdict.NOT_VERIFIED, str(error)))
         except Exception as error:  # finished results stay in the report
-            collector.give_up(
-                Failure(
-                    ValidationVerdict.NOT_VERIFIED, unexpected_error(error), error=format_traceback(error)
-                )
-            )
+            collector.give_up(unexpected_failure(error))
     reports = tuple(collector.reports())
     return ValidationReport(
         robots=reports,
@@ -182,8 +179,8 @@ def _folder(store: str | os.PathLike[str]) -> Path:
     return Path(os.fsdecode(name))
 
 
-def _is_robot(subject: RobotInput) -> bool:
-    """Return whether a robot can be loaded; otherwise, the robot's first chunk reports the error."""
+def _can_be_loaded(subject: RobotInput) -> bool:
+    """Return False for a robot that cannot be loaded; the robot's first chunk reports the error."""
     try:
         subject.load()
     except Exception:
@@ -192,9 +189,9 @@ def _is_robot(subject: RobotInput) -> bool:
 
 
 def stored(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store, which is equal to the report of an uninterrupted run.
+    """Return the report of a store; a complete store gives the report of an uninterrupted run.
 
-    Until the store is complete, the report is marked as interrupted.
+    The report of an incomplete store is marked as interrupted.
 
     Raises:
         SourceError, InputError: The folder is not a store.
@@ -202,10 +199,10 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
     store = Store.reading(Path(folder), _warn)
     store.check_names()
     manifest, found = store.manifest, store.manifest.subjects()
-    collector = ResultCollector(found, manifest.cut, shares(len(found), manifest.cut))
+    collector = ResultCollector(found, manifest.cut, chunks_of_shard(len(found), manifest.cut))
     _Campaign(found, manifest.cut, manifest.seed, None, collector).use(store)
-    reports, standing = tuple(collector.reports()), collector.standing()
-    judgements, all_judged = _judgements(store, reports)
+    reports, progress = tuple(collector.reports()), collector.state()
+    studies, all_studied = _studies(store, reports)
     return ValidationReport(
         robots=reports,
         asked=len(reports),
@@ -213,22 +210,22 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
         seed=manifest.seed,
         started=manifest.started,
         seconds=sum(robot.seconds for robot in reports),
-        interrupted=standing.chunks_done < standing.chunks or not all_judged,
+        interrupted=progress.chunks_done < progress.chunks or not all_studied,
         made_by=manifest.versions,
-        judgements=judgements,
+        studies=studies,
     )
 
 
-def _judgements(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Judgement | None, ...], bool]:
+def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
     """Return the accuracy results of the compared robots, and whether no result is missing."""
-    if not store.has_judge:
+    if not store.has_study:
         return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, NotJudged
+    from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy
 
     if (results := AccuracyResult.of(store)) is None:
         return (), True
     found = [results.found(i) for i, report in enumerate(reports) if report.tallies]
-    return tuple(None if isinstance(one, NotJudged) else one for one in found), None not in found
+    return tuple(None if isinstance(one, FailedStudy) else one for one in found), None not in found
 
 
 #: Compiled kernels save time for runs with more samples than this number.
@@ -243,6 +240,8 @@ def _kernels_pay(samples: int) -> bool:
 
 @dataclass
 class _Campaign:
+    """The tasks of a run, with the collector and the store that receive the answers."""
+
     subjects: Sequence[RobotInput]
     cut: Cut
     seed: int
@@ -273,34 +272,30 @@ class _Campaign:
         self.collector.enter(task, found)
 
 
-def shares(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
-    """Return the chunks of each robot that belong to a shard; without a shard, all chunks.
+def chunks_of_shard(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
+    """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
     The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read
-    only once. A shard that is not of the form i/n raises InputError.
+    only once. Another form of the shard raises InputError.
 
-    >>> shares(2, Cut(1000), "1/4"), shares(2, Cut(1000), "4/4")
+    >>> chunks_of_shard(2, Cut(1000), "1/4"), chunks_of_shard(2, Cut(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])
     """
-    part, parts = _shard(shard) if shard is not None else (1, 1)
+    match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", "1/1" if shard is None else shard)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise InputError(
+            "`shard` must have the form i/n",
+            found=repr(shard),
+            remedy="for a validation in four parts write 1/4, ..., 4/4",
+        )
+    part, parts = int(match[1]), int(match[2])
     size = len(cut)
-    start, stop = ((part - 1) * robots * size // parts, part * robots * size // parts)
+    start, stop = (part - 1) * robots * size // parts, part * robots * size // parts
     found = []
     for robot in range(robots):
         low, high = (min(max(end - robot * size, 0), size) for end in (start, stop))
         found.append(range(low, high) if low < high else range(0))
     return found
-
-
-def _shard(word: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", word)
-    if match is None or not 1 <= int(match[1]) <= int(match[2]):
-        raise InputError(
-            "`shard` must have the form i/n",
-            found=repr(word),
-            remedy="for a validation in four parts write 1/4, ..., 4/4",
-        )
-    return int(match[1]), int(match[2])
 
 
 def _warn(message: str) -> None:

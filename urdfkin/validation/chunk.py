@@ -1,11 +1,11 @@
-"""Chunks of a validation: a range of samples of one robot.
+"""Chunks of a validation; a chunk is a range of samples of one robot.
 
 A sample depends only on the seed and on the index of the sample. Inputs and results of a chunk are plain
 data, so a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2 of a
 robot are the neutral configuration, the lower limits and the upper limits.
 
-Samples are drawn 25 at a time, each draw with its own seed. The number of draws in a chunk does not change
-any result; it only changes the cost of distributing and storing chunks.
+Random samples are drawn 25 at a time, each draw with its own seed. Therefore, the number of draws in a chunk
+does not change any result; only the cost of distributing and storing chunks changes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from urdfkin.validation.comparison import SecondOracleModel, tallies
 from urdfkin.validation.error_stats import Key, Tally
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import RobotSummary
-from urdfkin.validation.timings import Clock, total
+from urdfkin.validation.timings import Timings
 from urdfkin.verify.oracle import Oracle
 from urdfkin.verify.oracles import PINOCCHIO
 
@@ -32,12 +32,11 @@ from urdfkin.verify.oracles import PINOCCHIO
 DRAWN = 25
 #: Number of special configurations before the random configurations.
 SPECIAL = 3
-#: Minimum number of chunks of a robot, so that several workers can share the robot.
-#: With fewer samples than this number, each chunk has one sample.
-_CHUNKS = 8
+#: Minimum number of chunks of a robot with at least 200 samples, so that several workers can share the robot.
+_MIN_CHUNKS = 8
 #: Maximum number of draws in a chunk.
 #: For a typical robot, 40 draws take one second and give a few kilobytes of results.
-_DRAWS = 40
+_MAX_DRAWS = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +44,8 @@ class Chunk:
     """A range of samples of one robot.
 
     Attributes:
-        seed: Seed of the samples. The random generator of a draw is initialized with this seed and the index
-            of the draw.
-        index: Index of the chunk within the robot.
+        seed: Seed of the samples. This seed and the index of a draw initialize the draw's random generator.
+        index: Index of the chunk among the robot's chunks.
         first: Index of the chunk's first draw.
         samples: Number of random configurations.
         memory: Bytes that the robot may use; None: half of the free memory of the machine.
@@ -70,7 +68,6 @@ class Chunk:
         return 0 if self.first == 0 else SPECIAL + self.first * DRAWN
 
     def draw(self, tree: KinematicTree) -> Samples:
-        """Draw the samples; they do not depend on the machine, the workers or the chunk size."""
         drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAWN)))]
         return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
 
@@ -93,8 +90,8 @@ class ChunkResult:
     tallies: dict[Key, Tally]
     samples: int
     seconds: float
-    clock: Clock
-    portrait: RobotSummary | None
+    timings: Timings
+    summary: RobotSummary | None
 
     def __add__(self, other: ChunkResult) -> ChunkResult:
         return ChunkResult(
@@ -104,8 +101,8 @@ class ChunkResult:
             tallies={key: tally + other.tallies[key] for key, tally in self.tallies.items()},
             samples=self.samples + other.samples,
             seconds=self.seconds + other.seconds,
-            clock=total((self.clock, other.clock)),
-            portrait=self.portrait or other.portrait,
+            timings=self.timings + other.timings,
+            summary=self.summary or other.summary,
         )
 
 
@@ -122,7 +119,7 @@ class Cut:
     @property
     def _draws(self) -> int:
         """Number of draws in each chunk of a robot."""
-        return min(_DRAWS, max(1, -(-self.samples // DRAWN) // _CHUNKS))
+        return min(_MAX_DRAWS, max(1, -(-self.samples // DRAWN) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
         """Number of chunks of a robot; at least one, for the special configurations."""
@@ -135,7 +132,7 @@ class Cut:
         return Chunk(subject, seed, index, first, samples, most)
 
     def configurations(self, chunks: range) -> int:
-        """Return the number of samples in a range of chunks."""
+        """Return the number of samples in a range of chunks, including the special configurations."""
         if not chunks:
             return 0
         size = self._draws * DRAWN
@@ -143,24 +140,24 @@ class Cut:
         return random + (SPECIAL if chunks.start == 0 else 0)
 
 
-def chunks(subject: RobotInput, samples: int, seed: int, most: int | None = None) -> Iterator[Chunk]:
+def chunks(subject: RobotInput, samples: int, seed: int) -> Iterator[Chunk]:
     cut = Cut(samples)
-    return (cut.chunk(subject, seed, index, most) for index in range(len(cut)))
+    return (cut.chunk(subject, seed, index) for index in range(len(cut)))
 
 
-#: Cache of the latest robot.
-#: A worker gets the chunks of a robot one after another, and reads the robot only once.
+_Models = tuple[Robot, Oracle, SecondOracleModel | None]
+#: Cache of the latest robot, because a worker gets the chunks of a robot one after another.
 #: Two large robots at a time would need too much memory.
-_cache: dict[RobotInput, tuple[Robot, Oracle, SecondOracleModel | None]] = {}
+_cache: dict[RobotInput, _Models] = {}
 
 
-def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondOracleModel | None]:
+def _load(chunk: Chunk) -> _Models:
     if (found := _cache.get(chunk.subject)) is not None:
         return found
     _cache.clear()
     robot = chunk.subject.load()
-    most = memory.share() if chunk.memory is None else chunk.memory
-    memory.demand(robot.tree, chunk.samples + SPECIAL, most)  # the first chunk is the largest
+    most = memory.limit() if chunk.memory is None else chunk.memory
+    memory.check(robot.tree, chunk.samples + SPECIAL, most)  # the first chunk is the largest
     second = None
     if (by := robot.verifier.library) is not PINOCCHIO:
         second = SecondOracleModel(by, robot.verifier.oracle(by=by))
@@ -170,14 +167,14 @@ def _loaded(chunk: Chunk) -> tuple[Robot, Oracle, SecondOracleModel | None]:
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
-    """Compare the quantities of every frame in all reference frames with the oracle's."""
-    begin, clock = time.perf_counter(), Clock()
-    robot, oracle, second = _loaded(chunk)
-    portrait = RobotSummary.of(robot, oracle) if chunk.index == 0 else None
-    clock.read = time.perf_counter() - begin
-    found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, clock, second)
+    """Compare all quantities of all frames in all reference frames with the oracle."""
+    begin, timings = time.perf_counter(), Timings()
+    robot, oracle, second = _load(chunk)
+    summary = RobotSummary.of(robot, oracle) if chunk.index == 0 else None
+    timings.read = time.perf_counter() - begin
+    found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
     seconds = time.perf_counter() - begin
-    clock.close(seconds)
+    timings.close(seconds)
     return ChunkResult(
         name=robot.name,
         joints=robot.joint_names,
@@ -185,6 +182,6 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
         tallies=found,
         samples=chunk.configurations,
         seconds=seconds,
-        clock=clock,
-        portrait=portrait,
+        timings=timings,
+        summary=summary,
     )

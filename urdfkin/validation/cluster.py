@@ -14,7 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import metadata
 from itertools import chain
 from typing import Any
@@ -24,47 +24,48 @@ from distributed import Client, Future, KilledWorker, Scheduler, SpecCluster, Wo
 
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.urdf.sources import Origin
-from urdfkin.validation import remote
-from urdfkin.validation.answer import Answer, Failure, failure
-from urdfkin.validation.engines import DIED_TWICE, Enter, Task, Work, died, lost
+from urdfkin.validation import remote, results
+from urdfkin.validation.answer import CRASHED_TWICE, Answer, Failure, crash_failure, failure, lost_failure
+from urdfkin.validation.engines import Enter, Task, Work
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At most _FOR_EACH * (threads of all workers) + _MORE chunks are sent and not yet answered.
+#: At most _PER_THREAD * (threads of all workers) + _MORE chunks are sent and not yet answered.
 #: With this number of chunks, no thread waits for its next chunk.
-_FOR_EACH, _MORE = 2, 4
-#: Maximum number of times a chunk is sent when Dask loses its worker.
+_PER_THREAD, _MORE = 2, 4
+#: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
 #: A robot can only crash the process of its chunks, not Dask's worker.
 _TRIES = 20
 #: Seconds after which the number of workers is read again.
-_COUNT = 1.0
-#: Packages whose version on the scheduler, if it has them, must be that of this process.
+_INTERVAL = 1.0
+#: Packages that must have the same version on the scheduler and in this process, if the scheduler has them.
 _COMPARED = ("urdfkin", "pin")
-_NOBODY = RobotInput(b"", Origin(""))
+_NO_ROBOT = RobotInput(b"", Origin(""))
 
 
 class ClusterError(UrdfkinError, RuntimeError):
-    """Error if the cluster cannot be used, or if the connection to the cluster was lost."""
+    """The cluster cannot be used, or the connection to the cluster was lost."""
 
 
 @contextmanager
 def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
     """Yield an engine on a cluster, for `validate(executor=...)`.
 
-    The scheduler is the address of a running scheduler, such as `tls://host:8786`. `local:N` starts N workers
-    on this machine, which end with the engine and open no port. The callback `tell` receives messages about
-    the number of workers and the dashboard of a running scheduler.
+    Args:
+        scheduler: Address of a running scheduler, such as `tls://host:8786`; or `local:N` for N workers on
+            this machine, which end with the engine and open no port.
+        tell: Callback for messages: the number of workers, and the dashboard of a running scheduler.
 
     Raises:
         ClusterError: No scheduler answers at the address, or the versions of urdfkin or Pinocchio differ.
         InputError: `local:N` has no number.
     """
     with _client(scheduler) as client:
-        _demand_same(client)
+        _check_versions(client)
         threads = client.nthreads()
-        watched = f"; dashboard: {client.dashboard_link}" if client.dashboard_link else ""
-        tell(f"{len(threads)} workers{watched}")
+        dashboard = f"; dashboard: {client.dashboard_link}" if client.dashboard_link else ""
+        tell(f"{len(threads)} workers{dashboard}")
         if scheduler.startswith("tcp://"):
             tell(
                 "an address with tcp:// is not protected: anyone who reaches the scheduler can run programs;"
@@ -108,7 +109,7 @@ class _Portless:
     """Base class for a Dask scheduler and a Dask worker without a web page, which all users could open."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
-        """Start no web server; this method overrides Dask's."""
+        """Override Dask's method and start no web server."""
 
 
 class _Scheduler(_Portless, Scheduler):
@@ -121,21 +122,24 @@ class _ClusterWorker(_Portless, Worker):
 
 @contextmanager
 def _without_ports(number: int) -> Iterator[SpecCluster]:
-    """Yield a scheduler and workers in this process that open no port. Chunks run in separate processes.
+    """Yield a scheduler and workers in this process that open no port.
 
-    Dask adds its scratch folders to the front of `sys.path`. The folders are in a temporary folder of this
-    run, which only this user can access. `sys.path` is restored before any further import. If Dask opened a
-    port, ClusterError is raised.
+    Chunks run in separate processes. Dask adds its scratch folders to the front of `sys.path`. These folders
+    are in a temporary folder of this run, which only this user can access. `sys.path` is restored before any
+    further import.
+
+    Raises:
+        ClusterError: Dask has opened a port.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
-        here: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
-        local = {"nthreads": 1, "memory_limit": 0, "local_directory": scratch, "dashboard": False}
+        scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
+        worker = {"nthreads": 1, "memory_limit": 0, "local_directory": scratch, "dashboard": False}
         path = list(sys.path)
         with (
             dask.config.set({"temporary-directory": scratch}),
             SpecCluster(
-                scheduler={"cls": _Scheduler, "options": here},
-                workers={place: {"cls": _ClusterWorker, "options": local} for place in range(number)},
+                scheduler={"cls": _Scheduler, "options": scheduler},
+                workers={i: {"cls": _ClusterWorker, "options": worker} for i in range(number)},
                 silence_logs=logging.ERROR,
             ) as cluster,
         ):
@@ -153,28 +157,27 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
                 remote.end_idle()
 
 
-def _demand_same(client: Client) -> None:
+def _check_versions(client: Client) -> None:
     """Raise ClusterError if a worker or the scheduler has other versions than this process.
 
     The caller must not send anything to the workers or the scheduler before this check.
     """
-    for worker, found in client.run(remote.computes, on_error="return").items():
+    for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
-            raise ClusterError(
-                "a worker cannot run urdfkin", where=worker, found=str(found),
-                remedy=f"install urdfkin {version('urdfkin')} on the worker's machine",
-            )  # fmt: skip
-        _demand_code(worker, found)
+            remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"
+            raise ClusterError("a worker cannot run urdfkin", where=worker, found=str(found), remedy=remedy)
+        _check_code(worker, found)
     for name in _COMPARED:
         try:
             found = client.run_on_scheduler(metadata.version, name)
         except Exception:  # the scheduler computes nothing and does not need the package
             continue
-        if found != version(name) and version(name) != "a checkout":
-            _refuse("scheduler", [f"{name} {found} on the cluster and {version(name)} on this machine"])
+        own = version(name)
+        if own not in (found, "a checkout"):
+            _raise_difference("scheduler", [f"{name} {found} on the cluster and {own} on this machine"])
 
 
-def _demand_code(worker: str, found: dict[str, str]) -> None:
+def _check_code(worker: str, found: dict[str, str]) -> None:
     local = provenance()
     differences = [
         f"{k} {found.get(k, 'none')[:12]} on the cluster and {local[k][:12]} on this machine"
@@ -182,30 +185,27 @@ def _demand_code(worker: str, found: dict[str, str]) -> None:
         if found.get(k) != local[k]
     ]
     if differences:
-        _refuse(worker, differences)
+        _raise_difference(worker, differences)
 
 
-def _refuse(where: str, differences: list[str]) -> None:
+def _raise_difference(where: str, differences: list[str]) -> None:
     raise ClusterError(
-        "the cluster and this machine have different versions of the"
-        " code", where=where, found=", ".join(differences),
+        "the cluster and this machine have different versions of the code",
+        where=where,
+        found=", ".join(differences),
         remedy="install the same versions on all machines; results of different versions are not mixed",
-    )  # fmt: skip
-
-
-@dataclass(slots=True)
-class _Flight:
-    task: Task
-    tries: int = 1
+    )
 
 
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        self._flying: dict[Future[Any], _Flight] = {}
+        #: Task of each chunk that is sent but not yet answered, and how many times the chunk was sent.
+        self._pending: dict[Future[Any], tuple[Task, int]] = {}
+        #: Text of each robot on the workers, and the number of chunks that need this text.
         self._robots: dict[int, Future[bytes]] = {}
         self._in_use = Counter[int]()
-        self._room, self._counted = _MORE, float("-inf")
+        self._limit, self._counted = _MORE, float("-inf")
 
     def run(self, work: Work, enter: Enter) -> None:
         """Run the tasks.
@@ -215,78 +215,74 @@ class Cluster:
                 urdfkin or Pinocchio.
         """
         waiting, failed = chain.from_iterable(work), set[int]()
-        landed = as_completed(loop=self._client.loop)
+        completed = as_completed(loop=self._client.loop)
         try:
             while True:
-                while len(self._flying) < self._count() and (task := next(waiting, None)) is not None:
+                while len(self._pending) < self._limit_now() and (task := next(waiting, None)) is not None:
                     if task.robot in failed:
                         continue
                     try:
-                        landed.add(self._send(_Flight(task)))
+                        completed.add(self._send(task, 1))
                     except (UrdfkinError, OSError) as error:  # the text of the robot cannot be read
                         failed.add(task.robot)
                         enter(task, failure(task.chunk.subject, error))
-                if not self._flying:
+                if not self._pending:
                     return
-                future = next(landed)
-                flight = self._flying.pop(future)
-                found = self._found(future, flight)
+                future = next(completed)
+                task, tries = self._pending.pop(future)
+                found = self._found(future, task, tries)
                 if found is None:
-                    landed.add(self._send(_Flight(flight.task, flight.tries + 1)))
-                    self._forget(flight.task.robot)
-                    continue
-                if isinstance(found, Failure):
-                    failed.add(flight.task.robot)
-                enter(flight.task, found)
-                self._forget(flight.task.robot)
+                    completed.add(self._send(task, tries + 1))
+                else:
+                    if isinstance(found, Failure):
+                        failed.add(task.robot)
+                    enter(task, found)
+                self._forget(task.robot)
         finally:
             if self._client.status == "running":
-                self._client.cancel(list(self._flying))
-            self._flying.clear()
+                self._client.cancel(list(self._pending))
+            self._pending.clear()
             self._robots.clear()
 
-    def _count(self) -> int:
-        """Return the largest number of chunks that may be sent but not yet answered."""
-        if time.monotonic() - self._counted > _COUNT and self._client.status == "running":
+    def _limit_now(self) -> int:
+        """Return the maximum number of chunks that may be sent but not yet answered."""
+        if time.monotonic() - self._counted > _INTERVAL and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
-            self._room, self._counted = _FOR_EACH * threads + _MORE, time.monotonic()
-        return self._room
+            self._limit, self._counted = _PER_THREAD * threads + _MORE, time.monotonic()
+        return self._limit
 
-    def _send(self, flight: _Flight) -> Future[Any]:
-        task = flight.task
+    def _send(self, task: Task, tries: int) -> Future[Any]:
         if (robot := self._robots.get(task.robot)) is None:
             data = pickle.dumps(task.chunk.subject.carried())
             robot = self._robots[task.robot] = self._client.submit(remote.hold, data, pure=False)
-        chunk = pickle.dumps(replace(task.chunk, subject=_NOBODY))
+        chunk = pickle.dumps(replace(task.chunk, subject=_NO_ROBOT))
         future = self._client.submit(remote.run, robot, chunk, provenance(), pure=False)
-        self._flying[future] = flight
+        self._pending[future] = task, tries
         self._in_use[task.robot] += 1
         return future
 
     def _forget(self, robot: int) -> None:
-        """Release the text of a robot without a chunk on the workers; the text can be sent again."""
+        """Release a robot's text on the workers after its last chunk; the text can be sent again."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]
             self._robots.pop(robot, None)
 
-    def _found(self, future: Future[Any], flight: _Flight) -> Answer | None:
+    def _found(self, future: Future[Any], task: Task, tries: int) -> Answer | None:
         """Return the answer of a finished chunk; None if the chunk must be sent again."""
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as gone:  # results come through the scheduler, which is lost
-                raise self._lost() from gone
-            return self._answer(result, flight.task)
+            except OSError as lost:  # the scheduler, which transfers the results, is lost
+                raise self._lost() from lost
+            return _answer(result, task)
         if self._client.status != "running":
             raise self._lost()
         error = future.exception() if future.status == "error" else None
-        if flight.tries < _TRIES and (error is None or isinstance(error, KilledWorker)):
+        if tries < _TRIES and (error is None or isinstance(error, KilledWorker)):
             return None
-        return lost(
-            "the cluster lost the chunk",
-            error if isinstance(error, Exception) else RuntimeError(future.status),
-        )
+        known = error if isinstance(error, Exception) else RuntimeError(future.status)
+        return lost_failure("the cluster lost the chunk", known)
 
     def _lost(self) -> ClusterError:
         return ClusterError(
@@ -295,10 +291,11 @@ class Cluster:
             remedy="start the scheduler again and repeat the same command; a store keeps the finished chunks",
         )
 
-    def _answer(self, found: remote.Found, task: Task) -> Answer:
-        if found[0] == "died":
-            return died(task.chunk.subject, DIED_TWICE, found[1])
-        if found[0] == "other code":
-            _demand_code("a worker", found[1])
-        answer: Answer = pickle.loads(found[1])  # type: ignore[arg-type]
-        return answer
+
+def _answer(found: remote.Found, task: Task) -> Answer:
+    if found[0] == "died":
+        return crash_failure(task.chunk.subject, CRASHED_TWICE, found[1])
+    if found[0] == "other code":
+        _check_code("a worker", found[1])
+    answer: Answer = pickle.loads(found[1])  # type: ignore[arg-type]
+    return answer

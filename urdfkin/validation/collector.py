@@ -18,7 +18,7 @@ from urdfkin.validation.error_stats import Key, Tally, plus
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_input import RobotInput
-from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
+from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
 from urdfkin.verify.oracles import ORACLES
 
 
@@ -67,7 +67,7 @@ class ResultCollector:
 
     def begin(self) -> None:
         if self._progress is not None:
-            self._progress(self.standing(self._subjects[0].label if self._subjects else ""))
+            self._progress(self.state(self._subjects[0].label if self._subjects else ""))
 
     def enter(self, task: Task, found: Answer, *, kept: bool = False) -> None:
         """Add an answer, and report the progress; `kept` is True if an earlier run computed the answer."""
@@ -79,9 +79,9 @@ class ResultCollector:
         self._robots_done += robot.over and not was_over
         self._failures += robot.has_failed and not had_failed
         if self._progress is not None:
-            self._progress(self.standing(self._subjects[task.robot].label))
+            self._progress(self.state(self._subjects[task.robot].label))
 
-    def standing(self, label: str = "") -> CampaignProgress:
+    def state(self, label: str = "") -> CampaignProgress:
         return CampaignProgress(
             robots_done=self._robots_done,
             robots=sum(bool(robot.part) for robot in self._robots),
@@ -102,6 +102,7 @@ class ResultCollector:
                 yield index
 
     def give_up(self, found: Failure) -> None:
+        """Add a failure to each robot that is not finished."""
         for robot in self._robots:
             if not robot.over:
                 robot.failures[len(self._cut)] = found
@@ -117,7 +118,8 @@ class _RobotAnswers:
     def __init__(self, part: range) -> None:
         self.part = part
         self.failures: dict[int, Failure] = {}
-        self._runs: list[tuple[range, ChunkResult]] = []
+        #: Disjoint ranges of chunks in ascending order, each with the sum of the results of its chunks.
+        self._sums: list[tuple[range, ChunkResult]] = []
         self._has_disagreed = False
 
     def enter(self, index: int, found: Answer) -> None:
@@ -128,19 +130,19 @@ class _RobotAnswers:
             self._add(range(index, index + 1), found)
 
     def _add(self, chunks: range, found: ChunkResult) -> None:
-        """Merge a result with the adjacent ranges of chunks."""
-        at = next((i for i, (run, _) in enumerate(self._runs) if run.start > chunks.start), len(self._runs))
-        if at and self._runs[at - 1][0].stop == chunks.start:
+        """Add a result to the sums of the adjacent ranges of chunks."""
+        at = next((i for i, (run, _) in enumerate(self._sums) if run.start > chunks.start), len(self._sums))
+        if at and self._sums[at - 1][0].stop == chunks.start:
             at -= 1
-            before, result = self._runs.pop(at)
+            before, result = self._sums.pop(at)
             chunks, found = range(before.start, chunks.stop), result + found
-        if at < len(self._runs) and self._runs[at][0].start == chunks.stop:
-            after, result = self._runs.pop(at)
+        if at < len(self._sums) and self._sums[at][0].start == chunks.stop:
+            after, result = self._sums.pop(at)
             chunks, found = range(chunks.start, after.stop), found + result
-        self._runs.insert(at, (chunks, found))
+        self._sums.insert(at, (chunks, found))
 
     def __contains__(self, index: int) -> bool:
-        return index in self.failures or any(index in run for run, _ in self._runs)
+        return index in self.failures or any(index in run for run, _ in self._sums)
 
     @property
     def has_failed(self) -> bool:
@@ -149,28 +151,29 @@ class _RobotAnswers:
     @property
     def done(self) -> int:
         """Number of chunks that are finished or no longer needed."""
-        return len(self.part) if self.failures else sum(len(run) for run, _ in self._runs)
+        return len(self.part) if self.failures else sum(len(run) for run, _ in self._sums)
 
     @property
     def over(self) -> bool:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
+        """Return the report of the robot; `wanted` is the requested number of samples."""
         # Results after the failed chunk are left out: their number depends on the speed of the workers.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
-        results = [result for run, result in self._runs if run.start < last]
+        results = [result for run, result in self._sums if run.start < last]
         found = reduce(add, results) if results else None
         tallies = found.tallies if found else {}
-        portrait = (found.portrait if found else None) or NO_PORTRAIT
-        if failure is not None and portrait is NO_PORTRAIT:
-            portrait = failure.portrait
+        summary = (found.summary if found else None) or EMPTY_SUMMARY
+        if failure is not None and summary is EMPTY_SUMMARY:
+            summary = failure.summary
         samples = found.samples if found else 0
-        verdict, reasons = _verdict(tallies, portrait, failure, samples, wanted)
-        known = found.name if found else portrait.model["name"] if portrait.model else subject.label
+        verdict, reasons = _verdict(tallies, summary, failure, samples, wanted)
+        name = found.name if found else summary.model["name"] if summary.model else subject.label
         return RobotReport(
             origin=subject.origin,
-            name=known,
+            name=name,
             verdict=verdict,
             reason="; ".join(reasons) or None,
             joints=found.joints if found else (),
@@ -178,17 +181,17 @@ class _RobotAnswers:
             tallies=tallies,
             samples=samples,
             seconds=found.seconds if found else 0.0,
-            portrait=portrait,
-            clock=found.clock if found else None,
+            summary=summary,
+            timings=found.timings if found else None,
             error=failure.error if failure else None,
         )
 
 
 def _verdict(
-    tallies: dict[Key, Tally], portrait: RobotSummary, failure: Failure | None, samples: int, wanted: int
+    tallies: dict[Key, Tally], summary: RobotSummary, failure: Failure | None, samples: int, wanted: int
 ) -> tuple[ValidationVerdict, list[str]]:
-    """Return the verdict on a robot and all reasons for it; a disagreement takes precedence."""
-    disagreements = [*_outside(tallies), *portrait.disagreements]
+    """Return the verdict on a robot and all reasons for the verdict; a disagreement takes precedence."""
+    disagreements = [*_outside(tallies), *summary.disagreements]
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:
         verdict, reasons = failure.verdict, [failure.reason]
@@ -201,11 +204,12 @@ def _verdict(
 
 
 def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
+    """Yield sentences about results outside their bound."""
     failed = sum(tally.failed for tally in tallies.values())
     if failed:
         results = sum(tally.results for tally in tallies.values())
         yield f"{failed:,} of {results:,} results lie outside their bound"
-    found = reduce(plus, (tally.three_sides for tally in tallies.values()), None)
+    found = reduce(plus, (tally.cross_check for tally in tallies.values()), None)
     if found is not None and found.urdfkin.failed:
         ours, theirs, second_oracle = found.alone
         title = ORACLES[found.by].title

@@ -1,8 +1,8 @@
 """Compare every frame of a robot with Pinocchio, for a batch of samples.
 
-Frames are compared in blocks, which limits the memory for every robot. The largest arrays are the Jacobians,
-with samples * frames * 6 * nv numbers. The results of a frame do not depend on the block that contains the
-frame, so the report does not depend on the division into blocks.
+Frames are compared in blocks, to limit the memory. The largest arrays are the Jacobians, with
+samples * frames * 6 * nv numbers. The results of a frame do not depend on the block that contains the frame,
+so the report does not depend on the division into blocks.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from urdfkin.compiled.plan import compile_tree
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import Samples
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, freed
+from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, without_mimic_rules
 from urdfkin.robot import Robot
-from urdfkin.validation.error_stats import Inputs, Key, Tally, ThreeSides, tally, three_sides
-from urdfkin.validation.timings import Clock
+from urdfkin.validation.error_stats import CrossCheck, Inputs, Key, Tally, cross_check, tally
+from urdfkin.validation.timings import Timings
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import OracleLibrary
@@ -37,17 +37,17 @@ class SecondOracleModel:
     library: OracleLibrary
     oracle: Oracle
 
-    def three_sides(
+    def cross_check(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
-    ) -> ThreeSides:
+    ) -> CrossCheck:
         """Compare the results of three libraries, for the frames or joints of a block."""
-        answers = block.clock.timed("second", row.ask, self.oracle, block.asked(row, reference))
+        second = block.timings.timed("second", row.ask, self.oracle, block.query(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
         if row.of == "joints":
-            bounds = (block.part(one) for one in bounds)
-        return three_sides(self.library.name, ours, theirs, answers, *bounds)
+            bounds = (block.joint_part(one) for one in bounds)
+        return cross_check(self.library.name, ours, theirs, second, *bounds)
 
 
 def tallies(
@@ -55,15 +55,15 @@ def tallies(
     oracle: Oracle,
     x: Samples,
     first_sample: int,
-    clock: Clock,
+    timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, Tally]:
     """Return the error statistics of each quantity of a robot in each reference frame.
 
-    `oracle` is Pinocchio's model. The clock receives the computing times.
+    `oracle` is Pinocchio's model. The computing times are added to `timings`.
     """
     found: dict[Key, Tally] = {}
-    work = robot, oracle, x, first_sample, clock
+    work = robot, oracle, x, first_sample, timings
     for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
         for key, part in _Block(*work, frames).tallies(second):
             found[key] = found[key].beside(part) if key in found else part
@@ -72,7 +72,7 @@ def tallies(
 
 
 def frame_bytes(samples: int, nv: int) -> int:
-    """Return the size (bytes) of a frame's largest array: the Jacobians, or the placements if nv is small."""
+    """Return the bytes of a frame's largest array: the Jacobians, or the placements if nv is small."""
     return samples * 8 * max(16, 6 * nv)
 
 
@@ -84,10 +84,9 @@ def blocks(count: int, size: int) -> Iterator[slice]:
 
 
 class _ComparisonBatch:
-    def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock) -> None:
-        self.robot, self.oracle, self.x, self.first, self.clock = robot, oracle, x, first_sample, clock
-        rows = zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True)
-        self.inputs: list[Inputs] = list(rows)
+    def __init__(self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings) -> None:
+        self.robot, self.oracle, self.x, self.first, self.timings = robot, oracle, x, first_sample, timings
+        self.inputs: list[Inputs] = list(zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True))
 
     def tally(self, ours: FloatArray, theirs: FloatArray, bound: Bound, names: tuple[str, ...]) -> Tally:
         return tally(ours, theirs, bound, names, self.first, self.inputs)
@@ -97,9 +96,9 @@ class _Block(_ComparisonBatch):
     """The comparisons for a block of frames, and for each joint whose child link is in the block."""
 
     def __init__(
-        self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, clock: Clock, frames: slice
+        self, robot: Robot, oracle: Oracle, x: Samples, first_sample: int, timings: Timings, frames: slice
     ) -> None:
-        super().__init__(robot, oracle, x, first_sample, clock)
+        super().__init__(robot, oracle, x, first_sample, timings)
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
@@ -117,24 +116,25 @@ class _Block(_ComparisonBatch):
     def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
         """Yield the error statistics of each quantity.
 
-        The result of a joint is the result of its child link. Pinocchio computes the two results with
-        different functions.
+        The result for a joint is the result for the joint's child link. Pinocchio computes the two results
+        with different functions.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.clock.timed("urdfkin", row.ours, self.plan, inputs, reference)
+                ours = self.timings.timed("urdfkin", row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
                 yield self._compare(row, reference, ours, bound, second)
                 for joint in joints:
-                    yield self._compare(joint, reference, ours[:, self.joint_rows], self.part(bound), second)
+                    own, joint_bound = ours[:, self.joint_rows], self.joint_part(bound)
+                    yield self._compare(joint, reference, own, joint_bound, second)
 
-    def part(self, bound: Bound) -> Bound:
+    def joint_part(self, bound: Bound) -> Bound:
         """Return the bounds of the block's joints, from the bounds of the block's frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
-    def asked(self, row: Quantity, reference: Reference | None) -> QueryBatch:
+    def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
         joints = row.of == "joints"
         frames = [JointFrame.of(name) for name in self.joint_names] if joints else self.frames
         inputs = self.x.q, self.x.v, self.x.a
@@ -150,25 +150,27 @@ class _Block(_ComparisonBatch):
         second: SecondOracleModel | None,
     ) -> tuple[Key, Tally]:
         names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.clock.timed("pinocchio", row.ask, self.oracle, self.asked(row, reference))
+        theirs = self.timings.timed("pinocchio", row.ask, self.oracle, self.query(row, reference))
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
-            found = replace(found, three_sides=second.three_sides(self, row, reference, ours, theirs))
+            found = replace(found, cross_check=second.cross_check(self, row, reference, ours, theirs))
         return (row.name, reference.name.lower() if reference is not None else ""), found
 
 
 class _Screws(_ComparisonBatch):
     """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
 
-    Each column of `data.J` belongs to one joint. It equals a column of this joint's Jacobian in the reference
-    frame WORLD.
+    Each column of `data.J` belongs to one joint, and equals a column of the Jacobian of this joint in the
+    reference frame WORLD.
     """
 
     def tallies(self) -> Iterator[Tally]:
         robot, x = self.robot, self.x
-        tree = freed(robot.tree)
+        tree = without_mimic_rules(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.clock.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(1, 2)
+        theirs = self.timings.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(
+            1, 2
+        )
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in blocks(len(moving), frame_bytes(len(x.q), tree.nv)):
@@ -182,7 +184,7 @@ class _Screws(_ComparisonBatch):
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, STILL_STATE)
-        J = self.clock.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
+        J = self.timings.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
@@ -193,11 +195,11 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations of the tree `free`, whose former mimic joints have the values of their rules."""
-    spread = np.empty((len(q), free.nq))
+    """Return configurations of `free`, a tree without mimic rules; the rules of `tree` give the values."""
+    expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]
         if joint.mimic:
             own = joint.mimic.multiplier * own + joint.mimic.offset
-        spread[:, free_at : free_at + joint.kind.nq] = own
-    return spread
+        expanded[:, free_at : free_at + joint.kind.nq] = own
+    return expanded

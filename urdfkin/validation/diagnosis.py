@@ -1,9 +1,9 @@
 """Find common mistakes that explain a wrong result of a user's function.
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
-and joints in another order. The module makes each mistake deliberately in urdfkin's own results. A mistake is
-named if it makes the largest difference from the user's results at least a thousand times smaller. If several
-mistakes lead to the same results, all of them are named.
+and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
+results with the user's results. A mistake is named if the largest difference becomes at least a thousand
+times smaller. If several mistakes lead to the same results, up to three of them are named.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake is named if at most this fraction of the difference remains.
-#: The remaining difference is that between the user's results and urdfkin's results with the mistake.
+#: Largest fraction of the difference that may remain if a mistake explains the results.
 EXPLAINED = 1e-3
-#: Largest number of explanations that are named.
+#: Maximum number of named mistakes.
 _MOST = 3
-#: Number of configurations in the test whether two joints are exchanged.
+#: Number of configurations in the first test for two exchanged joints.
 _FEW = 4
-#: Differences are divided by their scale.
-#: A scale of 0 is replaced by the largest scale times this number.
+#: Smallest scale by which a difference is divided, relative to the largest scale.
 _LEAST = 1e-9
+#: Maximum difference, relative to the scale, at which two results count as equal.
+_EQUAL = 1e-9
+#: Order of the rows of a six-vector with exchanged linear and angular halves.
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
-#: Inputs of a function: q, q and v, or q, v and a.
-#: From changed inputs, urdfkin computes the results of a function with a mistake.
+#: Inputs of a function: q, or q and v, or q, v and a.
 Inputs = tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The function's results and urdfkin's results, in which `diagnose` looks for common mistakes.
+    """The results of the function and of urdfkin for some configurations.
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
@@ -62,28 +62,30 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the fraction of the first n differences that remains after a simulated mistake.
+        """Return the fraction of the largest difference that remains after a mistake; 0: fully explained.
 
-        The fraction is 0 if urdfkin's results with the mistake (`predicted`) equal the user's results.
+        `predicted` are urdfkin's results with the mistake. With `n`, only the first n results are compared.
         """
-        scale = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
+        scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
             whole = float((np.abs(self.found[:n] - self.expected[:n]) / scale).max())
             left = float((np.abs(self.found[:n] - predicted) / scale).max())
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        """Return whether a mistake has no effect: the predicted results equal the expected ones."""
-        size = np.maximum(self.scale, _LEAST * self.scale.max(initial=_LEAST))
-        return bool((np.abs(predicted - self.expected) <= _LEAST * size).all())
+        """Return whether the predicted results equal the expected results: the mistake has no effect."""
+        return bool((np.abs(predicted - self.expected) <= _EQUAL * self._nonzero_scale()).all())
+
+    def _nonzero_scale(self, n: int | None = None) -> FloatArray:
+        scale: FloatArray = np.maximum(self.scale[:n], _LEAST * self.scale[:n].max(initial=_LEAST))
+        return scale
 
     def first(self, n: int) -> Inputs:
-        """Return the inputs of the first n configurations."""
         return tuple(x[:n] for x in self.inputs)
 
 
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
-    """Return at most three sentences about the mistakes that explain the results; the list may be empty.
+    """Return at most three sentences about the mistakes that explain the results.
 
     Each mistake is also combined with exchanged linear and angular halves of the six-vectors. Such a
     combination is named only if no single mistake explains the results.
@@ -115,9 +117,10 @@ Mistake = tuple[str, Callable[[], FloatArray]]
 
 @dataclass(frozen=True)
 class Mistakes:
-    """The usual mistakes of a function that computes one quantity of one frame.
+    """Common mistakes of a function that computes one quantity of one frame.
 
-    `conversion` belongs to the function's convention; None: the convention is urdfkin's.
+    Attributes:
+        conversion: Conversion to the function's convention; None: urdfkin's convention.
     """
 
     robot: Robot
@@ -128,13 +131,13 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """A sentence about exchanged linear and angular rows; empty for a quantity without these halves."""
+        """A sentence about exchanged linear and angular rows; empty if the quantity has no such rows."""
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
 
     @property
     def expected_halves(self) -> str:
-        """A sentence that states which rows come first in the convention: the linear or the angular rows."""
+        """A sentence about the order of linear and angular rows in the convention."""
         tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
         return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
 
@@ -143,7 +146,7 @@ class Mistakes:
         return self.conversion is not None and self.conversion.angular_first
 
     def all(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield all mistakes that can be tested, beginning with the simplest mistakes."""
+        """Yield the mistakes, the simplest first."""
         yield from self._of_references(case)
         if self.row.name == "acceleration":
             yield from self._of_accelerations(case)
@@ -204,10 +207,7 @@ class Mistakes:
         return found if self.conversion is None else self.conversion.six(found)
 
     def _ours(self, inputs: Inputs) -> Inputs:
-        if self.conversion is None:
-            return inputs
-        found = self.conversion.from_(*inputs)
-        return found if isinstance(found, tuple) else (found,)
+        return inputs if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
 
     def _of_placements(self, case: Diagnosis) -> Iterator[Mistake]:
         yield "the placement is inverted", partial(np.asarray, np.linalg.inv(case.expected))
@@ -236,7 +236,7 @@ class Mistakes:
             )
 
     def _of_units(self, case: Diagnosis) -> Iterator[Mistake]:
-        turns = self._turning()
+        turns = [(q, v) for _, q, v, turns in self._axes() if turns]
         lengths = case.expected.copy()
         if self.row.name.endswith("placement"):
             lengths[:, :3, 3] *= 1000.0
@@ -257,14 +257,10 @@ class Mistakes:
                 everywhere = self._scaled(case.inputs, turns, factor, 3)
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
-    def _turning(self) -> list[tuple[int, int]]:
-        """Return the indices in the function's q and v of each joint whose coordinate is a single angle."""
-        return [(q, v) for _, q, v, turns in self._axes() if turns]
-
     def _axes(self) -> list[tuple[str, int, int, bool]]:
         """Return (name, index in q, index in v, is an angle) for each joint with one coordinate.
 
-        The indices are those of the function's convention.
+        The indices belong to the function's convention.
         """
         tree = self.robot.tree
         found = []
@@ -281,7 +277,10 @@ class Mistakes:
 
     @staticmethod
     def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Return the inputs with the values of some joints, in the first inputs only, times a factor."""
+        """Multiply the values of some joints, only in the first `count` inputs, by a factor.
+
+        `at` has the indices of each joint in q and in v.
+        """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
             x[:, [pair[min(k, 1)] for pair in at]] *= factor
@@ -300,7 +299,8 @@ class Mistakes:
         frame, method = self.frame, getattr(free, self.row.method)
         named = {} if self.reference is None else {"reference": self.reference}
 
-        def spread(x: FloatArray, letter: str, *, moving: bool) -> FloatArray:
+        def expand(x: FloatArray, letter: str, *, moving: bool) -> FloatArray:
+            """Return q, v or a for all joints; without `moving`, the mimic joints are at 0."""
             names = free.coordinate_names if letter == "q" else free.rate_names
             ours = self.robot.coordinate_names if letter == "q" else self.robot.rate_names
             found = np.zeros((len(x), len(names)))
@@ -314,7 +314,7 @@ class Mistakes:
 
         def result(moving: str) -> FloatArray:
             inputs = [
-                spread(x, letter, moving=letter in moving)
+                expand(x, letter, moving=letter in moving)
                 for letter, x in zip("qva", case.inputs, strict=False)
             ]
             found: FloatArray = method(*inputs, frame, verify=False, **named)
@@ -330,9 +330,9 @@ class Mistakes:
         yield f"the mimic joints ({listed}) do not move", partial(result, "")
 
     def _of_joints(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the mistakes about single joints: a reversed sign, or two exchanged joints.
+        """Yield mistakes about single joints: a reversed sign, or two exchanged joints.
 
-        If the quantity is a Jacobian, its columns are reversed or exchanged as well.
+        The columns of a Jacobian are reversed or exchanged as well.
         """
         axes = self._axes()
         for name, q, v, _ in axes:
@@ -383,7 +383,7 @@ class Mistakes:
         return tuple(found)
 
     def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the joint orders of other tools, if they are permutations of urdfkin's order."""
+        """Yield the joint orders of other tools that are permutations of urdfkin's order."""
         if self.conversion is not None:
             return
         from urdfkin.model.conventions import BUILT_IN
@@ -406,7 +406,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the mistake of computing another link, for each other link."""
+        """Yield the mistake of a wrong frame, for each link."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return
@@ -419,8 +419,12 @@ class Mistakes:
             )
 
 
+def as_tuple(x: FloatArray | Inputs) -> Inputs:
+    return x if isinstance(x, tuple) else (x,)
+
+
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield mistakes of single columns of a Jacobian; the other columns may be right or wrong."""
+    """Yield mistakes in single columns of a Jacobian, with 0.0 as the unexplained fraction."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names
@@ -428,7 +432,7 @@ def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]
     size = np.maximum(case.scale, np.finfo(float).tiny)
 
     def equal(i: int, x: FloatArray) -> bool:
-        return bool((np.abs(theirs[..., i] - x) <= 1e-9 * size[..., i]).all())
+        return bool((np.abs(theirs[..., i] - x) <= _EQUAL * size[..., i]).all())
 
     wrong = [i for i in range(ours.shape[-1]) if not equal(i, ours[..., i])]
     for i in wrong:

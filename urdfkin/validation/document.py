@@ -1,4 +1,4 @@
-"""Define the types of the JSON document of a validation; its schema is generated from these types."""
+"""Types of the JSON document of a validation; the schema is generated from these types."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from typing import Annotated, Literal, NotRequired, TypedDict
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Sha256, Size, of_length, says
 from urdfkin.validation.outcome import OUTCOMES, RunOutcome, outcome
 
-Units = Annotated[
-    Size | None,
-    says(
-        "A disagreement in multiples of eps * scale. null: a result is NaN, or two values that must be equal "
-        "differ."
-    ),
+_UNDEFINED = "null: a result is NaN, or two values that must be equal differ."
+Units = Annotated[Size | None, says(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
+BoundRatio = Annotated[
+    float | None, says(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_UNDEFINED}")
 ]
+ReferenceName = Literal["local", "world", "local_world_aligned"]
 
 
 class ReportedLimit(TypedDict):
@@ -33,18 +32,14 @@ class ReportedMimic(TypedDict):
     offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
 
 
-class Kept(TypedDict):
-    """The part of a joint's range in which its mimic joints are within their limits.
+class ReportedRange(TypedDict):
+    """The part of a joint's range in which all mimic joints of this joint are within their limits.
 
     Both ends are null if the mimic joints exceed their limits everywhere in the range.
     """
 
-    lower: Annotated[
-        float | None, says("Lower end of this part of the range, rad or m; null: the part is empty.")
-    ]
-    upper: Annotated[
-        float | None, says("Upper end of this part of the range, rad or m; null: the part is empty.")
-    ]
+    lower: Annotated[float | None, says("Lower end, rad or m; null: the part is empty.")]
+    upper: Annotated[float | None, says("Upper end, rad or m; null: the part is empty.")]
     by: Annotated[list[str], says("Names of the mimic joints that reduce the joint's range.")]
 
 
@@ -57,10 +52,7 @@ class ReportedJoint(TypedDict):
         says("Kind of the joint."),
     ]
     parent: Annotated[str, says("Name of the parent link.")]
-    child: Annotated[
-        str,
-        says("Name of the child link. The frame of this link is the joint's frame after the joint motion."),
-    ]
+    child: Annotated[str, says("Name of the child link; its frame is the joint's frame after the motion.")]
     placement: Annotated[Matrix, says("Pose of the joint's frame in the parent link's frame at q = 0.")]
     axis: Annotated[
         Annotated[list[float], of_length(3)] | None,
@@ -68,28 +60,17 @@ class ReportedJoint(TypedDict):
     ]
     q: Annotated[
         int | None,
-        says(
-            "Index of the joint's first coordinate in q. A mimic joint has the index of the mimicked"
-            " joint. null: the joint has no coordinate."
-        ),
+        says("Index of the joint's first coordinate in q (mimic joint: of the mimicked joint); null: none."),
     ]
-    v: Annotated[
-        int | None, says("Index of the joint's first entry in v and in a. null: the joint has no coordinate.")
-    ]
+    v: Annotated[int | None, says("Index of the joint's first entry in v and in a; null: none.")]
     limit: Annotated[ReportedLimit | None, says("The joint's limits; null: the joint has no limits.")]
     mimic: Annotated[ReportedMimic | None, says("The rule of a mimic joint; null for other joints.")]
     kept: Annotated[
-        Kept | None,
-        says(
-            "The part of the joint's range in which its mimic joints stay within their limits. null: "
-            "the whole range, or the joint has no mimic joints."
-        ),
+        ReportedRange | None,
+        says("Range in which the joint's mimic joints are within limits; null: the joint's whole range."),
     ]
     locked: NotRequired[
-        Annotated[
-            float,
-            says("Value at which the joint is locked, in rad or m. The `kind` of a locked joint is `fixed`."),
-        ]
+        Annotated[float, says("Value of a locked joint, rad or m. The `kind` of a locked joint is `fixed`.")]
     ]
 
 
@@ -97,9 +78,7 @@ class ReportedModel(TypedDict):
     """Links and joints of the robot, in Pinocchio's order."""
 
     name: Annotated[str, says("The robot's name.")]
-    source: Annotated[
-        str, says("Source of the robot: a path, a catalogue name, - for standard input, or <text>.")
-    ]
+    source: Annotated[str, says("A path, a catalogue name, - for standard input, or <text>.")]
     path: Annotated[str | None, says("Path of the robot's file; null for a robot given as text.")]
     sha256: Annotated[Sha256, says("SHA-256 of the URDF's text as UTF-8, or of the MJCF file.")]
     mimic: Annotated[
@@ -118,17 +97,13 @@ class ReportedModel(TypedDict):
     rates: Annotated[list[str], says("Name of each entry of v and a.")]
     frames: Annotated[list[str], says("Names of all links and joints, as in Pinocchio.")]
     links: Annotated[list[str], says("Names of all links; links[i + 1] is the child of joints[i].")]
-    joints: Annotated[
-        list[ReportedJoint], says("All joints. The parent link of a joint comes before its child link.")
-    ]
+    joints: Annotated[list[ReportedJoint], says("All joints; a parent link comes before its child links.")]
 
 
 class ReportedFinding(TypedDict):
     """A finding in the URDF file, as `urdfkin check` reports it."""
 
-    code: Annotated[
-        str, says("Code of the finding, such as URDF502; `urdfkin explain CODE` explains the code.")
-    ]
+    code: Annotated[str, says("A code such as URDF502; `urdfkin explain CODE` explains the code.")]
     severity: Annotated[
         Literal["error", "warning", "note"],
         says("Severity of the finding. A file with an error is not compared with Pinocchio."),
@@ -143,15 +118,9 @@ class ReportedFinding(TypedDict):
     name: Annotated[str | None, says("Name of the link or joint with the problem; null: none.")]
     oracle: Annotated[
         Literal["refuses", "differs"] | None,
-        says(
-            "Pinocchio's behaviour: it refuses the file, or the robot that it reads differs from the "
-            "specification; null: neither."
-        ),
+        says("Whether Pinocchio refuses the file or reads another robot than specified; null: neither."),
     ]
-    also: Annotated[
-        list[int],
-        says("Line numbers of further findings of the same kind, which are merged into this finding."),
-    ]
+    also: Annotated[list[int], says("Line numbers of further findings that are merged into this finding.")]
 
 
 class ReportedDHRow(TypedDict):
@@ -159,25 +128,11 @@ class ReportedDHRow(TypedDict):
 
     joint: Annotated[str, says("Name of the joint.")]
     kind: Annotated[Literal["revolute", "continuous", "prismatic"], says("Kind of the joint.")]
-    a: Annotated[float, says("DH parameter a: translation along x, metres.")]
-    alpha: Annotated[float, says("DH parameter alpha: rotation about x, radians.")]
-    beta: Annotated[
-        float, says("Hayati parameter beta: rotation about y after alpha, radians; 0 in other rows.")
-    ]
-    d: Annotated[
-        float,
-        says(
-            "DH parameter d: translation along the joint axis, metres. The value of a prismatic joint is"
-            " added to d."
-        ),
-    ]
-    theta: Annotated[
-        float,
-        says(
-            "DH parameter theta: rotation about the joint axis, radians. The value of a revolute joint"
-            " is added to theta."
-        ),
-    ]
+    a: Annotated[float, says("Translation along x.")]
+    alpha: Annotated[float, says("Rotation about x.")]
+    beta: Annotated[float, says("Hayati parameter: rotation about y after alpha; 0 in other rows.")]
+    d: Annotated[float, says("Translation along the joint axis; a prismatic joint's value is added.")]
+    theta: Annotated[float, says("Rotation about the joint axis; a revolute joint's value is added.")]
     sense: Annotated[Literal[1, -1], says("Sign of the joint's value in d or theta.")]
 
 
@@ -197,49 +152,39 @@ class Chain(TypedDict):
     tip: Annotated[str, says("Name of the chain's tip frame.")]
     standard: ReportedDHTable
     modified: ReportedDHTable
-    samples: Annotated[
-        Count,
-        says("Number of configurations at which both tables were compared with Pinocchio; 0: no comparison."),
-    ]
+    samples: Annotated[Count, says("Number of compared configurations; 0: no comparison.")]
     metres: Annotated[
-        float | None,
-        says(
-            "Largest distance between the tip of either table and Pinocchio's tip, metres; null: no"
-            " comparison."
-        ),
+        float | None, says("Largest distance of a table's tip from Pinocchio's, metres; null: no comparison.")
     ]
     worst: Annotated[
         Units,
         says(
-            "The largest disagreement of the tip's placement, Jacobian and acceleration in eps * "
-            "scale, for both tables. null: a result is NaN, or there is no comparison."
+            "Largest disagreement of the tip's placement, Jacobian and acceleration in eps * scale, for both"
+            " tables. null: a result is NaN, or there is no comparison."
         ),
     ]
     share_of_bound: Annotated[
         float | None,
-        says(
-            "Largest ratio of a disagreement of the tables with Pinocchio to its bound. null: a result"
-            " is NaN, or there is no comparison."
-        ),
+        says("Largest ratio of a disagreement to its bound. null: a result is NaN, or no comparison."),
     ]
 
 
 class ReportedErrors(TypedDict):
     """Errors of one library relative to values with fifty digits, in eps * scale."""
 
-    worst: Annotated[float, says("Largest error of all values, in eps * scale.")]
-    typical: Annotated[float, says("Root mean square of the errors of all values, in eps * scale.")]
+    worst: Annotated[float, says("Largest error.")]
+    typical: Annotated[float, says("Root mean square of the errors.")]
 
 
-class Judged(TypedDict):
+class ReportedAccuracyLine(TypedDict):
     """Accuracy of one quantity in one reference frame."""
 
     quantity: Annotated[str, says("Name of the quantity: placement, velocity, ...")]
     reference: Annotated[
-        Literal["local", "world", "local_world_aligned", "euler angles", "quaternion"] | None,
+        ReferenceName | Literal["euler angles", "quaternion"] | None,
         says(
-            "Reference frame of the quantity; null for a placement. For analytical Jacobians: the"
-            " representation of the orientation."
+            "Reference frame; null for a placement. For analytical Jacobians: the representation of the"
+            " orientation."
         ),
     ]
     numbers: Annotated[Count, says("Number of values compared with fifty-digit values.")]
@@ -254,18 +199,14 @@ class ReportedAccuracy(TypedDict):
     samples: Annotated[Count, says("Number of configurations in the accuracy study.")]
     seed: Annotated[int, says("Seed of the random samples.")]
     moving_base: Annotated[bool, says("Whether the root link had a random motion.")]
-    lines: Annotated[list[Judged], says("One entry for each quantity and reference frame.")]
+    lines: Annotated[list[ReportedAccuracyLine], says("One entry for each quantity and reference frame.")]
 
 
 class Case(TypedDict):
-    """The sample at which the disagreement is the largest fraction of its bound."""
+    """The sample with the largest ratio of a disagreement to its bound."""
 
     sample: Annotated[
-        Count,
-        says(
-            "Index of the sample. Samples 0, 1 and 2 are the neutral configuration and the two ends of"
-            " the joint limits."
-        ),
+        Count, says("Index of the sample. Samples 0, 1 and 2: neutral, lower limits, upper limits.")
     ]
     frame: Annotated[str, says("Name of the frame: link:NAME or joint:NAME.")]
     disagreement: Units
@@ -280,13 +221,7 @@ class ReportedOraclePair(TypedDict):
 
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     worst: Units
-    share_of_bound: Annotated[
-        float | None,
-        says(
-            "Largest ratio of a disagreement to its bound. null: a result is NaN, or two values that"
-            " must be equal differ."
-        ),
-    ]
+    share_of_bound: BoundRatio
 
 
 class Alone(TypedDict):
@@ -304,9 +239,7 @@ class SecondOracle(TypedDict):
     urdfkin: ReportedOraclePair
     pinocchio: ReportedOraclePair
     alone: Alone
-    undecided: Annotated[
-        Count, says("Number of results in which all three libraries differ from each other.")
-    ]
+    undecided: Annotated[Count, says("Number of results without a majority of two libraries.")]
 
 
 class ReportedCheck(TypedDict):
@@ -314,67 +247,49 @@ class ReportedCheck(TypedDict):
 
     quantity: Annotated[str, says("Name of the quantity: placement, velocity, jacobian, ...")]
     reference: Annotated[
-        Literal["local", "world", "local_world_aligned"] | None,
-        says("Reference frame of the quantity, as named by Pinocchio; null for a placement."),
+        ReferenceName | None, says("Pinocchio's name of the reference frame; null for a placement.")
     ]
     results: Annotated[Count, says("Number of compared matrices or six-vectors.")]
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     median: Units
     p99: Units
     worst: Units
-    share_of_bound: Annotated[
-        float | None,
-        says(
-            "Largest ratio of a disagreement to its bound; above 1: a failure. null: a result is NaN, or two "
-            "values that must be equal differ."
-        ),
-    ]
+    share_of_bound: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
-        says(
-            "Smallest and largest error bound of the results, in eps * scale; null if nothing was compared."
-        ),
+        says("Smallest and largest bound of the results, in eps * scale; null: nothing was compared."),
     ]
     histogram: Annotated[
         list[Count],
         says(
-            "Number of results in each bin: below the first of `histogram_edges`, between each two "
-            "adjacent edges, above the last edge."
+            "Number of results in each bin: below the first of `histogram_edges`, between two adjacent"
+            " edges, above the last edge."
         ),
     ]
     subjects: Annotated[
         Literal["frames", "joints", "columns"],
         says(
-            "Subjects of the entries of `worst_by_subject`: the robot's frames, its joints, or the"
-            " columns of the "
-            "full Jacobian of all joints."
+            "Meaning of the entries of `worst_by_subject`: one for each frame, for each joint, or for each"
+            " column of the full Jacobian of all joints."
         ),
     ]
     worst_by_subject: Annotated[list[Units], says("The largest disagreement of each frame, joint or column.")]
     worst_case: Annotated[
-        Case | None,
-        says(
-            "The sample at which the disagreement is the largest fraction of its bound; null: no comparison."
-        ),
+        Case | None, says("Sample with the largest ratio of disagreement to bound; null: no comparison.")
     ]
     second_oracle: NotRequired[SecondOracle]
 
 
-class Timings(TypedDict):
+class ReportedTimings(TypedDict):
     """Computing times in seconds, summed over processes."""
 
     read: Annotated[
-        float,
-        says(
-            "Time to read the file and to build both models and the tables; includes compilation, if needed."
-        ),
+        float, says("Time of reading the file, of building the models and tables, and of any compilation.")
     ]
     urdfkin: Annotated[float, says("Time of computing with urdfkin.")]
     pinocchio: Annotated[float, says("Time of computing with Pinocchio.")]
     compare: Annotated[float, says("Time of computing the bounds and of the comparison.")]
-    second_oracle: NotRequired[
-        Annotated[float, says("Time of computing with the second oracle, if there is one.")]
-    ]
+    second_oracle: NotRequired[Annotated[float, says("Time of computing with the second oracle.")]]
 
 
 class ReportedSecondReading(TypedDict):
@@ -392,27 +307,23 @@ class ReportedSecondReading(TypedDict):
 class ReportedRobot(TypedDict):
     """Report of one robot."""
 
-    source: Annotated[
-        str, says("Source of the robot: a path, a catalogue name, - for standard input, or <text>.")
-    ]
+    source: Annotated[str, says("A path, a catalogue name, - for standard input, or <text>.")]
     name: Annotated[str, says("The robot's name in the URDF.")]
     verdict: Annotated[
         Literal["verified", "disagrees", "not verified", "bad input"], says("Verdict on the robot.")
     ]
     reason: Annotated[str | None, says("Reason why the robot is not verified; null if it is verified.")]
-    error: Annotated[
-        str | None, says("Traceback of an unexpected error, for a bug report; null: no such error.")
-    ]
+    error: Annotated[str | None, says("Traceback of an unexpected error; null: no such error.")]
     joints: Annotated[list[str], says("Names of the moving joints, mimic joints included.")]
     frames: Annotated[list[str], says("Names of the compared links and joints.")]
     samples: Annotated[Count, says("Number of compared configurations, including the three special ones.")]
     results: Annotated[Count, says("Number of results compared with Pinocchio.")]
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     seconds: Annotated[float, says("Computing time of this robot, seconds.")]
-    timings: Annotated[Timings | None, says("Computing times of the parts of the validation; null: unknown.")]
-    model: Annotated[
-        ReportedModel | None, says("Links and joints of the robot; null if the file could not be read.")
+    timings: Annotated[
+        ReportedTimings | None, says("Computing times of the parts of the validation; null: unknown.")
     ]
+    model: Annotated[ReportedModel | None, says("Links and joints; null: the file could not be read.")]
     findings: Annotated[list[ReportedFinding], says("Findings of the linter in the robot's file.")]
     chains: Annotated[list[Chain], says("Chains of the robot with their Denavit-Hartenberg tables.")]
     second_reader: Annotated[
@@ -428,8 +339,7 @@ class ReportedRobot(TypedDict):
 class Document(Header):
     """The output of `urdfkin validate --json`.
 
-    A version of the layout may receive new entries. An entry is removed or changes its meaning only in a new
-    version of the layout.
+    Entries may be added to a version of the layout. Removed entries and changed meanings need a new version.
     """
 
     started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]
@@ -441,13 +351,10 @@ class Document(Header):
     histogram_edges: Annotated[list[float], says("Edges of the bins of all histograms, in eps * scale.")]
     asked: Annotated[Count, says("Number of robots in the validation, including those without a report.")]
     interrupted: Annotated[bool, says("Whether the validation ended early, or its store is incomplete.")]
-    reason: Annotated[
-        str | None, says("Reason why the validation has not passed, in one line; null if it has passed.")
-    ]
+    reason: Annotated[str | None, says("One-line reason why the validation has not passed; null: passed.")]
     robots: Annotated[list[ReportedRobot], says("Reports of the robots in the requested order.")]
 
 
-#: Layout of the document; entries may be added, but none is removed or changes its meaning.
 VALIDATION = DocumentKind(
     "urdfkin-validation/1",
     Document,
@@ -458,6 +365,5 @@ VALIDATION = DocumentKind(
 
 
 def outcome_of(document: Document) -> RunOutcome:
-    """Return the outcome of the run, which follows from the verdicts of all robots."""
     verdicts = [robot["verdict"] for robot in document["robots"]]
     return outcome(verdicts, document["asked"], document["interrupted"])

@@ -17,82 +17,8 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Protocol
 
-from urdfkin.validation.answer import Answer, Failure, answer
+from urdfkin.validation.answer import Answer, Failure, answer, lost_failure
 from urdfkin.validation.chunk import Chunk
-from urdfkin.validation.outcome import ValidationVerdict
-from urdfkin.validation.robot_input import RobotInput
-
-
-class RobotTasks:
-    """The remaining tasks of a robot.
-
-    Attributes:
-        robot: Index of the robot; -1 before the first task was taken.
-        index: Index of the latest chunk that was taken. The lower this index, the more chunks of the robot
-            remain.
-    """
-
-    def __init__(self, tasks: Iterable[Task]) -> None:
-        self.robot = self.index = -1
-        self._tasks = iter(tasks)
-
-    def __iter__(self) -> Iterator[Task]:
-        return self
-
-    def __next__(self) -> Task:
-        task = next(self._tasks)
-        self.robot, self.index = task.robot, task.chunk.index
-        return task
-
-    def put_back(self, task: Task) -> None:
-        """Put a task back, so that it is the robot's next task."""
-        self._tasks = chain([task], self._tasks)
-
-
-class WorkQueue:
-    """Distribute tasks among workers; if `shared`, several workers may work on the same robot."""
-
-    def __init__(self, work: Work, *, shared: bool = True) -> None:
-        self._waiting: Iterator[RobotTasks] = map(RobotTasks, work)
-        self._shared = shared
-        self._begun: list[RobotTasks] = []
-        self._ended = set[int]()
-
-    def first(self) -> tuple[Task, RobotTasks] | None:
-        """Return a task for an idle worker, preferably of a new robot, and the robot's other tasks."""
-        for row in self._waiting:
-            self._begun.append(row)
-            if (task := self.next(row)) is not None:
-                return task, row
-        for row in sorted(self._begun, key=lambda row: row.index) if self._shared else ():
-            if (task := self.next(row)) is not None:
-                return task, row
-        return None
-
-    def next(self, row: RobotTasks) -> Task | None:
-        """Return the next task of a robot; None if no task is left, or if the robot was removed."""
-        task = next(row, None)
-        if task is None or task.robot in self._ended:
-            if row in self._begun:
-                self._begun.remove(row)
-            return None
-        return task
-
-    def put_back(self, task: Task, row: RobotTasks) -> None:
-        """Put a task back into its robot's remaining tasks, so that another worker can run it."""
-        row.put_back(task)
-        self._begun.remove(row)
-        self._waiting = chain([row], self._waiting)
-
-    def end(self, robot: int) -> None:
-        """Remove a robot from the queue."""
-        self._ended.add(robot)
-
-    def withdraw(self, robot: int) -> list[Task]:
-        """Remove a robot from the queue, and return its remaining tasks."""
-        self.end(robot)
-        return [task for row in self._begun if row.robot == robot for task in row]
-
 
 #: Maximum number of chunks in an executor's queue.
 #: This number is enough for many workers, and small enough to save memory.
@@ -112,9 +38,10 @@ Enter = Callable[[Task, Answer], None]
 
 
 class Engine(Protocol):
-    """Interface of an engine; an exception from `run` ends the validation.
+    """Interface of an engine.
 
-    Answers that were passed to the callback before the exception stay in the report.
+    An exception from `run` ends the validation. Answers that were passed to the callback before the exception
+    stay in the report.
     """
 
     def run(self, work: Work, enter: Enter) -> None:
@@ -132,7 +59,7 @@ class SerialEngine:
 
 
 class ExecutorEngine:
-    """Engine that runs chunks on an executor. The number of chunks in the executor's queue is bounded."""
+    """Engine that runs chunks on an executor, with at most `IN_FLIGHT` chunks in the executor's queue."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
@@ -140,32 +67,32 @@ class ExecutorEngine:
     def run(self, work: Work, enter: Enter) -> None:
         """Run the tasks. If the executor raises an error, the error becomes the result of the robot."""
         waiting, failed = chain.from_iterable(work), set[int]()
-        flying = deque[tuple[Task, Future[Answer]]]()
+        submitted = deque[tuple[Task, Future[Answer]]]()
         next_task = next(waiting, None)
         try:
-            while next_task is not None or flying:
+            while next_task is not None or submitted:
                 found: Answer | None
-                if next_task is not None and len(flying) < IN_FLIGHT:
+                if next_task is not None and len(submitted) < IN_FLIGHT:
                     task, next_task = next_task, next(waiting, None)
                     if task.robot in failed:
                         continue
-                    found = self._submit(task, flying)
+                    found = self._submit(task, submitted)
                 else:
-                    task, future = flying.popleft()
+                    task, future = submitted.popleft()
                     found = _result(future)
                 if isinstance(found, Failure):
                     failed.add(task.robot)
                 if found is not None:
                     enter(task, found)
         finally:
-            for _, future in flying:
+            for _, future in submitted:
                 future.cancel()
 
-    def _submit(self, task: Task, flying: deque[tuple[Task, Future[Answer]]]) -> Failure | None:
+    def _submit(self, task: Task, submitted: deque[tuple[Task, Future[Answer]]]) -> Failure | None:
         try:
-            flying.append((task, self._executor.submit(answer, task.chunk)))
+            submitted.append((task, self._executor.submit(answer, task.chunk)))
         except Exception as error:
-            return lost("the executor did not accept the chunk", error)
+            return lost_failure("the executor did not accept the chunk", error)
         return None
 
 
@@ -173,18 +100,73 @@ def _result(future: Future[Answer]) -> Answer:
     try:
         return future.result()
     except Exception as error:
-        return lost("the executor lost the chunk", error)
+        return lost_failure("the executor lost the chunk", error)
 
 
-def lost(what: str, error: Exception) -> Failure:
-    message = " ".join(str(error).split()) or "no message"
-    return Failure(ValidationVerdict.NOT_VERIFIED, f"{what}: {type(error).__name__}: {message}", passing=True)
+class RobotTasks:
+    """The remaining tasks of a robot.
+
+    Attributes:
+        robot: Index of the robot; -1 before the first task was taken.
+        index: Index of the latest chunk that was taken; the lower, the more chunks of the robot remain.
+    """
+
+    def __init__(self, tasks: Iterable[Task]) -> None:
+        self.robot = self.index = -1
+        self._tasks = iter(tasks)
+
+    def __iter__(self) -> Iterator[Task]:
+        return self
+
+    def __next__(self) -> Task:
+        task = next(self._tasks)
+        self.robot, self.index = task.robot, task.chunk.index
+        return task
+
+    def put_back(self, task: Task) -> None:
+        """Put a task back as the robot's next task."""
+        self._tasks = chain([task], self._tasks)
 
 
-#: Reasons in the report for a robot that crashed its process.
-DIED = "the process that validated the robot crashed"
-DIED_TWICE = "the process that validated the robot crashed twice; the second process computed nothing else"
+class WorkQueue:
+    """Distribute tasks among workers; if `shared`, several workers may work on the same robot."""
 
+    def __init__(self, work: Work, *, shared: bool = True) -> None:
+        self._waiting: Iterator[RobotTasks] = map(RobotTasks, work)
+        self._shared = shared
+        self._begun: list[RobotTasks] = []
+        self._ended = set[int]()
 
-def died(subject: RobotInput, how: str, cause: str) -> Failure:
-    return Failure(ValidationVerdict.NOT_VERIFIED, f"{subject.label}: {how}: found {cause}")
+    def first(self) -> tuple[Task, RobotTasks] | None:
+        """Return a task for an idle worker, preferably of a new robot, and the robot's other tasks."""
+        for tasks in self._waiting:
+            self._begun.append(tasks)
+            if (task := self.next(tasks)) is not None:
+                return task, tasks
+        for tasks in sorted(self._begun, key=lambda tasks: tasks.index) if self._shared else ():
+            if (task := self.next(tasks)) is not None:
+                return task, tasks
+        return None
+
+    def next(self, tasks: RobotTasks) -> Task | None:
+        """Return the next task of a robot; None if no task is left, or if the robot was removed."""
+        task = next(tasks, None)
+        if task is None or task.robot in self._ended:
+            if tasks in self._begun:
+                self._begun.remove(tasks)
+            return None
+        return task
+
+    def put_back(self, task: Task, tasks: RobotTasks) -> None:
+        """Put a task back into its robot's remaining tasks, so that another worker can run it."""
+        tasks.put_back(task)
+        self._begun.remove(tasks)
+        self._waiting = chain([tasks], self._waiting)
+
+    def end(self, robot: int) -> None:
+        self._ended.add(robot)
+
+    def withdraw(self, robot: int) -> list[Task]:
+        """Remove a robot from the queue, and return its remaining tasks."""
+        self.end(robot)
+        return [task for tasks in self._begun if tasks.robot == robot for task in tasks]

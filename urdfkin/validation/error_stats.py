@@ -1,11 +1,12 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
 The addition of two tallies is commutative and associative, so the sum does not depend on the division of the
-samples into chunks. If two worst cases are equally bad, the sum keeps the one with the smaller sample number.
+samples into chunks. If two worst cases are equally bad, the sum contains the case with the smaller sample
+number.
 
-With a second oracle, `ThreeSides` compares three results. Each of the three pairs of libraries has its own
+With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two
-results agree and the third one agrees with neither of them, the third one is the outlier.
+results agree and the third result agrees with neither, the third result is the outlier.
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.bounds import Bound, result_k
 from urdfkin.verify.comparison import worst_of_each
 
-#: The three compared libraries, in the order of the columns of tables.
-SIDES = ("urdfkin", "pinocchio", "second_oracle")
+#: The libraries of a cross check, in the order of the columns of tables.
+CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +51,13 @@ class OraclePair:
 
 
 @dataclass(frozen=True, slots=True)
-class ThreeSides:
+class CrossCheck:
     """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
 
     Attributes:
         urdfkin: urdfkin compared with the second oracle.
         pinocchio: Pinocchio compared with the second oracle.
-        alone: For each library of `SIDES`, the number of results in which only this library differs from the
-            other two.
+        alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
         undecided: Number of results without a majority. Either no two of the three results agree, or a result
             agrees with two results that disagree with each other.
     """
@@ -67,9 +68,9 @@ class ThreeSides:
     alone: tuple[int, int, int] = (0, 0, 0)
     undecided: int = 0
 
-    def __add__(self, other: ThreeSides) -> ThreeSides:
+    def __add__(self, other: CrossCheck) -> CrossCheck:
         first, second, third = (a + b for a, b in zip(self.alone, other.alone, strict=True))
-        return ThreeSides(
+        return CrossCheck(
             self.by,
             self.urdfkin + other.urdfkin,
             self.pinocchio + other.pinocchio,
@@ -78,52 +79,46 @@ class ThreeSides:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        return asdict(self) | {"alone": dict(zip(SIDES, self.alone, strict=True))}
+        return asdict(self) | {"alone": dict(zip(CROSS_CHECKED, self.alone, strict=True))}
 
 
-def plus(first: ThreeSides | None, second: ThreeSides | None) -> ThreeSides | None:
+def plus(first: CrossCheck | None, second: CrossCheck | None) -> CrossCheck | None:
     return first if second is None else second if first is None else first + second
 
 
-def three_sides(
+def cross_check(
     by: str, ours: FloatArray, pinocchios: FloatArray, second_oracles: FloatArray, first: Bound, second: Bound
-) -> ThreeSides:
+) -> CrossCheck:
     """Compare three results (n, frames, ...) with each other.
 
-    The bound `first` limits the difference between urdfkin and Pinocchio, `second` the difference between
-    urdfkin and the second oracle.
+    `first` is the bound on the difference between urdfkin and Pinocchio, `second` the bound on the difference
+    between urdfkin and the second oracle.
     """
     if not ours.size:
-        return ThreeSides(by, OraclePair(), OraclePair())
-    both = _together(first, second)
-    own, units_own = _shares(ours, second_oracles, second)
-    other, units_other = _shares(pinocchios, second_oracles, both)
-    agree = _shares(ours, pinocchios, first)[0] <= 1.0, own <= 1.0, other <= 1.0
-    ours_theirs, ours_second, theirs_second = agree
+        return CrossCheck(by, OraclePair(), OraclePair())
+    ours_pinocchio, _ = _compare_pair(ours, pinocchios, first)
+    ours_second, urdfkin = _compare_pair(ours, second_oracles, second)
+    pinocchio_second, pinocchio = _compare_pair(pinocchios, second_oracles, _sum_of_bounds(first, second))
     alone = (
-        theirs_second & ~ours_theirs & ~ours_second,
-        ours_second & ~ours_theirs & ~theirs_second,
-        ours_theirs & ~ours_second & ~theirs_second,
+        pinocchio_second & ~ours_pinocchio & ~ours_second,
+        ours_second & ~ours_pinocchio & ~pinocchio_second,
+        ours_pinocchio & ~ours_second & ~pinocchio_second,
     )
-    settled = np.logical_or.reduce((*alone, ours_theirs & ours_second & theirs_second))
+    settled = np.logical_or.reduce((*alone, ours_pinocchio & ours_second & pinocchio_second))
     first_alone, second_alone, third_alone = (int(one.sum()) for one in alone)
-    return ThreeSides(
-        by,
-        OraclePair(int((~ours_second).sum()), float(units_own.max()), float(own.max())),
-        OraclePair(int((~theirs_second).sum()), float(units_other.max()), float(other.max())),
-        (first_alone, second_alone, third_alone),
-        int((~settled).sum()),
-    )
+    counts = first_alone, second_alone, third_alone
+    return CrossCheck(by, urdfkin, pinocchio, counts, int((~settled).sum()))
 
 
-def _shares(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays (n, frames): ratios of disagreement to bound, and disagreements in eps * scale."""
+def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
+    """Return whether each result agrees (n, frames), and the worst disagreements of the pair."""
     units = worst_of_each(one, other, bound.scale, 2)
-    share: FloatArray = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
-    return share, units
+    share = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
+    agrees = share <= 1.0
+    return agrees, OraclePair(int((~agrees).sum()), float(units.max()), float(share.max()))
 
 
-def _together(first: Bound, second: Bound) -> Bound:
+def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
     """Return the sum of two bounds k * eps * scale, expressed with the k of the second bound."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
@@ -132,14 +127,20 @@ def _together(first: Bound, second: Bound) -> Bound:
 
 #: Edges of the histogram of disagreements, in eps * scale: ten bins per decade from 0.001 to 100,000.
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
-
-
+#: Key of error statistics: the quantity and the reference frame.
+Key = tuple[str, str]
+#: Values of q, v and a.
 Inputs = tuple[list[float], list[float], list[float]]
 
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """The sample with the largest ratio of disagreement to bound, and the inputs to compute it again."""
+    """The sample with the largest ratio of disagreement to bound, and the inputs of that sample.
+
+    Attributes:
+        share: Ratio of the disagreement to the bound.
+        units: The disagreement, in eps * scale.
+    """
 
     share: float
     units: float
@@ -175,7 +176,7 @@ class Tally:
     by_frame: tuple[float, ...]
     case: WorstCase | None
     bounds: tuple[float, float] = (math.inf, 0.0)
-    three_sides: ThreeSides | None = None
+    cross_check: CrossCheck | None = None
 
     def __add__(self, other: Tally) -> Tally:
         cases = [case for case in (self.case, other.case) if case is not None]
@@ -188,7 +189,7 @@ class Tally:
             tuple(max(a, b) for a, b in zip(self.by_frame, other.by_frame, strict=True)),
             max(cases, key=lambda case: (case.share, -case.sample), default=None),
             (min(self.bounds[0], other.bounds[0]), max(self.bounds[1], other.bounds[1])),
-            plus(self.three_sides, other.three_sides),
+            plus(self.cross_check, other.cross_check),
         )
 
     def beside(self, other: Tally) -> Tally:
@@ -197,14 +198,14 @@ class Tally:
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements; its error is at most a histogram bin, 26 %."""
+        """Return a percentile of the disagreements; the error is at most the width of a bin, 26 %."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram, to the width of a bin."""
+    """Return a percentile of the values in a histogram; the error is at most the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -224,10 +225,9 @@ def tally(
     first_sample: int,
     inputs: Sequence[Inputs],
 ) -> Tally:
-    """Compare results (n, frames, ...) of urdfkin and Pinocchio.
+    """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample.
 
-    The scale and k of the bound can be broadcast to the shape of the results. `inputs` are q, v and a of each
-    sample, for the worst case.
+    The scale and k of the bound can be broadcast to the shape of the results.
     """
     n, count = ours.shape[:2]
     if not ours.size:
@@ -251,7 +251,3 @@ def tally(
         case=case,
         bounds=(float(bound.k.min()), float(bound.k.max())),
     )
-
-
-#: Key of error statistics: the quantity and the reference frame.
-Key = tuple[str, str]

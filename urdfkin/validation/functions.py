@@ -2,7 +2,7 @@
 
 The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
 function at random configurations, at the zero configuration and at the joint limits. If urdfkin and the
-oracle agree there, but the function disagrees with urdfkin, the error is in the function.
+oracle agree, but the function disagrees with urdfkin, the error is in the function.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import plain
-from urdfkin.validation.diagnosis import Diagnosis, Mistakes, diagnose
-from urdfkin.verify.bounds import Bound, disagreement, result_k
+from urdfkin.validation.diagnosis import Diagnosis, Mistakes, as_tuple, diagnose
+from urdfkin.verify.bounds import result_k
+from urdfkin.verify.comparison import disagreement
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import ACCELERATION_BREAKDOWN, Quantity
 from urdfkin.verify.quantities import quantity as quantity_of
@@ -40,18 +41,18 @@ if TYPE_CHECKING:
     from urdfkin.verify.call import Call
 
 #: Number of configurations in a batch.
-_AT_A_TIME = 256
+_BATCH = 256
 #: Number of configurations in a diagnosis.
 _DIAGNOSED = 48
-#: Largest number of exceptions and wrong shapes with a stored message.
-_KEPT = 5
-#: A relative difference up to this number is explained by rounding to single precision.
+#: Maximum number of stored messages about exceptions and wrong shapes.
+_MESSAGES = 5
+#: Maximum relative difference that rounding to single precision explains.
 _SINGLE = 1e-5
 
 
 @dataclass(frozen=True)
 class FunctionError:
-    """An exception of the user's function, or a result that is not an array of the right shape."""
+    """An exception of the user's function, or a result that is not a real array of the expected shape."""
 
     sample: int
     message: str
@@ -63,7 +64,7 @@ class WorstResult:
 
     Attributes:
         sample: Index of the configuration.
-        inputs: q, or q and v, or q, v and a, as the function received them.
+        inputs: The function's inputs: q, or q and v, or q, v and a.
         bound: Largest allowed difference of each number.
         replay: A command or a line of Python that computes the expected result.
     """
@@ -90,7 +91,7 @@ class WorstResult:
 
 @dataclass(frozen=True)
 class FunctionCheck(Displayable):
-    """Result of `verify_function`: how far a function's results are from urdfkin's and the oracle's results.
+    """Result of `verify_function`: differences between a function's results and urdfkin's and the oracle's.
 
     Attributes:
         function: Name of the function.
@@ -112,9 +113,9 @@ class FunctionCheck(Displayable):
         columns: Largest ratio in each column of a Jacobian; the key is the name of the joint velocity. Empty
             for other quantities.
         worst: The worst result; None if no result was compared.
-        errors: Number of exceptions and wrong shapes.
-        first_errors: The first exceptions and wrong shapes, with their texts.
-        diagnoses: Explanations of a disagreement. Each of these explanations is sufficient for all results.
+        errors: Number of configurations with an exception or a wrong shape.
+        first_errors: The first exceptions and wrong shapes, with messages.
+        diagnoses: Explanations of a disagreement. Each explanation alone explains all results.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -177,14 +178,7 @@ class FunctionCheck(Displayable):
         >>> check.as_dict()["agrees"]
         True
         """
-        names = (
-            *("function", "robot", "quantity", "frame", "reference", "convention", "oracle", "samples"),
-            *("compared", "factor", "eps_scale", "share", "oracle_share", "rows", "columns", "errors"),
-            *("first_errors", "diagnoses", "worst"),
-        )
-        data = {name: getattr(self, name) for name in names}
-        found: dict[str, Any] = plain({"agrees": self.agrees, **data, "versions": versions()})
-        return found
+        return {"agrees": self.agrees, **plain(self), "versions": versions()}
 
     def _sheet(self) -> TextDocument:
         of = f"{self.quantity} of {self.frame}" + (f" ({self.reference})" if self.reference else "")
@@ -228,17 +222,17 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a robot's verifier that also stores the arguments and the result of each checked call."""
+    """A wrapper of a robot's verifier that also stores the arguments and the result of the checked call."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
-        self.calls: dict[str, tuple[Quantity, Call, FloatArray]] = {}
+        self.calls: dict[str, Call] = {}
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._verifier, name)
 
     def check(self, row: Quantity, call: Call, result: FloatArray, verify: object) -> None:
-        self.calls[row.name] = row, call, result
+        self.calls[row.name] = call
         self._verifier.check(row, call, result, cast("Any", verify))
 
 
@@ -326,16 +320,17 @@ def verify_function(
 
 @dataclass
 class _FunctionResults:
-    """The results of the user's function and of urdfkin at some configurations.
+    """The results of the user's function and of urdfkin for a batch of configurations.
 
     Attributes:
         first: Index of the first configuration.
         inputs: The function's inputs, one row for each configuration.
-        good: Indices of the configurations with a result of the right shape.
-        found: The function's results (n, ...) at the configurations in `good`.
-        expected: urdfkin's results at the configurations in `good`.
+        good: Indices of the n configurations with a result of the right shape.
+        found: The function's results (n, ...).
+        expected: urdfkin's results (n, ...).
         scale: The scale in the bound k * eps * scale of each number in `expected`.
         k: (n,) the factor k in the bound k * eps * scale of each result.
+        theirs: The oracle's results (n, ...); None if no oracle can check the robot.
     """
 
     first: int
@@ -354,14 +349,12 @@ class _FunctionResults:
 
     def units(self, other: FloatArray) -> FloatArray:
         """Return the differences between `found` and `other` in eps * scale; inf if not finite."""
-        with np.errstate(all="ignore"):
-            units = disagreement(self.found, other, Bound(self.scale, self.k))
-        return np.where(np.isfinite(units), units, np.inf)
+        return disagreement(self.found, other, self.scale)
 
 
 @dataclass
 class _Run:
-    """One check of a function; the attributes are the arguments of `verify_function`, validated."""
+    """One check of a function; the attributes are the validated arguments of `verify_function`."""
 
     function: Callable[..., object]
     robot: Robot
@@ -384,8 +377,8 @@ class _Run:
         drawn = draw(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
         total = _Total(self.row, self.factor, self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
-        for first in range(0, len(drawn.q), _AT_A_TIME):
-            part = slice(first, first + _AT_A_TIME)
+        for first in range(0, len(drawn.q), _BATCH):
+            part = slice(first, first + _BATCH)
             total.add(self._compared(first, (drawn.q[part], drawn.v[part], drawn.a[part]), total, checked))
         return self._result(total, len(drawn.q), checked)
 
@@ -441,7 +434,7 @@ class _Run:
         row = self.row
         ours = drawn[: len(row.inputs)]
         result = self._method(self.recording, ours, self.frame, None, verify=checked)
-        _, call, _ = self.recorder.calls[row.name]
+        call = self.recorder.calls[row.name]
         flat = result[:, None]
         part = call.part(slice(0, call.n))
         theirs, bound = None, None
@@ -454,7 +447,7 @@ class _Run:
         k = result_k(bound, flat.shape[:2])[:, 0] * self.factor
         inputs: tuple[FloatArray, ...] = ours
         if self.conversion is not None:
-            inputs = _tuple(self.conversion.to(*ours))
+            inputs = as_tuple(self.conversion.to(*ours))
             scale = self._converted_scale(ours, scale)
             k = k + self._rounding_of_the_conversion(ours[0]) * self.factor
         expected = self._converted(ours, result)
@@ -479,7 +472,7 @@ class _Run:
         return found
 
     def _ours(self, inputs: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-        return tuple(inputs) if self.conversion is None else _tuple(self.conversion.from_(*inputs))
+        return tuple(inputs) if self.conversion is None else as_tuple(self.conversion.from_(*inputs))
 
     def _converted(
         self,
@@ -520,12 +513,12 @@ class _Run:
         return found
 
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
-        """Return the rounding errors of a conversion, in eps * scale; they are 0 for a permutation.
+        """Return the rounding errors of a conversion, in eps * scale; 0 for a permutation.
 
-        The conversion rounds each joint angle before it is passed to the user's function. The rounded angle
-        differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix is rotated by
-        up to 2 eps |q|, and this matrix is a factor of each term of the result. The conversion of a base
-        velocity by a matrix has at most 16 rounding errors.
+        The conversion rounds each joint angle before the angle is passed to the user's function. The rounded
+        angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix is
+        rotated by up to 2 eps |q|, and this matrix is a factor of each term of the result. The conversion of
+        a base velocity by a matrix has at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
@@ -536,7 +529,7 @@ class _Run:
     def _called(
         self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
     ) -> tuple[FloatArray, list[int]]:
-        """Return the function's results of the right shape, and their indices."""
+        """Return the function's results of the right shape, and the indices of their configurations."""
         n = len(inputs[0])
         if self.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)
@@ -576,8 +569,7 @@ class _Run:
         yield from diagnose(mistakes, case)
 
     def _replay(self, values: tuple[FloatArray, ...]) -> str:
-        _, call, _ = self.recorder.calls[self.row.name]
-        one = copy(call)
+        one = copy(self.recorder.calls[self.row.name])
         one.q, one.rates, one.shape, one.n = values[0][None], [x[None] for x in values[1:]], (1,), 1
         return self.robot.verifier._replay(self.row, one, 0, self.frame)
 
@@ -617,7 +609,7 @@ class _Total:
 
     def error(self, sample: int, message: str, configurations: int) -> None:
         self.errors += configurations
-        if len(self.first_errors) < _KEPT:
+        if len(self.first_errors) < _MESSAGES:
             self.first_errors.append(FunctionError(sample, message))
 
     def add(self, part: _FunctionResults) -> None:
@@ -674,7 +666,3 @@ def _call(
         total.error(sample, f"shape {found.shape}, expected {shape}", configurations)
         return None
     return found
-
-
-def _tuple(x: FloatArray | tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
-    return x if isinstance(x, tuple) else (x,)

@@ -1,7 +1,7 @@
-"""Define the manifest of a stored validation: its robots, samples and versions.
+"""Manifest of a stored validation: robots, samples and versions.
 
-The manifest defines the chunks and their keys. The key of a chunk is the sha256 of all data on which its
-numbers depend. Therefore, results of older code, texts or options are never reused.
+The manifest defines the chunks and the key of each chunk. The key is the sha256 of all data on which the
+chunk's numbers depend. Therefore, results of older code, texts or options are never reused.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Manifest:
     """Definition of a campaign.
 
     Attributes:
-        robots: The origin of each robot and the sha256 of its text; empty if the text could not be read.
+        robots: For each robot: the origin, and the sha256 of the text (empty if the text could not be read).
         provenance: Versions and digests of the computing code (`urdfkin.validation.results.provenance`).
         versions: Versions in the report.
         started: Start time, ISO 8601, UTC.
@@ -62,7 +62,7 @@ class Manifest:
 
     @cached_property
     def _keys(self) -> list[str]:
-        """The key of each robot: a sha256 of the robot's text, the settings and the versions."""
+        """Key of each robot: a sha256 of the robot's text, the settings and the versions."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
@@ -79,7 +79,7 @@ class Manifest:
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
-        """Return the differences of the definitions of chunks, each with the values of both manifests."""
+        """Return the differences between two campaigns, each with the values in both manifests."""
         own, theirs = (
             {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance
             for m in (self, other)
@@ -90,9 +90,9 @@ class Manifest:
             if own.get(name) != theirs.get(name)
         ]
         lines += [
-            f"robot {i + 1} {_called(mine_)} and {_called(theirs_)}"
-            for i, (mine_, theirs_) in enumerate(zip(self.robots, other.robots, strict=False))
-            if mine_ != theirs_
+            f"robot {i + 1} {_called(robot)} and {_called(other_robot)}"
+            for i, (robot, other_robot) in enumerate(zip(self.robots, other.robots, strict=False))
+            if robot != other_robot
         ]
         return [*lines[:_SHOWN], f"{len(lines) - _SHOWN} more"] if len(lines) > _SHOWN + 1 else lines
 

@@ -1,7 +1,7 @@
 """Limit the memory of a validation, and estimate the memory that a robot needs.
 
-All processes of a validation together use at most `SHARE` of the memory that is free at the start. A robot
-that needs more memory is not verified; the reason states the needed and the allowed memory.
+All processes of a validation together use at most half of the memory that is free at the start. A robot that
+needs more memory is not verified; the reason states the needed and the allowed memory.
 """
 
 from __future__ import annotations
@@ -15,45 +15,39 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 
 #: Fraction of the free memory that a validation uses.
-SHARE = 0.5
-#: Bytes that Pinocchio 4.1.0 needs (measured).
-#: The workspace needs _FOR_CUBE * nv^3, and each link needs _FOR_LINK.
-_FOR_CUBE, _FOR_LINK = 64, 24_000
-#: Maximum number of arrays at a time, all with the size of a block of samples.
+_FRACTION = 0.5
+#: Bytes that Pinocchio 4.1.0 needs (measured): PER_CUBE * nv^3 for the workspace, and PER_LINK for each link.
+_PER_CUBE, _PER_LINK = 64, 24_000
+#: Maximum number of arrays at a time; each array has the size of a block of samples.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
 
 
-def share(processes: int = 1) -> int | None:
+def limit(processes: int = 1) -> int | None:
     """Return the bytes for each process of a validation; None if the system reports no free memory."""
     free = min(_free(), default=None)
-    return None if free is None else int(SHARE * free / processes)
+    return None if free is None else int(_FRACTION * free / processes)
 
 
-def needed(tree: KinematicTree, samples: int) -> int:
+def needed_bytes(tree: KinematicTree, samples: int) -> int:
     """Return the maximum number of bytes for checking a robot."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
-    return _FOR_CUBE * nv**3 + _FOR_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
+    return _PER_CUBE * nv**3 + _PER_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
 
 
-def demand(tree: KinematicTree, samples: int, most: int | None) -> None:
+def check(tree: KinematicTree, samples: int, most: int | None) -> None:
     """Raise OracleError if a comparison of `samples` configurations needs more than `most` bytes."""
-    wanted = needed(tree, samples)
+    wanted = needed_bytes(tree, samples)
     if most is not None and wanted > most:
         raise OracleError(
-            f"not enough memory to check the robot (all processes of a validation may use {SHARE:.0%} of"
-            " the free"
-            " memory)",
+            "not enough memory to check the robot (all processes of a validation may use"
+            f" {_FRACTION:.0%} of the free memory)",
             where=tree.name,
-            found=f"{_gigabytes(wanted)} needed, {_gigabytes(most)} allowed for each process",
+            found=f"{wanted / 1e9:.3g} GB needed, {most / 1e9:.3g} GB allowed for each process",
             remedy="use fewer jobs or a larger machine",
         )
-
-
-def _gigabytes(size: int) -> str:
-    return f"{size / 1e9:.3g} GB"
 
 
 def _free() -> Iterator[int]:
@@ -74,9 +68,9 @@ def _free() -> Iterator[int]:
 
 
 def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
-    """Yield the free bytes of a control group and of its parent groups, because all their limits apply.
+    """Yield the free bytes of a control group and of each parent group, because all limits apply.
 
-    In a container, the last parent is the container's own group, because its parents are not visible.
+    In a container, the last visible parent is the container's own group.
     """
     folder = mount / group.lstrip("/")
     for place in (folder, *folder.parents):
@@ -84,16 +78,10 @@ def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
             return
         numbers = [line for file in (limit, usage) for line in _lines(place / file)]
         if len(numbers) == 2 and all(number.isdigit() for number in numbers):
-            yield max(0, int(numbers[0]) - int(numbers[1]) + _cached(place))
-
-
-def _cached(place: Path) -> int:
-    """Return the bytes of cached files that a control group has not read recently.
-
-    The kernel counts these bytes as used, but frees them on demand.
-    """
-    counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
-    return int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
+            counts = dict(line.split(maxsplit=1) for line in _lines(place / "memory.stat"))
+            # The kernel counts cached files as used memory, but frees inactive cached files on demand.
+            cached = int(counts.get("total_inactive_file") or counts.get("inactive_file") or 0)
+            yield max(0, int(numbers[0]) - int(numbers[1]) + cached)
 
 
 def _lines(path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""Define the verdict on a robot, and the outcome of a validation run with its reason.
+"""Verdict on a robot, and outcome of a validation run with the reason.
 
 Only this module decides whether a run has passed, for new reports and for reports that are read from a file.
 """
@@ -24,7 +24,7 @@ class ValidationVerdict(StrEnum):
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run, as in shells: 128 + SIGINT.
 INTERRUPTED = 130
-#: Verdicts of a failed run, in words for one robot and for several robots.
+#: Words for the verdicts of a failed run, for one robot and for several robots.
 _WORDS = {
     ValidationVerdict.DISAGREES: ("disagrees", "disagree"),
     ValidationVerdict.NOT_VERIFIED: ("is not verified", "are not verified"),
@@ -68,21 +68,19 @@ class RunOutcome:
 def outcome(verdicts: Iterable[str], asked: int, interrupted: bool) -> RunOutcome:
     """Return the outcome of a run with `asked` requested robots.
 
-    >>> outcome(["verified", "disagrees"], asked=3, interrupted=False)
-    Outcome(exit_code=1, reason='1 of 3 robots disagrees, 1 of 3 robots without a report')
     >>> outcome(["bad input", "bad input"], asked=3, interrupted=False).reason
     '2 of 3 robots have bad input, 1 of 3 robots without a report'
     """
     counts = Counter(map(str, verdicts))
-    unknown = sum(counts.values()) != asked
+    robots = "1 robot" if asked == 1 else f"{asked:,} robots"
     reasons = ["the validation was interrupted before everything was compared"] if interrupted else []
     reasons += [
-        f"{counts[verdict]} of {_robots(asked)} {words[counts[verdict] > 1]}"
+        f"{counts[verdict]} of {robots} {words[counts[verdict] > 1]}"
         for verdict, words in _WORDS.items()
         if counts[verdict]
     ]
-    if unknown:
-        reasons.append(f"{asked - sum(counts.values())} of {_robots(asked)} without a report")
+    if missing := asked - counts.total():
+        reasons.append(f"{missing} of {robots} without a report")
     if not asked:
         reasons.append("no robot was validated")
     return RunOutcome(_exit_code(counts, interrupted, bool(reasons)), ", ".join(reasons) or None)
@@ -96,7 +94,3 @@ def _exit_code(counts: Counter[str], interrupted: bool, failed: bool) -> int:
     if counts[ValidationVerdict.BAD_INPUT]:
         return INPUT
     return UNCHECKED if failed else 0
-
-
-def _robots(n: int) -> str:
-    return "1 robot" if n == 1 else f"{n:,} robots"

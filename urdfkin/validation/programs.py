@@ -1,4 +1,4 @@
-"""Call a program in any language like a function; the program answers requests with lines of JSON.
+"""Call a program in any language like a function; requests and answers are lines of JSON.
 
 Each request is one line on the program's standard input:
 
@@ -6,10 +6,10 @@ Each request is one line on the program's standard input:
      "reference": "local_world_aligned", "coordinates": ["shoulder", ...],
      "q": [...], "v": [...], "a": [...]}
 
-`coordinates` names the numbers of q. The entries `v` and `a` are present if the quantity needs them. The
-entry `reference` is present if the quantity has a reference frame. The entries `lock` (values of locked
-joints), `root_joint` and `convention` are present if the user gave them. The file contains the whole URDF,
-without locks and without a root joint. The answer is one line:
+`coordinates` contains the names of the numbers in q. The entries `v` and `a` are present if the quantity
+needs them. The entry `reference` is present if the quantity has a reference frame. The entries `lock` (values
+of locked joints), `root_joint` and `convention` are present if the user gave them. The file contains the
+whole URDF, without locks and without a root joint. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
 _MOST = 64 * 2**20
 #: Maximum number of quoted bytes of the program's standard error.
 _TAIL = 300
-#: Number of failures in a row after which the program is not started again.
-_PATIENCE = 3
+#: Number of consecutive failures after which the program is not started again.
+_MOST_FAILURES = 3
 _DAY = 86400.0
 
 
 class ProgramError(Exception):
-    """Error for a program that did not answer a request with a result."""
+    """The program did not answer a request with a result."""
 
 
 class Program:
@@ -138,8 +138,8 @@ class Program:
         Raises:
             ProgramError: the program ended, took too long, or answered with no result.
         """
-        if self._failures >= _PATIENCE:
-            raise ProgramError(f"not called: the program failed {_PATIENCE} times in a row")
+        if self._failures >= _MOST_FAILURES:
+            raise ProgramError(f"not called: the program failed {_MOST_FAILURES} times in a row")
         if self._process is None:
             self._start()
         values = {letter: x.tolist() for letter, x in zip("qva", inputs, strict=False)}
@@ -175,7 +175,7 @@ class Program:
                 stream.close()
 
     def _ask(self, request: bytes) -> bytes:
-        """Write a request, and return the line of the answer; the timeout covers writing and reading."""
+        """Write a request, and return the answer's line; the timeout covers writing and reading."""
         process = self._process
         assert process is not None
         assert process.stdin is not None
@@ -214,10 +214,10 @@ class Program:
         status = self._process.poll()
         self._errors.seek(0, os.SEEK_END)
         self._errors.seek(max(0, self._errors.tell() - _TAIL))
-        said = " ".join(self._errors.read(_TAIL).decode(errors="replace").split())
+        message = " ".join(self._errors.read(_TAIL).decode(errors="replace").split())
         self._stop()
         how = "closed its output" if status is None else f"ended with exit code {status}"
-        return f"the program {how}" + (f": {said}" if said else "")
+        return f"the program {how}" + (f": {message}" if message else "")
 
     @staticmethod
     def _read(line: bytes) -> object:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
 #: Return value of a worker for a chunk.
-#: "answer" comes with the pickled results, and "died" with the reason for two crashes.
-#: "other code" comes with the worker's versions, because they differ from the client's.
+#: "answer" comes with the pickled answer, and "died" with the signal or exit status of the second crash.
+#: "other code" comes with the worker's versions, which differ from the versions of the client.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -38,23 +38,19 @@ def hold(robot: bytes) -> bytes:
     return robot
 
 
-def computes() -> dict[str, str]:
-    return provenance()
-
-
 def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
     """Run a chunk in a process and return its answer.
 
     `robot` and `chunk` are pickles; the chunk is pickled without its robot. The chunk runs only if the
     client's versions and digests (`by`) are those of this machine.
     """
-    if by != computes():
-        return "other code", computes()
+    if by != provenance():
+        return "other code", provenance()
     cause = ""
-    for child in (_idle_or_new, WorkerProcess):
+    for start in (_idle_or_new, WorkerProcess):
         try:
-            return "answer", _run_in(child(), _Parcel(robot, chunk))
-        except _DiedError as crash:
+            return "answer", _run_in(start(), _Parcel(robot, chunk))
+        except _CrashError as crash:
             cause = str(crash)
     return "died", cause
 
@@ -65,8 +61,8 @@ def end_idle() -> None:
             _idle.pop().end()
 
 
-class _DiedError(Exception):
-    """The process that ran a chunk crashed; the message states the cause."""
+class _CrashError(Exception):
+    """The process that ran a chunk crashed; the message states the signal or the exit status."""
 
 
 class _Parcel:
@@ -80,30 +76,30 @@ class _Parcel:
 
 
 def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
-    made: Chunk = replace(pickle.loads(chunk), subject=pickle.loads(robot))
-    return made
+    without_robot: Chunk = pickle.loads(chunk)
+    return replace(without_robot, subject=pickle.loads(robot))
 
 
 def _idle_or_new() -> WorkerProcess:
     """Return an idle process, which may have the robot in its cache; start a process if none is idle."""
     with _lock:
         while _idle:
-            child = _idle.pop()
-            if child.alive:
-                return child
-            child.end()
+            process = _idle.pop()
+            if process.alive:
+                return process
+            process.end()
     return WorkerProcess()
 
 
-def _run_in(child: WorkerProcess, parcel: _Parcel) -> bytes:
+def _run_in(process: WorkerProcess, parcel: _Parcel) -> bytes:
     try:
-        child.connection.send(parcel)
-        found = child.connection.recv_bytes()
+        process.connection.send(parcel)
+        found = process.connection.recv_bytes()
     except (EOFError, OSError):
-        raise _DiedError(child.cause()) from None
+        raise _CrashError(process.wait_for_cause()) from None
     except BaseException:
-        child.end()
+        process.end()
         raise
     with _lock:
-        _idle.append(child)
+        _idle.append(process)
     return found

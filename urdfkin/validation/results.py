@@ -1,4 +1,4 @@
-"""Define the report of a validation, and the versions on which the report's numbers depend.
+"""Report of a validation, and the versions on which the report's numbers depend.
 
 `urdfkin.validation.document` defines the layout of the JSON document.
 """
@@ -21,21 +21,20 @@ from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.catalogue import examples
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.document import VALIDATION, Document
-from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally, WorstCase
+from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally
 from urdfkin.validation.outcome import RunOutcome, ValidationVerdict, outcome
-from urdfkin.validation.robot_summary import NO_PORTRAIT, RobotSummary
-from urdfkin.validation.timings import Clock
+from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
+from urdfkin.validation.timings import Timings
 from urdfkin.verify.oracles import ORACLES, version, versions
-from urdfkin.verify.quantities import QUANTITIES
-from urdfkin.verify.replay import replay_line
+from urdfkin.verify.quantities import QUANTITIES, replay_line
 
 if TYPE_CHECKING:
-    from urdfkin.validation.accuracy import Judgement
+    from urdfkin.validation.accuracy import AccuracyStudy
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-#: Packages that only display results; their code may change during a campaign.
-_SHOWING = ("cli", "report", "view")
+#: Packages that only display results; the code of these packages may change during a campaign.
+_DISPLAY = ("cli", "report", "view")
 LIBRARIES = ("urdfkin", "numpy", "numba", "llvmlite", "yourdfpy", *(one.package for one in ORACLES.values()))
 
 
@@ -50,7 +49,7 @@ def _code() -> str:
     digest = hashlib.sha256()
     for path in sorted(_PACKAGE.rglob("*")):
         relative = path.relative_to(_PACKAGE)
-        if path.suffix in (".py", ".toml", ".json") and relative.parts[0] not in _SHOWING:
+        if path.suffix in (".py", ".toml", ".json") and relative.parts[0] not in _DISPLAY:
             content = read_bytes(path)
             digest.update(f"{relative.as_posix()}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
@@ -66,7 +65,7 @@ class RobotReport:
         joints: Names of the moving joints, mimic joints included.
         frames: Names of the compared frames: every link and every joint.
         tallies: Error statistics of each quantity in each reference frame.
-        clock: Computing times of the parts; None if nothing was computed.
+        timings: Computing times; None if nothing was computed.
         error: The traceback of an unexpected error, for a bug report; None otherwise.
     """
 
@@ -79,8 +78,8 @@ class RobotReport:
     tallies: dict[Key, Tally]
     samples: int
     seconds: float
-    portrait: RobotSummary = NO_PORTRAIT
-    clock: Clock | None = None
+    summary: RobotSummary = EMPTY_SUMMARY
+    timings: Timings | None = None
     error: str | None = None
 
     @property
@@ -102,42 +101,50 @@ class RobotReport:
         """Return the error statistics of one quantity, one entry for each reference frame."""
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
-    def worst(self, quantity: str) -> float | None:
-        """Return the largest disagreement of a quantity, in eps * scale; None: it was not compared."""
-        return max((tally.worst for tally in self.of(quantity)), default=None)
-
     def replay(self, key: Key) -> str | None:
-        """Return a command that computes the worst result of a quantity again; None if there is none."""
+        """Return a command that computes the worst result of a quantity again; None: nothing was compared."""
         quantity, reference = key
-        case = self.tallies[key].case
-        return None if case is None else replay(self.origin, quantity, reference, case)
+        if (case := self.tallies[key].case) is None:
+            return None
+        row = QUANTITIES[quantity]
+        # The prefix "joint:" is needed because a link may have the same name.
+        frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
+        origin = replace(self.origin, oracle=None)  # the command compares the result with Pinocchio
+        return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
-    def as_dict(self, judgement: Judgement | None = None) -> dict[str, Any]:
-        return {
-            "source": self.source,
-            "name": self.name,
-            "verdict": self.verdict,
-            "reason": self.reason,
-            "error": self.error,
-            "joints": self.joints,
-            "frames": self.frames,
-            "samples": self.samples,
-            "results": self.results,
-            "failed": self.failed,
+    def as_dict(self, study: AccuracyStudy | None = None) -> dict[str, Any]:
+        names = (
+            "source",
+            "name",
+            "verdict",
+            "reason",
+            "error",
+            "joints",
+            "frames",
+            "samples",
+            "results",
+            "failed",
+        )
+        return {name: getattr(self, name) for name in names} | {
             "seconds": round(self.seconds, 3),
-            "timings": self.clock.as_dict() if self.clock else None,
-            "model": self.portrait.model,
-            "findings": self.portrait.findings,
-            "chains": self.portrait.chains,
-            "second_reader": self.portrait.second_reader,
+            "timings": self.timings.as_dict() if self.timings else None,
+            "model": self.summary.model,
+            "findings": self.summary.findings,
+            "chains": self.summary.chains,
+            "second_reader": self.summary.second_reader,
             "checks": [self._check(key) for key in self.tallies],
-            "judge": judgement,
+            "judge": study,
         }
 
     def _check(self, key: Key) -> dict[str, Any]:
         quantity, reference = key
         tally = self.tallies[key]
         case = tally.case
+        worst_case = case and {
+            **{name: getattr(case, name) for name in ("sample", "frame", "q", "v", "a")},
+            "disagreement": case.units,
+            "replay": self.replay(key),
+        }
         return {
             "quantity": quantity,
             "reference": reference or None,
@@ -151,26 +158,8 @@ class RobotReport:
             "histogram": tally.histogram,
             "subjects": QUANTITIES[quantity].of,
             "worst_by_subject": tally.by_frame,
-            "worst_case": None
-            if case is None
-            else {
-                "sample": case.sample,
-                "frame": case.frame,
-                "disagreement": case.units,
-                "q": case.q,
-                "v": case.v,
-                "a": case.a,
-                "replay": self.replay(key),
-            },
-        } | ({"second_oracle": tally.three_sides.as_dict()} if tally.three_sides else {})
-
-
-def replay(origin: Origin, quantity: str, reference: str, case: WorstCase) -> str:
-    row = QUANTITIES[quantity]
-    # The prefix "joint:" is needed because a link may have the same name.
-    frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
-    origin = replace(origin, oracle=None)  # the command compares the result with Pinocchio
-    return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
+            "worst_case": worst_case,
+        } | ({"second_oracle": tally.cross_check.as_dict()} if tally.cross_check else {})
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,10 +171,9 @@ class ValidationReport(Displayable):
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        made_by: Versions of urdfkin and of the oracles that computed the report; None if these are the
-            installed versions.
-        judgements: Results of the accuracy study, if requested. Each compared robot has a result, or None if
-            its study failed.
+        made_by: Versions of urdfkin and the oracles that computed the report; None: the installed versions.
+        studies: Results of the accuracy study, if requested: one for each compared robot; None if the study
+            of a robot failed.
     """
 
     robots: tuple[RobotReport, ...]
@@ -196,7 +184,7 @@ class ValidationReport(Displayable):
     seconds: float
     interrupted: bool = False
     made_by: dict[str, str] | None = None
-    judgements: tuple[Judgement | None, ...] = ()
+    studies: tuple[AccuracyStudy | None, ...] = ()
 
     def to_html(self) -> str:
         """Return the report as one offline HTML page, as `urdfkin validate --html` writes it."""
@@ -225,8 +213,8 @@ class ValidationReport(Displayable):
     def command(self) -> str:
         """The command that repeats the run.
 
-        Robots with the same options are on the same line. If a robot was passed as text, the command reads
-        the text from standard input. Each of these robots has its own line.
+        Robots with the same options are on the same line. For a robot that was passed as text, the command
+        reads the text from standard input. Each of these robots has its own line.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
@@ -246,16 +234,19 @@ class ValidationReport(Displayable):
 
     @property
     def exit_code(self) -> int:
-        """0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified."""
+        """Exit code of the command `validate`.
+
+        0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified.
+        """
         return self.outcome.exit_code
 
     def as_dict(self) -> Document:
         """Return the JSON document; an infinite or NaN disagreement becomes null."""
-        judgements = iter(self.judgements)  # only compared robots have an accuracy result
+        studies = iter(self.studies)  # only compared robots have an accuracy result
         document = {
             "schema": VALIDATION.name,
             "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
-            "sha256": [robot.portrait.model and robot.portrait.model["sha256"] for robot in self.robots],
+            "sha256": [robot.summary.model and robot.summary.model["sha256"] for robot in self.robots],
             "verdict": self.outcome.verdict,
             "command": self.command,
             "started": self.started,
@@ -267,7 +258,7 @@ class ValidationReport(Displayable):
             "interrupted": self.interrupted,
             "reason": self.outcome.reason,
             "robots": [
-                robot.as_dict(next(judgements, None) if robot.tallies else None) for robot in self.robots
+                robot.as_dict(next(studies, None) if robot.tallies else None) for robot in self.robots
             ],
         }
         return cast("Document", plain(document))

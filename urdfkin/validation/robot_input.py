@@ -1,7 +1,7 @@
-"""Represent the robots of a validation as plain data; the digest of a robot's text identifies the robot.
+"""Robots of a validation as plain data; the digest of a robot's text identifies the robot.
 
-A robot from a file is stored as its path, so that thousands of robots take little memory. Reading a text that
-has changed since the start of the validation is an error.
+A robot from a file is represented by the path, so that thousands of robots take little memory. An error is
+raised if the text has changed since the start of the validation.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from urdfkin.urdf.mjcf import is_mjcf
 from urdfkin.urdf.sources import Origin, Source, Text, as_word, is_usd, is_xacro, read_source
 from urdfkin.verify.oracles import ORACLES, PINOCCHIO
 
-Given = Source | DHTable | Robot
+RobotSource = Source | DHTable | Robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,11 @@ class RobotInput:
 
     Attributes:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
-        origin: Source of the robot (also if `source` is the text) and its loading options.
+        origin: Source of the robot (also if `source` is the text) and loading options.
         stamp: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in errors and warnings, if `source` is the text of the robot.
-        listed: Findings (errors and warnings) about the original MJCF or USD file, if the text was converted.
-        made: Whether the text was converted from another format than URDF.
+        listed: Errors and warnings about the original MJCF or USD file, if the text was converted.
+        made: Whether the text was converted to URDF from another format.
     """
 
     source: str | bytes
@@ -53,14 +53,14 @@ class RobotInput:
     @classmethod
     def of(cls, robot: Robot) -> RobotInput:
         if robot.source in catalogue():
-            found = _word(robot.source, robot.origin.mimic, robot.origin.root_joint)
+            found = _from_word(robot.source, robot.origin.mimic, robot.origin.root_joint)
             return replace(found, origin=replace(found.origin, lock=robot.origin.lock))
         listed = tuple(finding for finding in robot.findings if finding.code.startswith(("MJCF", "USD")))
-        return replace(_text(robot.urdf.encode(), robot.origin, robot.source), listed=listed)
+        return replace(_from_text(robot.urdf.encode(), robot.origin, robot.source), listed=listed)
 
     @property
     def label(self) -> str:
-        """The source of the robot, which is its name in messages until it is loaded."""
+        """Source of the robot; messages use this name until the robot is loaded."""
         return self.origin.source
 
     def text(self) -> Text:
@@ -87,9 +87,8 @@ class RobotInput:
         return replace(self, source=text.data, file=text.label)
 
     def read(self) -> Robot:
-        """Return the robot without warnings, because the robot's summary contains the findings."""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)
+            warnings.simplefilter("ignore", UrdfWarning)  # the robot's summary contains the findings
             robot = robot_of(
                 self.text(),
                 mimic=self.origin.mimic,
@@ -106,7 +105,7 @@ class RobotInput:
         """Return the robot for a comparison with Pinocchio.
 
         Raises:
-            OracleError: A finding states that Pinocchio refuses the file or reads a different robot.
+            OracleError: Pinocchio refuses the file or reads a different robot, as a finding states.
         """
         robot = self.read()
         if robot.verifier.unverifiable is not None:
@@ -115,26 +114,30 @@ class RobotInput:
 
 
 def subjects(
-    robots: Sequence[Given],
+    robots: Sequence[RobotSource],
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    """Return the robots as plain data, and reading errors by the robot's index."""
+    """Return the robots as plain data, and the errors of robots that cannot be read, by index."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
             found.append(subject(robot, mimic, root_joint, xacro_args, lock, joints))
         except Exception as error:
-            found.append(RobotInput(b"", Origin(_called(robot), mimic, root_joint)))
+            if isinstance(robot, os.PathLike):
+                name = as_word(Path(robot))
+            else:
+                name = robot if isinstance(robot, str) else f"<{type(robot).__name__}>"
+            found.append(RobotInput(b"", Origin(name, mimic, root_joint)))
             errors[i] = error
     return found, errors
 
 
 def subject(
-    robot: Given,
+    robot: RobotSource,
     mimic: bool | None = None,
     root_joint: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
@@ -148,7 +151,7 @@ def subject(
 
 
 def _subject(
-    robot: Given, mimic: bool | None, root_joint: str | None, xacro_args: Mapping[str, object] | None
+    robot: RobotSource, mimic: bool | None, root_joint: str | None, xacro_args: Mapping[str, object] | None
 ) -> RobotInput:
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot) or is_usd(robot):
         with warnings.catch_warnings():
@@ -158,23 +161,17 @@ def _subject(
         return RobotInput.of(robot)
     if is_xacro(robot):
         text = read_source(robot, xacro_args=xacro_args)  # the .xacro file is expanded once, here
-        return _text(text.data, Origin(text.source, mimic, root_joint, text.xacro_args), text.label)
+        return _from_text(text.data, Origin(text.source, mimic, root_joint, text.xacro_args), text.label)
     source = as_word(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":
-        return _word(source, mimic, root_joint)
+        return _from_word(source, mimic, root_joint)
     text = read_source(source)  # an open file, or standard input, is read once, here
     if is_mjcf(text.data):
         return _subject(text.data, mimic, root_joint, None)
-    return _text(text.data, Origin(text.source, mimic, root_joint), text.label)
+    return _from_text(text.data, Origin(text.source, mimic, root_joint), text.label)
 
 
-def _called(robot: Given) -> str:
-    if isinstance(robot, str | os.PathLike):
-        return str(robot) if isinstance(robot, str) else as_word(Path(robot))
-    return f"<{type(robot).__name__}>"
-
-
-def _word(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput:
+def _from_word(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput:
     """Return the input for a path, a catalogue name or a text."""
     try:
         text = read_source(source)
@@ -183,7 +180,7 @@ def _word(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput
     return RobotInput(source, Origin(text.source, mimic, root_joint), _digest(text.data))
 
 
-def _text(data: bytes, origin: Origin, file: str) -> RobotInput:
+def _from_text(data: bytes, origin: Origin, file: str) -> RobotInput:
     return RobotInput(data, origin, _digest(data), file)
 
 

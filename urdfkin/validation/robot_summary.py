@@ -4,7 +4,7 @@ The summary has the links and joints, the findings in the file, and Denavit-Hart
 plain data, which can be sent between processes and written as JSON.
 
 The chains of a catalogue robot are the limbs in the catalogue. For other robots, the chains are the paths
-from the base to the leaves. If several paths have the same moving joints, the summary contains one of them.
+from the base to the leaves. If several paths have the same moving joints, the summary contains only one path.
 Each chain has a standard and a modified table. The tables are exact, and are compared with Pinocchio.
 """
 
@@ -84,21 +84,20 @@ def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
     """Return the part of a joint's range in which its mimic joints are within limits; None: not narrowed."""
     if narrowed is None:
         return None
-    lower, upper = narrowed.kept or (None, None)
+    lower, upper = narrowed.allowed or (None, None)
     return {"lower": lower, "upper": upper, "by": narrowed.by}
 
 
-#: Maximum number of chains in a summary; `urdfkin dh --all` lists all.
+#: Maximum number of chains in a summary; `urdfkin dh --all` lists all chains.
 MOST = 12
 _SAMPLES = 10
 _CONVENTIONS = ("standard", "modified")
 
 
 def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
-    """Return each chain as plain data for JSON: frames, two tables, and their differences from Pinocchio.
+    """Return each chain as plain data for JSON: frames, two tables, and differences from Pinocchio.
 
-    `oracle` is Pinocchio's model. If it is None, Pinocchio cannot check the robot, and the tables are not
-    checked.
+    `oracle` is Pinocchio's model. Without an oracle, the tables are not checked.
     """
     found = []
     for limb, base, tip in _chains(robot):
@@ -153,7 +152,7 @@ class RobotSummary:
 
     Attributes:
         model: The result of `describe`; None if the robot could not be read.
-        second_reader: The comparison with yourdfpy's tree of the same text; None: not compared.
+        second_reader: Comparison with the tree that yourdfpy reads from the same text; None: no comparison.
     """
 
     model: ReportedModel | None = None
@@ -163,7 +162,7 @@ class RobotSummary:
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
-        """Return the summary of a loaded robot; without an oracle, its tables are not checked."""
+        """Return the summary of a loaded robot; without an oracle, the tables are not checked."""
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
         reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
         return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
@@ -191,13 +190,13 @@ def chain_disagreement(chain: Chain) -> str | None:
 
 
 def reader_disagreement(reading: ReportedSecondReading) -> str | None:
-    """Describe how yourdfpy's tree differs from urdfkin's; None if they are equal or were not compared."""
+    """Describe the differences between yourdfpy's and urdfkin's tree; None if there are none."""
     if not reading["differences"]:
         return None
     return f"{reading['by']} reads another robot from the file: {'; '.join(reading['differences'])}"
 
 
-NO_PORTRAIT = RobotSummary()
+EMPTY_SUMMARY = RobotSummary()
 
 
 def entries_of(findings: Iterable[Finding]) -> tuple[FindingEntry, ...]:

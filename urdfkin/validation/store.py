@@ -1,9 +1,11 @@
 """Store the results of a campaign in a folder with a manifest and one small file for each chunk.
 
-    DIR/manifest.json             definition of the campaign
-    DIR/chunks/4f/4f1a....chunk   result of a chunk; .failed: why its robot could not be checked
-    DIR/judge.json                settings of the accuracy study; chunks/*/*.judged: its results
-    DIR/lock                      locked by the process that writes to the store
+    DIR/manifest.json              definition of the campaign
+    DIR/chunks/4f/4f1a....chunk    result of a chunk
+    DIR/chunks/4f/4f1a....failed   reason why the robot of a chunk could not be checked
+    DIR/judge.json                 settings of the accuracy study
+    DIR/chunks/4f/4f1a....judged   result of the accuracy study of a robot
+    DIR/lock                       locked by the process that writes to the store
 
 Files are written atomically, so a file is either complete or absent. A damaged file, and a file whose name
 belongs to no chunk, is reported and moved to `damaged/`. The chunk of a damaged file is computed again.
@@ -21,22 +23,22 @@ import socket
 import stat
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, TypeVar
 
 from urdfkin.errors import InputError, SourceError
 from urdfkin.system.files import read_bytes, read_if_there
-from urdfkin.validation.answer import Answer, DamagedError, Failure, read, written
+from urdfkin.validation.answer import Answer, DamagedError, Failure, decode_answer, encode_answer
 from urdfkin.validation.manifest import Manifest
 
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
-JUDGE = "judge.json"
+STUDY_FILE = "judge.json"
 #: Suffix of a file with the accuracy result of a robot.
 #: `urdfkin.validation.accuracy_store` computes the name of the file.
-JUDGED = ".judged"
+STUDY_SUFFIX = ".judged"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: Number of attempts to acquire a lock; the attempts are 0.1 s apart.
@@ -49,10 +51,10 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Store:
-    """The folder of a stored validation, for reading. The function `opened` returns a store for writing.
+    """Folder of a stored validation; `open_store` returns a store for writing.
 
     Attributes:
-        tell: Callback for each damaged file.
+        tell: Callback for a message about each damaged file.
         scratch: Folder for unfinished files; None: the store is read-only.
     """
 
@@ -72,19 +74,19 @@ class Store:
         return cls(folder, Manifest.from_json(read_bytes(place), str(place)), tell)
 
     def answer(self, robot: int, index: int) -> Answer | None:
-        """Return the answer of a chunk, or None if the store has no answer.
+        """Return the answer of a chunk, or None if the store has no answer."""
+        key = self.manifest.key(robot, index)
+        return self.entry(key, _DONE, decode_answer) or self.entry(key, _FAILED, decode_answer)
+
+    def entry(self, key: str, kind: str, decode: Callable[[str, bytes], _T]) -> _T | None:
+        """Return the decoded content of the file with a key; None if the file is missing or damaged.
 
         A damaged file is moved to `damaged/`, unless the store is read-only.
         """
-        key = self.manifest.key(robot, index)
-        return self.kept(key, _DONE, read) or self.kept(key, _FAILED, read)
-
-    def kept(self, key: str, kind: str, read: Callable[[str, bytes], _T]) -> _T | None:
-        """Return the content of the file with a key; None if it is missing or damaged."""
         place = self._place(key, kind)
         try:
             content = read_if_there(place)
-            return None if content is None else read(key, content)
+            return None if content is None else decode(key, content)
         except (DamagedError, OSError) as error:
             why = f"{error.what}: {error.found}" if isinstance(error, SourceError) else str(error)
             self._quarantine(place, f"is damaged and is computed again: {why}")
@@ -97,17 +99,17 @@ class Store:
             SourceError: The file cannot be written.
         """
         key = self.manifest.key(robot, index)
-        self.keep_part(key, _FAILED if isinstance(found, Failure) else _DONE, written(key, found))
+        self.write_entry(key, _FAILED if isinstance(found, Failure) else _DONE, encode_answer(key, found))
 
     def has(self, key: str, kind: str) -> bool:
         return self._place(key, kind).exists()
 
     @property
-    def has_judge(self) -> bool:
-        return (self.folder / JUDGE).exists()
+    def has_study(self) -> bool:
+        return (self.folder / STUDY_FILE).exists()
 
-    def keep_part(self, key: str, kind: str, data: bytes) -> None:
-        """Write the file with the given key atomically; the method `kept` reads this file."""
+    def write_entry(self, key: str, kind: str, data: bytes) -> None:
+        """Write the file with a key atomically; the method `entry` reads this file."""
         self._write(self._place(key, kind), data)
 
     def forget_failures(self) -> None:
@@ -124,11 +126,14 @@ class Store:
         )
         expected = {self._place(key, kind) for key in keys for kind in (_DONE, _FAILED)}
         for place in sorted((self.folder / _CHUNKS).glob("*/*")):
-            if place not in expected and place.suffix != JUDGED:
+            if place not in expected and place.suffix != STUDY_SUFFIX:
                 self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:
-        """Return each robot's number of stored chunks and whether it failed; only file names are read."""
+        """Return, for each robot, the number of stored chunks and whether a chunk failed.
+
+        The method reads only the names of the files.
+        """
         names = {place.name for kind in (_DONE, _FAILED) for place in self._files(kind)}
         found = {}
         for robot in range(len(self.manifest.robots)):
@@ -137,7 +142,7 @@ class Store:
             found[robot] = done, any(key + _FAILED in names for key in keys)
         return found
 
-    def take(self, other: Store) -> int:
+    def copy_missing(self, other: Store) -> int:
         """Copy missing chunks from another store of the same campaign, and return their number."""
         other.check_names()
         taken = 0
@@ -148,7 +153,7 @@ class Store:
                     taken += 1
         return taken
 
-    def demand_same(self, manifest: Manifest, where: object = None) -> None:
+    def check_same(self, manifest: Manifest, where: object = None) -> None:
         """Raise InputError with the differences if a manifest describes another campaign."""
         if differences := self.manifest.differences(manifest):
             there = "here" if where is None else f"in {where}"
@@ -159,16 +164,13 @@ class Store:
                 remedy="use the options of the stored campaign, or another folder",
             )
 
-    def at_work(self) -> str | None:
-        """Return the process that is writing to the store, or None if no process is writing."""
+    def writing_process(self) -> str | None:
+        """Return words for the process that is writing to the store; None if no process is writing."""
         try:
             with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
                 return None if _try_lock(file, fcntl.LOCK_SH) else _holder(file)
         except OSError:
             return None
-
-    def write_manifest(self) -> None:
-        self.write(_MANIFEST, self.manifest.as_json())
 
     def write(self, name: str, data: bytes) -> None:
         """Write a file beside the manifest; raise SourceError if the file cannot be written."""
@@ -209,17 +211,17 @@ class Store:
 
 
 @contextlib.contextmanager
-def opened(
+def open_store(
     folder: Path, manifest: Manifest, tell: Tell, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
-    """Open the store of a validation, or create it, so that no other process can write into it.
+    """Open the store of a validation, or create the store, and lock the store for writing.
 
-    Only the part `shard` of the store is locked, for example "2/4": other processes may write other parts.
-    Without `shard`, the whole store is locked. With `retry_failed`, stored failures are deleted, because the
-    files of the failed robots may have changed.
+    With `shard`, for example "2/4", only this part of the store is locked, and other processes may write
+    other parts. With `retry_failed`, stored failures are deleted, because the files of the failed robots may
+    have changed.
 
     Raises:
-        SourceError: The store cannot be made or written.
+        SourceError: The store cannot be created or written.
         InputError: The store contains a validation with other robots or settings, or another process uses the
             store.
     """
@@ -258,85 +260,74 @@ def opened(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether another shard that starts at the same time may create the file before its manifest."""
+    """Return whether a process of another shard may have created the file before the manifest."""
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
     """Write the manifest if there is none, and return the store.
 
-    An existing manifest stays, because it contains the original start time.
+    An existing manifest is not replaced, because it contains the original start time.
     """
     if not (store.folder / _MANIFEST).exists():
-        store.write_manifest()
+        store.write(_MANIFEST, store.manifest.as_json())
         return store
-    before = Store(store.folder, Store.reading(store.folder, store.tell).manifest, store.tell, store.scratch)
-    if retry_failed and _only_failed_ones_differ(before, store.manifest):
-        before.forget_failures()
-        store.write_manifest()
-        return store
-    before.demand_same(store.manifest)
+    before = replace(store, manifest=Store.reading(store.folder, store.tell).manifest)
+    is_changed = retry_failed and _only_failed_robots_differ(before, store.manifest)
+    if not is_changed:
+        before.check_same(store.manifest)
     if retry_failed:
         before.forget_failures()
+    if is_changed:
+        store.write(_MANIFEST, store.manifest.as_json())
+        return store
     return before
 
 
-def _only_failed_ones_differ(store: Store, manifest: Manifest) -> bool:
+def _only_failed_robots_differ(store: Store, manifest: Manifest) -> bool:
     """Return whether two manifests differ only in the digests of failed robots, whose files have changed."""
-    own, theirs = store.manifest, manifest
-    if len(own.robots) != len(theirs.robots):
+    own, theirs = store.manifest.robots, manifest.robots
+    if len(own) != len(theirs) or replace(store.manifest, robots=theirs).differences(manifest):
         return False
-    differ = [i for i, pair in enumerate(zip(own.robots, theirs.robots, strict=True)) if pair[0] != pair[1]]
-    robots = [theirs.robots[i] if i in differ else robot for i, robot in enumerate(own.robots)]
-    same = Manifest(tuple(robots), own.samples, own.seed, own.provenance, own.versions, own.started)
+    differ = [i for i, robots in enumerate(zip(own, theirs, strict=True)) if robots[0] != robots[1]]
     counts = store.counts()
-    return (
-        bool(differ)
-        and not same.differences(theirs)
-        and all(counts[i][1] and own.robots[i][0] == theirs.robots[i][0] for i in differ)
-    )
+    return bool(differ) and all(counts[i][1] and own[i][0] == theirs[i][0] for i in differ)
 
 
 @contextlib.contextmanager
 def _locked(folder: Path, shard: str | None) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
-        whole = stack.enter_context(_lock_file(folder / _LOCK))
-        _lock(whole, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
+        file = stack.enter_context(_lock_file(folder / _LOCK))
+        _lock(file, fcntl.LOCK_SH if shard else fcntl.LOCK_EX, folder)
         if shard:
-            part = stack.enter_context(_lock_file(folder / f"{_LOCK}-{shard.replace('/', '-of-')}"))
-            _lock(part, fcntl.LOCK_EX, folder)
-            whole = part
-        whole.truncate(0)
-        whole.write(json.dumps({"host": socket.gethostname(), "process": os.getpid()}).encode())
-        whole.flush()
+            file = stack.enter_context(_lock_file(folder / f"{_LOCK}-{shard.replace('/', '-of-')}"))
+            _lock(file, fcntl.LOCK_EX, folder)
+        file.truncate(0)
+        file.write(json.dumps({"host": socket.gethostname(), "process": os.getpid()}).encode())
+        file.flush()
         yield
 
 
 def _lock_file(place: Path, how: int = os.O_RDWR | os.O_CREAT | os.O_APPEND) -> IO[bytes]:
     """Open the file of a lock; raise SourceError if the path is a link, a pipe or a device."""
+    message, remedy = "the store's lock is not a regular file", "delete the lock"
     try:
         descriptor = os.open(place, how | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise _no_lock(place, "a link") from error
+            raise SourceError(message, where=str(place), found="a link", remedy=remedy) from error
         raise
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise _no_lock(place, "another kind of file")
+        raise SourceError(message, where=str(place), found="another kind of file", remedy=remedy)
     return os.fdopen(descriptor, "rb" if how == os.O_RDONLY else "a+b")
-
-
-def _no_lock(place: Path, found: str) -> SourceError:
-    return SourceError(
-        "the store's lock is not a regular file", where=str(place), found=found, remedy="delete the lock"
-    )
 
 
 def _lock(file: IO[bytes], how: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, how):
             return
-        time.sleep(0.1)  # another process may test for a moment whether the lock is free
+        time.sleep(0.1)  # another process may hold the lock for a moment to test whether the lock is free
     raise InputError(
         "another process uses this store",
         where=str(folder),

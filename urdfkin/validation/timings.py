@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import astuple, dataclass
 from typing import Any, ParamSpec, TypeVar
 
@@ -12,10 +12,13 @@ _T = TypeVar("_T")
 
 
 @dataclass(slots=True)
-class Clock:
-    """Computing time (seconds) of each part; `read` includes the models of urdfkin and Pinocchio.
+class Timings:
+    """Computing times in seconds.
 
-    The time `compare` of the bounds and the comparison is the total time minus the times of the other parts.
+    Attributes:
+        read: Time of building the models of urdfkin and of the oracles.
+        compare: Time of the bounds and of the comparison: the total time minus all other times.
+        second: Time of the second oracle.
     """
 
     read: float = 0.0
@@ -36,14 +39,9 @@ class Clock:
         """Set `compare` to the total time (s) minus the times of all other parts."""
         self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
+    def __add__(self, other: Timings) -> Timings:
+        return Timings(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
     def as_dict(self) -> dict[str, Any]:
-        return {
-            "read": round(self.read, 4),
-            "urdfkin": round(self.urdfkin, 4),
-            "pinocchio": round(self.pinocchio, 4),
-            "compare": round(self.compare, 4),
-        } | ({"second_oracle": round(self.second, 4)} if self.second else {})
-
-
-def total(clocks: Iterable[Clock]) -> Clock:
-    return Clock(*(sum(seconds) for seconds in zip(*map(astuple, clocks), strict=True)))
+        parts = {name: round(getattr(self, name), 4) for name in ("read", "urdfkin", "pinocchio", "compare")}
+        return parts | ({"second_oracle": round(self.second, 4)} if self.second else {})

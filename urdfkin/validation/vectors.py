@@ -1,6 +1,6 @@
 """Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
 
-The file `robots/features.toml` defines small robots with one feature of URDF each. For robots of the
+The file `robots/features.toml` defines small robots, each with one feature of URDF. For robots of the
 catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimals of
 the URDF, and configurations from digests of names. Therefore, the files depend only on these texts.
 """
@@ -59,16 +59,16 @@ from urdfkin.verify.quantities import (
 VERSION = "1.0"
 LICENCE = "CC0-1.0"
 #: Number of configurations of each robot; the first is the zero configuration.
-#: A joint whose limits exclude zero has its limit nearest to zero.
+#: If a joint's limits exclude zero, the joint is at the limit nearest to zero instead.
 SAMPLES = 3
 #: Bound of velocities, accelerations, and positions of planar and floating joints.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
-#: A multiple of 1 / 1024 has few decimals, and a double represents it exactly.
+#: A multiple of 1 / 1024 has few decimals and is exactly a double.
 _GRID = 1024.0
-#: A tolerance is first rounded to `_SAME` digits.
-#: Then the tolerance is rounded up to `_DIGITS` digits.
-_DIGITS, _SAME = 3, 12
+#: Number of digits of a tolerance, and number of digits before the last rounding.
+#: The first rounding removes differences between processors.
+_DIGITS, _FIRST_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
     ACCELERATION,
@@ -76,27 +76,19 @@ SPATIAL_ACCELERATION = replace(
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
 #: The quantities of the test vectors.
-#: The classical and the spatial acceleration differ by w x vel, which the scale of both includes.
+#: The scales of the classical and of the spatial acceleration include the difference w x vel.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
 
 
 class JointEntry(TypedDict):
-    """A joint with its own coordinates, and the indices of its numbers in q, v and a."""
+    """A joint with coordinates, and the indices of the joint's numbers in q, v and a."""
 
     name: Annotated[str, says("Name of the joint.")]
     type: Annotated[str, says("Type of the joint in the URDF.")]
-    q: Annotated[
-        list[Count],
-        of_length(2),
-        says("Index of the joint's first number in q, and the index after its last number."),
-    ]
-    v: Annotated[
-        list[Count],
-        of_length(2),
-        says("Index of the joint's first number in v and a, and the index after its last number."),
-    ]
+    q: Annotated[list[Count], of_length(2), says("First index in q, and the index after the last.")]
+    v: Annotated[list[Count], of_length(2), says("First index in v and a, and the index after the last.")]
 
 
 class Result(TypedDict):
@@ -120,8 +112,7 @@ class Result(TypedDict):
     k: Annotated[Size, says("The tolerance in multiples of 2^-52 times the size of the terms.")]
     value: Annotated[list[float], says("The true values, rounded to 17 significant digits.")]
     tolerance: Annotated[
-        list[float],
-        says("Largest allowed difference of a result from the true value; 0: they must be equal."),
+        list[float], says("Largest allowed difference from the true value; 0: the result must be equal.")
     ]
 
 
@@ -148,10 +139,7 @@ class Vectors(TypedDict):
     robot: Annotated[str, says("Name of the feature or robot.")]
     file: Annotated[str, says("Path of the URDF, in this folder or in example-robot-data.")]
     sha256: Annotated[Sha256, says("SHA-256 of the URDF file.")]
-    rule: Annotated[
-        str | None,
-        says("The rule of the URDF standard that this robot tests, or null."),
-    ]
+    rule: Annotated[str | None, says("The rule of the URDF standard that this robot tests, or null.")]
     note: Annotated[str | None, says("How libraries differ, or how the file was loaded; null: no remark.")]
     joints: list[JointEntry]
     samples: list[Sample]
@@ -193,7 +181,7 @@ def stem(name: str) -> str:
 
 @cache
 def features() -> Mapping[str, Feature]:
-    """Return the features of `robots/features.toml` by name.
+    """Return the features in `robots/features.toml` by name.
 
     >>> features()["axis of length 2"].rule
     'The axis is a direction: its length has no effect on an angle.'
@@ -234,7 +222,7 @@ def _robot(row: Mapping[str, Any]) -> str:
 
 
 def _fraction(*words: object) -> float:
-    """Return a number in [0, 1) that depends only on the given words."""
+    """Return a number in [0, 1) from the sha256 of some words."""
     digest = hashlib.sha256("\n".join(map(str, words)).encode()).digest()
     return int.from_bytes(digest[:6], "big") / 2.0**48
 
@@ -244,7 +232,7 @@ def _on_grid(x: float) -> float:
 
 
 def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return q, v and a of a sample, which depend on the robot's name and the limits alone."""
+    """Return q, v and a of a sample; they depend only on the robot's name, joints and limits."""
     q, ranges = neutral(tree), coordinate_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         unit = [_fraction(name, sample, joint.name, k) for k in range(joint.nq)]
@@ -272,7 +260,7 @@ def _tolerance(k: float, scale: float) -> str:
     """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
-    with localcontext(prec=_SAME):  # processors may differ in the last digits
+    with localcontext(prec=_FIRST_DIGITS):
         number = +Decimal(k * max(EPS * scale, LEAST_UNIT))
     with localcontext(prec=_DIGITS, rounding=ROUND_CEILING):
         return str((+number).normalize())
@@ -283,7 +271,11 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The files of one robot with the number of values: vectors as JSON and as lines, and a written URDF."""
+    """The files of one robot: vectors as JSON and as lines, and the URDF if it was written.
+
+    Attributes:
+        numbers: Number of values in each file of vectors.
+    """
 
     robot: str
     files: tuple[Path, ...]
@@ -301,7 +293,7 @@ class _Head:
 
 
 def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the test vectors and the URDF of each small robot in `features.toml`. Yield the written files."""
+    """Write the test vectors and the URDF of each small robot in `features.toml`."""
     for feature in features().values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -330,11 +322,7 @@ def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> Written:
 
 
 def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the vectors of all robots of the catalogue, and yield what was written.
-
-    Raises:
-        SourceError: a file cannot be written.
-    """
+    """Write the test vectors of all robots in the catalogue."""
     for name in catalogue():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -343,12 +331,12 @@ def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
 
 
 def name_of(robot: Robot) -> str:
-    """Return a robot's name in its test vectors: the catalogue's name, or else the URDF's name."""
+    """Return the robot's name in the catalogue, or else the name in the URDF."""
     return robot.source if robot.source in catalogue() else robot.name
 
 
 def write_sums(folder: Path, written: Sequence[Written]) -> Path:
-    """Write SHA256SUMS, which `sha256sum --check` reads, for all files."""
+    """Write SHA256SUMS for all files, in the format of `sha256sum --check`."""
     lines = [
         f"{hashlib.sha256(read_bytes(path, MOST_DATA)).hexdigest()}  {path.name}\n"
         for one in written
@@ -396,9 +384,9 @@ def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], sample
 
 
 def _result(one: Mapping[str, Any]) -> str:
-    """Return a result as JSON; its decimals are not converted to doubles."""
-    lists = {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
-    texts = {name: json_text(x) if name not in lists else lists[name] for name, x in one.items()}
+    """Return a result as JSON, without converting the decimals to doubles."""
+    texts = {name: json_text(x) for name, x in one.items()}
+    texts |= {name: f"[{', '.join(one[name])}]" for name in ("value", "tolerance")}
     return f"{{{', '.join(f'{json_text(name)}: {text}' for name, text in texts.items())}}}"
 
 

@@ -1,17 +1,16 @@
-"""Read a robot file with other libraries; one adapter for each library follows its documentation.
+"""Read a robot file with other libraries, with one adapter for each library.
 
-The module imports only NumPy and the chosen library. The command `urdfkin readers` imports this module.
-`scripts/make_libraries.py` runs this module as a program, with the Python of an environment that contains one
-library:
+This module imports only NumPy and the chosen library. The command `urdfkin readers` imports this module.
+`scripts/make_libraries.py` runs this module as a program, with the Python of an environment with one library:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
 The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
-case. A configuration gives values by the names of the independent joints: one number (rad or m), three for a
-planar joint (x, y, angle), seven for a floating joint (x, y, z, qx, qy, qz, qw).
+case. A configuration maps each independent joint to its value: one number (rad or m), three numbers for a
+planar joint (x, y, angle), or seven for a floating joint (x, y, z, qx, qy, qz, qw).
 
-An adapter passes all inputs that the library's documentation requires. The adapter sets no values of mimic
-joints, because the file contains the mimic rules. The adapter does not correct wrong poses.
+An adapter passes all inputs that the library's documentation requires, but no values of mimic joints, whose
+rules are in the file. The adapter does not correct wrong poses.
 """
 
 from __future__ import annotations
@@ -49,8 +48,8 @@ class Reading:
 
     Attributes:
         joints: Names of the joints that have a coordinate, in the library's order.
-        poses: Function that returns the pose (4, 4) of each link in the root link for given joint values.
-            Links that the library merges into other links are missing.
+        poses: Function (joint values) that returns the pose (4, 4) of each link in the root link, except for
+            links that the library merges into other links.
     """
 
     joints: list[str]
@@ -61,7 +60,7 @@ class Reading:
 
 
 def _is_path(source: str) -> bool:
-    """Return whether a source is the path of an MJCF or USD file; other sources are URDF texts."""
+    """Return whether a source is the path of an MJCF or USD file, and not a URDF text."""
     return not source.lstrip().startswith("<")
 
 
@@ -101,13 +100,13 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Return link poses relative to the root link; a missing root link has the identity pose."""
+    """Return link poses in the root link; without a pose of the root link, in the world."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
 
 def read_pinocchio(text: str) -> Reading:
-    """Read a URDF with Pinocchio; `mimic=True` couples its mimic joints."""
+    """Read a URDF with Pinocchio, with coupled mimic joints."""
     import pinocchio as pin
 
     if _is_path(text):
@@ -134,13 +133,13 @@ def read_pinocchio(text: str) -> Reading:
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
-    # The joint 0 is the world.
+    # Joint 0 is the world.
     moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]
     return Reading(moving, poses)
 
 
 def read_mujoco(text: str) -> Reading:
-    """Read a URDF with MuJoCo; links at fixed joints are not merged, and each mass has a lower limit."""
+    """Read a URDF with MuJoCo, without merging links at fixed joints, and with a minimum for each mass."""
     import mujoco
 
     root = "world"
@@ -181,7 +180,7 @@ def read_mujoco(text: str) -> Reading:
 
 
 def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
-    """Yield the MuJoCo joints for a joint of the URDF, with their values; three joints for a planar joint."""
+    """Yield the name and the value of each MuJoCo joint for a joint of the URDF; three for a planar joint."""
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR[0] in names:
@@ -189,7 +188,7 @@ def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, V
 
 
 def read_drake(text: str) -> Reading:
-    """Read a URDF with Drake, as a discrete plant with the contact solver that mimic joints require."""
+    """Read a URDF with Drake, as a discrete plant with the contact solver SAP, which mimic joints require."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 
@@ -199,7 +198,7 @@ def read_drake(text: str) -> Reading:
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root))
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    # Drake gives a floating joint the name of its child link.
+    # A floating joint has the name of its child link in Drake.
     carried = {child: joint for joint, child in _children(text).items()}
     moving = [j for i in plant.GetJointIndices() if (j := plant.get_joint(i)).num_positions()]
     joints = {carried.get(j.name(), j.name()): j for j in moving}
@@ -236,8 +235,8 @@ def read_idyntree(text: str) -> Reading:
     }
     computed.setFloatingBase(root)
 
-    # `_owner` keeps the loader and its model alive.
-    def poses(values: Mapping[str, Value], _owner: Any = loader) -> Poses:
+    # The model exists only as long as the loader, to which the default of `_loader` refers.
+    def poses(values: Mapping[str, Value], _loader: Any = loader) -> Poses:
         q = np.zeros(model.getNrOfPosCoords())
         for name in places.keys() & values.keys():
             q[places[name]] = _scalar(values[name])
@@ -309,7 +308,7 @@ def read_kinpy(text: str) -> Reading:
 
 
 def read_ikpy(text: str) -> Reading:
-    """Read a URDF with ikpy, which reads only one path from the root to a tip."""
+    """Read one path of a URDF from the root to a tip; ikpy reads no branches."""
     from ikpy.chain import Chain
 
     root, children = _root(text), _children(text)
@@ -368,8 +367,7 @@ def read_newton(path: str) -> Reading:
     model = builder.finalize(device="cpu")
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
-    # Newton adds a free joint, which the file does not contain, to a body without a joint.
-    # `eval_mimic` computes the coordinates of mimic joints.
+    # Newton adds a free joint to a body without a joint; the file does not contain this free joint.
     places = {
         str(label).rpartition("/")[2]: (int(start), int(count))
         for label, kind, leader, start, count in zip(
@@ -404,8 +402,8 @@ class Library:
         title: Name of the library in tables.
         package: The name that pip installs.
         module: The module that is imported.
-        read: Its adapter.
-        forms: The file formats that the adapter reads with the library.
+        read: The adapter.
+        forms: File formats that the adapter can read.
         single: Whether the library computes in single precision.
     """
 
@@ -442,11 +440,11 @@ def version(name: str) -> str | None:
 
 
 def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the joints and poses that a library finds for a case, or the text of its error."""
+    """Return a library's joints and poses for a case, or the text of the library's error."""
     try:
         reading = LIBRARIES[name].read(case["text"])
         found = [reading.poses(values) for values in case["configurations"]]
-    except Exception as error:  # each library raises other types of exceptions
+    except Exception as error:  # the libraries raise many types of exceptions
         words = " ".join(str(error).split())
         return {"error": f"{type(error).__name__}: {words}" if words else type(error).__name__}
     poses = [{link: np.asarray(T, float).tolist() for link, T in one.items()} for one in found]
@@ -463,13 +461,13 @@ def _lines(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
 
 
 def main() -> None:
-    """Read cases from standard input, and print the answers of the library that the first argument names."""
+    """Print the answers of the library that the first argument names, to the cases on standard input."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    own = os.dup(1)  # libraries may print their own text to standard output
+    output = os.dup(1)  # libraries may print to standard output, which becomes standard error
     os.dup2(2, 1)
     for line in _lines(sys.argv[1], json.load(sys.stdin)):
-        os.write(own, f"{line}\n".encode())
+        os.write(output, f"{line}\n".encode())
 
 
 if __name__ == "__main__":

@@ -1,18 +1,7 @@
-"""Compute analytical Jacobians from a rotation matrix and a velocity Jacobian, without any angle.
+"""Compute analytical Jacobians (eq. 7.122) from a rotation matrix and a velocity Jacobian, without any angle.
 
-The module computes eq. 7.122 a second time, as a check of results. It shares no code with
-`urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`.
-
-An Euler sequence rotates about the coordinate axes i, then j, then k, so that R = R_i R_j R_k. The first axis
-of rotation is e_i and the third is R e_k. The middle axis, the line of nodes, is perpendicular to the first
-and to the third axis. The middle axis is +- n / |n| with n = e_i x R e_k. The range of the middle angle b
-determines the sign:
-
-- k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
-- k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
-
-The time derivatives of the angles are the dot products of the angular velocity w with the reciprocal basis of
-the three axes. The functions also accept arrays of fifty-digit numbers, which the accuracy study uses.
+The results check `urdfkin.kinematics.rotation` and `urdfkin.kinematics.bodies`, which share no code with this
+module. The functions also accept arrays of fifty-digit numbers, for the accuracy study.
 """
 
 from __future__ import annotations
@@ -29,29 +18,41 @@ Numbers = NDArray[Any]
 def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Numbers]:
     """Return the Jacobian (..., 6, n) of the position and three Euler angles, and |sin b| or |cos b| (...).
 
-    Here b is the middle angle. The sequence has SciPy's name: capital letters are body axes, small letters
-    are fixed axes. `R` (..., 3, 3) rotates body axes to world axes. `J_v` (..., 6, n) is the velocity
-    Jacobian, [linear; angular], in world axes.
+    An Euler sequence rotates about the coordinate axes i, j and k, in this order: R = R_i R_j R_k. The first
+    rotation axis is e_i, and the third is R e_k. The middle axis is perpendicular to the first and the third
+    axis: it is n / |n| or -n / |n|, with n = e_i x R e_k. The range of the middle angle b determines the
+    sign:
+
+    - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
+    - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
+
+    The derivative of each angle is the dot product of the angular velocity and a vector of the reciprocal
+    basis of the three axes.
+
+    Args:
+        name: SciPy's name of the sequence: capital letters are body axes, small letters are fixed axes.
+        R: (..., 3, 3) rotation from body axes to world axes.
+        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in world axes.
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)
     first, third = np.eye(3)[i], R[..., :, k]
-    across = np.cross(first, third)
-    apart = np.sqrt((across * across).sum(axis=-1, keepdims=True))
-    sense = 1.0 if k == i else float(np.linalg.det(np.eye(3)[[j, i, k]]))
+    n = np.cross(first, third)
+    length = np.sqrt((n * n).sum(axis=-1, keepdims=True))
+    sign = 1.0 if k == i else float(np.linalg.det(np.eye(3)[[j, i, k]]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        middle = sense * across / apart
-        volume = -sense * apart  # the volume is first . (middle x third)
+        middle = sign * n / length
+        volume = -sign * length  # first . (middle x third)
         reciprocal = [np.cross(middle, third) / volume, middle, np.cross(first, middle) / volume]
     rows = np.stack(reciprocal[::-1] if name.islower() else reciprocal, axis=-2)
-    return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), apart[..., 0]
+    return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), length[..., 0]
 
 
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
     """Return the Jacobian (..., 7, n) of the position and a unit quaternion (..., 4), scalar last.
 
-    The derivative of the quaternion is half of the quaternion product of (w, 0) and `quat`, where w is the
-    angular velocity. `J_v` is the velocity Jacobian as in `euler_jacobian`.
+    The derivative of the quaternion is half of the quaternion product (w, 0) `quat`; w is the angular
+    velocity. `J_v` is the velocity Jacobian (..., 6, n), [linear; angular], in world axes.
     """
     w = J_v[..., 3:, :].swapaxes(-1, -2)
     q, q0 = quat[..., np.newaxis, :3], quat[..., np.newaxis, 3:]

@@ -4,16 +4,16 @@ A result is accepted if each of its numbers differs from the oracle's number by 
 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
-Each number is a sum of terms. *scale* is an upper bound on the sum of the absolute values of these terms
-(`magnitudes`). The scale has the unit of the number. If two computations add the same terms in different
-orders, the difference of the two results is proportional to the scale, not to the sum of the terms.
+*Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
+terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. The
+difference of the two sums is proportional to the scale, not to the sums.
 
 *k* is the number of roundings to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
-adds a fixed number of roundings. Each joint also rotates the vectors of the joints after it. A rotation does
-not amplify an error, so the error grows only linearly with the number of joints.
+adds a fixed number of roundings. A joint also rotates the vectors of the joints after it, but a rotation does
+not amplify an error. The error therefore grows linearly with the number of joints.
 
-Each term of a quantity is a product of rotated vectors. Each vector is a *factor* with its own rounding
-error:
+*Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
+rounding error:
 
 | Quantity | Factors | Vectors in a term |
 |---|---|---|
@@ -28,15 +28,14 @@ The references LOCAL and WORLD need one more factor: a rotation into the frame's
 product with p (WORLD).
 
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
-worst way. Reports state differences in multiples of eps * scale, because these multiples can be compared
-between robots.
+worst way. Reports state differences in multiples of eps * scale, because such multiples of different robots
+can be compared.
 
-`magnitudes` runs the forward recursion with the lengths of vectors instead of the vectors. The function
-evaluates eq. 7.58 and 7.127 to 7.130 with the number types of `urdfkin.kinematics.number_kinds`. With these
-number types, no intermediate value exceeds the result. Pinocchio computes one term differently. Eq. 7.129
-contains the term v_i w_{i-1} x z. Pinocchio computes v_i w_i x z instead. The difference is v_i^2 z x z,
-which is 0 except for rounding errors. These rounding errors are relevant for fast joints with an oblique
-axis. `magnitudes` therefore uses w_i instead of w_{i-1} in its bound on the angular acceleration alpha.
+*Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
+vectors (`urdfkin.kinematics.number_kinds`), so no intermediate value exceeds the result. Eq. 7.129 contains
+the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The difference v_i^2 z x z is 0 except for
+rounding errors, which are large for fast joints with an oblique axis. The bound on the angular acceleration
+alpha therefore uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -55,17 +54,17 @@ from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.lengths import State
 from urdfkin.kinematics.number_kinds import Length, counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, MUJOCO, ROUNDINGS, of_joints
+from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS, of_joints
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.verify.comparison import KERNELS
 
-_UNTURNED = np.eye(3).ravel()
-#: Indices of position, velocities and accelerations in a moving base's state.
+#: Module of the compiled functions that check results.
+KERNELS = "urdfkin.verify.kernels"
+_NO_ROTATION = np.eye(3).ravel()
+#: Indices of position, velocities and accelerations in the state of a moving base.
 _OF_BASE = 9, 12, 15, 18, 21
-#: Number of configurations that the compiled function `lengths` computes at a time.
-#: The intermediate results for one block fit into the processor's first-level cache.
+#: Number of configurations in a block of the kernel `lengths`; a block fits into the first-level cache.
 _BLOCK = 64
 
 
@@ -74,12 +73,12 @@ class Magnitudes:
     """Upper bounds on the terms of a frame's position, velocity and acceleration.
 
     Attributes:
-        p: (n, frames) length of the path from the world origin, in m. Prismatic displacements are included.
+        p: (n, frames) length of the path from the world origin, with prismatic displacements, m.
         w: (n, frames) angular velocity, rad/s.
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) upper bound on the number of rounding errors of one factor. A factor is a
+        roundings: (n, frames) upper bound on the number of rounding errors of one factor, that is, of one
             rotated vector. The bound counts all URDF joints on the path, a rotated base, and one additional
             joint.
     """
@@ -101,8 +100,7 @@ def magnitudes(
     Args:
         plan: The compiled tree.
         q: (n, nq) rad, m.
-        v: (n, nv) or None. Without v, only `p` and `roundings` are valid. Placements and Jacobians need only
-            these two.
+        v: (n, nv) or None. Without v, only `p` and `roundings` are valid, for placements and Jacobians.
         a: (n, nv) or None.
         base: (1 or n, 24) state of the moving base.
     """
@@ -119,8 +117,8 @@ def magnitudes(
             preload.spend("lengths", time.thread_time() - begin)
     else:
         _by_kernel(kernel, lengths, inputs, out)
-    turned = (base[:, :9] != _UNTURNED).any(axis=1)  # a rotated base adds as many roundings as a joint
-    out[5] = of_joints(plan.depth + 1 + turned[:, np.newaxis], plan.tilts)
+    is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)  # a rotated base has as many roundings as a joint
+    out[5] = of_joints(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
@@ -133,13 +131,13 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
     for end in lengths.ends:
         carried = (steps.carried if rates else _carried_place)(states[end.step + 1], end.length)
         for row, values in zip(out, carried, strict=False):
-            row[:, end.place] = values  # a value for all configurations is a scalar
+            row[:, end.frame] = values
 
 
 def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with a compiled function, with the same bits as `_by_steps`."""
+    """Compute `out` with a compiled function; the bits are those of `_by_steps`."""
     links = lengths.links
-    # An input that is the same for all configurations becomes a single row.
+    # The stride of an input is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
     free = [
         x
@@ -166,10 +164,7 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _MovingJoint(NamedTuple):
-    """A moving joint of a compiled tree.
-
-    `multiplier` and `constant` are the absolute values of the joint's mimic multiplier and mimic offset.
-    """
+    """A moving joint of a compiled tree, with the absolute values of the mimic multiplier and offset."""
 
     kind: int
     q: int
@@ -177,18 +172,20 @@ class _MovingJoint(NamedTuple):
     parent: int
     length: float
     multiplier: float
-    constant: float
+    offset: float
 
 
 class _End(NamedTuple):
     """A frame of a compiled tree.
 
-    `step` is the index of the last moving joint before the frame. `length` is the length of the path from
-    this joint to the frame. `place` is the frame's index in the output.
+    Attributes:
+        step: Index of the last moving joint before the frame.
+        frame: Index of the frame in the output.
+        length: Length of the path from the joint `step` to the frame, m.
     """
 
     step: int
-    place: int
+    frame: int
     length: float
 
 
@@ -201,25 +198,25 @@ class _Lengths(NamedTuple):
 
 
 def _lengths(plan: CompiledTree) -> _Lengths:
-    """Return the moving joints and the frames of a compiled tree, which stores the result for later calls."""
-    found: _Lengths | None = plan.made.get("lengths")
+    """Return the moving joints and the frames of a compiled tree; `plan.cache` stores the result."""
+    found: _Lengths | None = plan.cache.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
         rules = np.abs(plan.geometry[:, Geometry.MULTIPLIER :]).tolist()
         steps = zip(plan.steps.tolist(), plan.parents.tolist(), lengths[:count], rules, strict=True)
         links = [
-            _MovingJoint(kind, q, v, parent, length, multiplier, float(counted(constant)))
-            for (kind, q, v), parent, length, (multiplier, constant) in steps
+            _MovingJoint(kind, q, v, parent, length, multiplier, float(counted(offset)))
+            for (kind, q, v), parent, length, (multiplier, offset) in steps
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
-        ends = [_End(step, place, length) for (step, place), length in frames]
+        ends = [_End(step, frame, length) for (step, frame), length in frames]
         tables = (
             np.array([link[:4] for link in links], dtype=np.int64).reshape(-1, 4),
             np.array([link[4:] for link in links]).reshape(-1, 3),
             np.array([end[:2] for end in ends], dtype=np.int64).reshape(-1, 2),
             np.array([end.length for end in ends]),
         )
-        found = plan.made["lengths"] = _Lengths(links, ends, tables)
+        found = plan.cache["lengths"] = _Lengths(links, ends, tables)
     return found
 
 
@@ -245,7 +242,7 @@ def _displacement(link: _MovingJoint, q: Any) -> Length:
     """Return a bound on the displacement of a prismatic, planar or floating joint, m."""
     if link.kind != JointMotion.SLIDE:
         return _norm(q[link.q : link.q + _FREE_PARTS[link.kind][0]])
-    return product(link.multiplier, abs(q[link.q])) + link.constant
+    return product(link.multiplier, abs(q[link.q])) + link.offset
 
 
 def _place(link: _MovingJoint, state: State, q: Any) -> State:
@@ -275,7 +272,7 @@ def _step(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles is inf; `disagreement` then accepts no result.
+#: A scale above the range of doubles becomes inf, and `disagreement` then accepts no result.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
@@ -285,7 +282,7 @@ class Bound:
 
     Attributes:
         scale: Upper bound on the sum of the absolute values of the terms of a number, in the unit of this
-            number. A scale of 0 means that the results of urdfkin and of the oracle must be equal.
+            number. If the scale is 0, the results of urdfkin and of the oracle must be equal.
         k: Allowed difference in multiples of eps * scale.
     """
 
@@ -296,8 +293,7 @@ class Bound:
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the factor `k` of the bound for each result, as an array of shape `leading`.
 
-    All numbers of a result have the same `k`. A value of k that is not finite and positive is replaced by
-    NaN. Then no result is within its bound.
+    A `k` that is not finite and positive becomes NaN, so that no result is within the bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -305,10 +301,7 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound of a quantity with the given scale (n, frames, ...).
-
-    The factor `k` of the bound is the number of factors times the number of rounding errors of one factor.
-    """
+    """Return the bound with a scale (n, frames, ...), and with k = factors * roundings of one factor."""
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
@@ -318,12 +311,12 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
 def about_the_root(size: Magnitudes) -> Magnitudes:
     """Return the magnitudes for a comparison of urdfkin with MuJoCo.
 
-    MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass. In the models of
-    `urdfkin.verify.mujoco`, this centre of mass is at the root. At the end, MuJoCo converts the results to
-    the frame's origin. The distance of the centre of mass from a joint or from the frame is at most the
-    length of the path. Therefore, lever arms are at most 2 p. MuJoCo converts a vector to the centre of mass
-    and back to the frame by a cross product with a lever arm. These cross products at most double the number
-    of factors. The bound allows `MUJOCO` rounding errors for each joint instead of `ROUNDINGS`.
+    MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass, which
+    `urdfkin.verify.mujoco` places at the root. At the end, MuJoCo converts the results to the frame's origin.
+    The distance from the centre of mass to a joint or to the frame is at most the length p of the path, so
+    lever arms are at most 2 p. The conversion to the centre of mass and back is a cross product with a lever
+    arm, which at most doubles the number of factors. A joint has `MUJOCO` rounding errors instead of
+    `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -342,10 +335,9 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rules: Number of mimic rules for the joints on the path. For a joint that mimics a mimic joint, both
-            rules are counted.
-        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if the offsets
-            of a chain of mimic rules cancel each other.
+        rules: Number of mimic rules of the joints on the path. A joint that mimics a mimic joint has two.
+        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m; positive if the offsets of a chain
+            of mimic rules cancel each other.
     """
 
     angles: FloatArray
@@ -358,34 +350,31 @@ def against_true_values(
 ) -> Magnitudes:
     """Return the magnitudes for a comparison of one program's results with the true values.
 
-    The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
-    values are rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One
-    program makes at most 16.8 of these rounding errors (`urdfkin.kinematics.roundings`). The remaining 7.2
-    are enough for the conversions of decimals to doubles. The offset, the axis and the true value each have a
-    conversion error of half an eps. An axis is used in two rotations, so its error is added twice. Two kinds
-    of numbers need additional roundings:
+    The true values are computed from the decimals in the URDF and from the doubles q, v and a, and are
+    rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One program makes
+    at most 16.8 rounding errors (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the conversion of
+    decimals to doubles: half an eps each for the offset, the axis and the true value; the axis counts twice,
+    because two rotations use the axis. Two kinds of numbers need additional roundings:
 
-    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint turn by
+    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint rotate by
       at most (|roll| + |pitch| + |yaw|) / 2 eps.
     - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum have an error of at
       most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps, and the error of x
       is multiplied by |m|.
 
-    A mimic joint may mimic another mimic joint, so r rules can form a chain. A program may combine the rules
-    of a chain to one rule M q + C. The combined rule has the same rounding errors as the separate rules,
-    except for the sums. The combined rule has r - 1 sums in C, and the sum of M q and C. Let X be the value
-    of the joint if all terms are replaced by their absolute values. For an independent joint, X is |q|. For a
-    mimic joint, X is |m| X' + |c|, where X' is the X of the mimicked joint. No sum exceeds X. The combined
-    rule can therefore increase the error by at most (r - 1) / 2 X eps.
+    *Chains of mimic rules.* If a mimic joint mimics another mimic joint, r rules form a chain. Let X be the
+    value of the joint with all terms replaced by their absolute values: |q| for an independent joint, and |m|
+    X' + |c| for a joint that mimics a joint with X'. A program may combine the r rules to one rule M q + C.
+    This rule has r - 1 sums in C, and the sum of M q and C. No sum exceeds X, so the combined rule adds an
+    error of at most (r - 1) / 2 X eps; all other rounding errors are those of the separate rules.
 
-    The error of a revolute mimic joint's value rotates all later vectors of the path. An angle error of 1 eps
-    rad changes a vector by at most eps times the length of the vector.
+    *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
+    error of 1 eps rad changes a vector by at most eps times the length of the vector.
 
-    Each term of X is rounded at most 3 r times, so the displacement of a prismatic mimic joint has an error
-    of at most 3/2 r X eps. This bound is valid for separate rules and for a combined rule. If the offsets of
-    a chain cancel each other, |M q| + |C| is far below X. Therefore, the function uses X as the length of
-    such a joint's displacement. Then a rounding error of 3/2 eps for each rule is enough. The same error is
-    enough for the joint's velocity and acceleration, which are rounded less often.
+    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times, so the displacement has an error of
+    at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain cancel each
+    other, |M q| + |C| is far below X. The function therefore uses X as the length of the displacement. Then
+    3/2 eps for each rule are enough. The velocity and the acceleration of the joint are rounded less often.
 
     Args:
         plan: The compiled tree of one frame.
@@ -395,15 +384,14 @@ def against_true_values(
         errors: The errors of the conversions, for the same path and the same q.
     """
     size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
-    own = errors.angles[:, np.newaxis] + 1.5 * errors.rules
-    return replace(size, roundings=size.roundings + own)
+    more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
+    return replace(size, roundings=size.roundings + more)
 
 
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
     """Return the scale (n, frames, 4, 4) of the bound on placements.
 
-    For positions, the scale is the length of the path. For rotations, the scale is 1. For the last row, the
-    scale is 0.
+    The scale is the length of the path for positions, 1 for rotations, and 0 for the last row.
     """
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
@@ -415,17 +403,16 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of its joints, and a
-    vector for the `ref` of a slide joint. urdfkin adds these vectors once, when it reads the file. MuJoCo
-    adds them for each configuration. The individual vectors can be longer than their sum. The scale of
-    positions is therefore the larger of the length of the path and `lengths`.
+    *Lengths.* In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of the joints,
+    and a vector for the `ref` of a slide joint. urdfkin adds these vectors once, when reading the file.
+    MuJoCo adds the vectors for each configuration. A single vector can be longer than the sum, so the scale
+    of positions is the larger of the length of the path and `lengths`.
 
-    MuJoCo rotates a hinge by the angle q - ref, which is a rounded number. urdfkin's tree rotates the hinge
-    by ref and by q separately. The rounding error of the difference is at most (eps/2) (|q| + |ref|) rad. All
-    bodies after the hinge are rotated by this angle error. An entry of a rotation matrix changes by at most
-    the angle error. A coordinate of a position changes by at most the angle error times the length of the
-    path. The bound allows twice these changes, so that it also covers terms of second order. The scale is
-    therefore multiplied by 1 + `angles` / k.
+    *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref; urdfkin rotates the hinge by ref and by q
+    separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
+    all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error, and a
+    coordinate of a position by at most the angle error times the length of the path. The scale is multiplied
+    by 1 + `angles` / k, which allows twice these changes and so covers terms of second order.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
@@ -444,53 +431,45 @@ def velocity_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -
     linear = size.vel
     if reference.at_world:
         linear = eq.point_velocity(linear, size.w, size.p)
-    return _six(linear, size.w)
+    return _in_six_rows(linear, size.w)
 
 
 @_BEYOND
 def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on accelerations [linear; angular], (n, frames, 6).
 
-    Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel. The scale includes
-    the term w x vel.
+    Pinocchio computes the classical acceleration as the spatial acceleration plus w x vel, so the scale
+    includes the term w x vel.
 
-    An `AccelerationBreakdown` contains the contributions of the joints to an acceleration. The scale is also
-    valid for the sum of these contributions. Let d_k be the vector from joint k to the frame, and let w_k be
-    the sum of the joint velocities up to joint k. The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x
-    d_k) have the length (w_k^2 - w_{k-1}^2) d_k. The sum of these lengths over all joints is the sum of w_k^2
-    times the length of link k, as in eq. 7.130. A vector d_k is the sum of the vectors between successive
-    joint origins. The rounding errors of d_k are those of the sums in eq. 7.77. The breakdown of an
-    acceleration for n joints has 4 n terms. Adding these terms causes n + 3 rounding errors. The bound allows
-    2 eps for the sums at each joint. These 2 eps per joint exceed the rounding errors of d_k and of the sum
-    of 4 n terms.
+    *Breakdown.* The scale is also valid for the sum of the contributions in an `AccelerationBreakdown`. Let
+    d_k be the vector from joint k to the frame, and w_k the sum of the joint velocities up to joint k.
+
+    - The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have together at most the length (w_k^2 -
+      w_{k-1}^2) d_k. The sum over all joints is the sum of w_k^2 times the length of link k, as in eq. 7.130.
+    - A vector d_k is the sum of the vectors between successive joint origins, with the rounding errors of the
+      sums in eq. 7.77.
+    - For n joints, the breakdown has 4 n terms, whose sum has n + 3 rounding errors.
+    - The bound allows 2 eps for the sums at each joint, more than the rounding errors of d_k and of 4 n
+      terms.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
     if reference.at_world:
         linear = eq.point_acceleration(linear + shared, size.alpha, size.w, size.p)
-    return _six(linear, size.alpha)
+    return _in_six_rows(linear, size.alpha)
 
 
 @_BEYOND
 def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
-    """Return the scale of the bound on IMU readings, (n, frames, 6).
-
-    The argument `gravity` (3,) is the gravity vector.
-    """
-    return _six(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
+    """Return the scale of the bound on IMU readings, (n, frames, 6), for a gravity vector (3,)."""
+    return _in_six_rows(size.acc + eq.tangential(size.w, size.vel) + norm(gravity), size.w)
 
 
-def _six(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    scale = np.empty((*linear.shape, 6))
-    scale[..., :3] = linear[..., None]
-    scale[..., 3:] = angular[..., None]
-    return scale
-
-
-def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    scale = np.empty((*linear.shape[:-1], 6, linear.shape[-1]))
-    scale[..., :3, :] = linear[..., None, :]
-    scale[..., 3:, :] = angular[..., None, :]
+def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
+    """Return (n, frames, 6, ...) with `linear` (n, frames, ...) in three rows and `angular` in three rows."""
+    scale = np.empty((*linear.shape[:2], 6, *linear.shape[2:]))
+    rows = scale.transpose(2, 0, 1, *range(3, scale.ndim))  # faster than `np.moveaxis`
+    rows[:3], rows[3:] = linear, angular
     return scale
 
 
@@ -498,21 +477,21 @@ def _six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
 
-    In the linear rows, the scale of a revolute joint's column is the length of the path. The scale of a
+    In the linear rows, the scale of a revolute joint's column is the length of the path, and that of a
     prismatic joint's column is 1. For joints that are not on the path, the scale is 0.
     """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
-    return _six_rows(linear + sliding, angular)
+    return _in_six_rows(linear + sliding, angular)
 
 
 @_BEYOND
 def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
-    The length of a revolute joint's column is at most the length of the path to the frame. The linear rows of
-    this column are z x d. The derivative of d is at most as long as the bound on the velocity of the frame's
-    origin. In LOCAL, J-dot is the derivative of components along the frame's axes, which rotate.
+    The linear rows of a revolute joint's column are z x d. The vector d is at most as long as the path to the
+    frame, and the derivative of d is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot
+    is the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -522,14 +501,13 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
         column, axis = eq.turning_column(turning, p)
         linear = eq.rate_in_turning_axes(linear, w, column + sliding)
         angular = eq.rate_in_turning_axes(angular, w, axis)
-    return _six_rows(linear, angular)
+    return _in_six_rows(linear, angular)
 
 
-#: Numbers of products in Pinocchio's derivative of Jacobian column i by joint j, linear rows.
-#: The first pair is for a joint j that is joint i or is nearer to the root than joint i.
-#: The second pair is for all other joints j.
-#: The first number of a pair counts the products z x (z x d) of two revolute joints.
-#: The second number counts the products z x z of a revolute and a prismatic joint.
+#: Numbers of products in Pinocchio's derivative of Jacobian column i by joint j, linear rows:
+#: the first pair if joint j is joint i or is nearer to the root than joint i, the second pair otherwise.
+#: A pair is the number of products z x (z x d) of two revolute joints, and the number of products z x z
+#: of a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -543,65 +521,64 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
 
     An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
     column of the mimicked joint, so the scale of an entry can be a sum over several pairs. A lever arm d is
-    never longer than the path. Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the
-    world origin. Pinocchio adds these products:
+    never longer than the path.
+
+    Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
+    contains sums of the numbers of products:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
-    - one more to move the result to the frame's origin p, p x (w_1 x w_2)
-    - two more to move the other column there, (v - p x w) x w
+    - one to move the result to the frame's origin p, p x (w_1 x w_2)
+    - two to move the other column to p, (v - p x w) x w
 
-    The numbers five, two and three in `_PAIR_TERMS` are sums of these counts. urdfkin needs the single
-    product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first rotates the two columns by
-    R. Then urdfkin computes two products. Each product has the five factors R, z, R, z and d. The bound
-    allows three products of four factors, which is more than these two products need.
+    urdfkin computes the single product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first
+    rotates the two columns by R, so each of the two products has the five factors R, z, R, z and d. The bound
+    allows three products of four factors, which is more.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     (near, near_mixed), (far, far_mixed) = _PAIR_TERMS[reference]
     step, rate = plan.columns[:, ColumnField.STEP], plan.columns[:, ColumnField.V]
     turns, size_of = plan.columns[:, ColumnField.TURNS] == 1, np.abs(plan.multipliers)
-    for f, (_, place) in enumerate(plan.frames):
-        own = np.flatnonzero(plan.leaders[f] >= 0)
-        i, j = own[:, np.newaxis], own[np.newaxis, :]
+    for f, (_, frame) in enumerate(plan.frames):
+        on_path = np.flatnonzero(plan.leaders[f] >= 0)
+        i, j = on_path[:, np.newaxis], on_path[np.newaxis, :]
         before = step[j] <= step[i]
         sizes = product(size_of[i], size_of[j])
         both, one = sizes * (turns[i] & turns[j]), sizes * (turns[i] ^ turns[j])
-        pair = place, rate[i], rate[j]
+        pair = frame, rate[i], rate[j]
         np.add.at(turning, pair, both * np.where(before, near, far))
         np.add.at(mixed, pair, one * np.where(before, near_mixed, far_mixed))
         np.add.at(angular, pair, both * (before != reference.own_axes))
     linear = product(turning, size.p[..., np.newaxis, np.newaxis]) + mixed
-    scale = np.empty((*linear.shape[:2], 6, *shape[1:]))
-    scale[..., :3, :, :] = linear[..., np.newaxis, :, :]
-    scale[..., 3:, :, :] = angular[..., np.newaxis, :, :]
-    return scale
+    return _in_six_rows(linear, angular)
 
 
 @_BEYOND
 def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The rows of positions have the same bound as in the velocity Jacobian. The rotation axis of the first
-    angle is e_i, that of the middle angle is u, and that of the last angle is t = R e_k
-    (`analytical_reference`). Let w be the angular part of a column of the velocity Jacobian. The column's
-    element for the middle angle is u . w. The element for the first or last angle is r . w. Here r is the
-    reciprocal basis vector of the angle's axis. The lengths are |u| = 1 and |r| = 1 / s.
-    Here s = |e_i x t| is the sine or cosine of the middle angle.
+    The rows of positions have the bound of the velocity Jacobian. For the rows of angles, let w be the
+    angular part of a column of the velocity Jacobian. The rotation axes of the three angles are e_i, u and t
+    = R e_k (`urdfkin.verify.analytical_reference`). With s = |e_i x t|, the sine or cosine of the middle
+    angle:
 
-    Let the error of t be delta = k eps. This error rotates u by at most delta / s. Let r' be the reciprocal
-    vector of t. Then the change of r is the vector -(r . du) u - (r . dt) r'. This vector is at most 2 delta
-    / s^2 long. For s, the function uses the smallest possible value, `apart` - delta. Let delta also be the
-    relative error of w. Then the errors are:
+    | Row | Element | Length of the vector |
+    |---|---|---|
+    | middle angle | u . w | 1 |
+    | first or last angle | r . w, r is the reciprocal basis vector of the axis | 1 / s |
+
+    Let delta = k eps be the error of t, and also the relative error of w. The error of t rotates u by at most
+    delta / s. The error of t changes r by the vector -(r . du) u - (r . dt) r', which is at most 2 delta /
+    s^2 long; r' is the reciprocal vector of t. The errors of the rows are:
 
     - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
 
-    The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale of the
-    velocity Jacobian is therefore multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the
-    middle angle. In urdfkin and in the reference, arctan2 and the sine of the angle add rounding errors of
-    about 3 eps. Products and quotients add about 10 eps. These errors need no additional bound, because
-    `Magnitudes.roundings` counts one joint more than the path contains, and a joint has more rounding errors
-    than these.
+    The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
+    multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. For s, the
+    function uses the smallest possible value, `apart` - delta. The functions arctan2 and sine add about 3
+    eps, and products and quotients about 10 eps. The bound includes these errors, because
+    `Magnitudes.roundings` counts one joint more than the path contains.
 
     Args:
         bound: Bound of the Jacobian.
@@ -620,11 +597,11 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
     """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
 
-    The rows of positions have the same bound as in the velocity Jacobian. Let delta be the error of R. The
-    elements of the matrix 4 q q^T are linear functions of R. The longest row of 4 q q^T has a length of at
-    least 2. The error of this row is below 4.6 delta. Therefore, the error of q is below 2.3 delta. The
-    derivative of q is half the quaternion product of w and q. Its error is (2.3 + 1) / 2 delta |w|. This
-    error is below the bound 2 delta |w| on the angular velocity in the velocity Jacobian.
+    The rows of positions have the bound of the velocity Jacobian. Let delta be the error of R. The elements
+    of the matrix 4 q q^T are linear functions of R. The longest row of this matrix has a length of at least 2
+    and an error below 4.6 delta, so the error of q is below 2.3 delta. The derivative of q is half the
+    quaternion product of w and q, with an error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|,
+    the bound on the angular velocity in the velocity Jacobian.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
@@ -632,55 +609,44 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 def hidden_scalar(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the limit of |qw| below which rounding can change the sign of qw.
 
-    The limit is 1.5 k eps = 3 delta. The error of the quaternion q is only 2.3 delta.
+    The limit is 1.5 k eps = 3 delta, above the error 2.3 delta of `quaternion_jacobian_bound`.
     """
     return 1.5 * EPS * result_k(bound, leading)
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return the distance (rad) from a singularity below which results have no valid digit.
-
-    The distance is four times the error of R.
-    """
+    """Return four times the error of R: the distance (rad) from a singularity with no valid digit."""
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    """Return the sums of |multiplier| over revolute joints and over prismatic joints.
+    """Return the sums (frames, nv) of |multiplier| over revolute joints and over prismatic joints.
 
-    Each sum is an array (frames, nv). An independent joint has the multiplier 1.
+    An independent joint has the multiplier 1. `plan.cache` stores the result.
     """
-    weights: tuple[FloatArray, FloatArray] | None = plan.made.get("column weights")
+    weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
-        weights = plan.made["column weights"] = _column_weights(plan)
-    return weights
-
-
-def _column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
-    weights = np.zeros((2, len(plan.frames), plan.nv))
-    for f, (_, place) in enumerate(plan.frames):
-        for c in np.flatnonzero(plan.leaders[f] >= 0):
-            kind = 0 if plan.columns[c, ColumnField.TURNS] else 1
-            weights[kind, place, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
-    weights.setflags(write=False)
+        weights = plan.cache["column weights"] = np.zeros((2, len(plan.frames), plan.nv))
+        for f, (_, frame) in enumerate(plan.frames):
+            for c in np.flatnonzero(plan.leaders[f] >= 0):
+                kind = 0 if plan.columns[c, ColumnField.TURNS] else 1
+                weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
+        weights.setflags(write=False)
     return weights[0], weights[1]
 
 
 def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
-    """Return a bool array (frames, 6, nv).
+    """Return an array (frames, 6, nv), False for Jacobian entries that are 0 for every q and every base.
 
-    The array is False for the entries of a Jacobian that are 0 for every q and every motion of the base. The
-    linear rows of a revolute column are z x d. In WORLD, d is the vector from the joint to the root. In the
-    other reference frames, d is the vector from the joint to the frame. The vector d is 0 for every q if the
-    path between these points has no length and no prismatic joint.
+    The linear rows of a revolute column are z x d. In WORLD, d is the vector from the joint to the root;
+    otherwise, d is the vector from the joint to the frame. The vector d is 0 for every q if the path between
+    these two points has no length and no prismatic joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
-    turns, multipliers = (
-        plan.steps[:, StepField.KIND] == JointMotion.TURN,
-        plan.geometry[:, Geometry.MULTIPLIER :],
-    )
+    turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
+    multipliers = plan.geometry[:, Geometry.MULTIPLIER :]
     extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
-    for f, (end, place) in enumerate(plan.frames):
+    for f, (end, frame) in enumerate(plan.frames):
         path, step = list[int](), int(end)  # the path leads from the frame to the root
         while step >= 0:
             path.append(step)
@@ -692,21 +658,7 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
         has_lever = dict(zip(path, levers, strict=False))
         for c in np.flatnonzero((plan.leaders[f] >= 0) & (plan.multipliers != 0.0)):
             column = plan.columns[c]
-            own = found[place, :, column[ColumnField.V]]
-            own[:3] |= not column[ColumnField.TURNS] or has_lever[column[ColumnField.STEP]]
-            own[3:] |= column[ColumnField.TURNS] == 1
+            rows = found[frame, :, column[ColumnField.V]]
+            rows[:3] |= not column[ColumnField.TURNS] or has_lever[column[ColumnField.STEP]]
+            rows[3:] |= column[ColumnField.TURNS] == 1
     return found
-
-
-def disagreement(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
-    """Return |ours - theirs| in multiples of eps * scale.
-
-    The result is inf if the scale is 0 and the results differ. The result is also inf if `ours`, `theirs` or
-    the scale is not finite.
-    """
-    unit = np.where(bound.scale > 0.0, np.maximum(EPS * bound.scale, LEAST_UNIT), 0.0)
-    with np.errstate(all="ignore"):
-        difference = np.abs(ours - theirs)
-        units = difference / unit
-    units = np.where(difference == 0.0, 0.0, units)
-    return np.where(np.isfinite(difference) & np.isfinite(bound.scale), units, np.inf)

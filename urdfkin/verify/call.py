@@ -22,7 +22,7 @@ from urdfkin.verify.oracle import OracleQuery, QueryBatch
 
 T = TypeVar("T")
 
-#: Array types without methods that override NumPy's.
+#: Array types that do not override methods of NumPy's arrays.
 _PLAIN = np.ndarray, np.memmap
 
 
@@ -31,12 +31,11 @@ class Part(NamedTuple):
 
     Attributes:
         plan: The compiled tree.
-        reference: Reference frame; placements ignore it.
+        reference: Reference frame; without effect on placements.
         q: (n, nq).
-        rates: The arrays v and a (n, nv) that the quantity needs: () for a placement, (v,) for a velocity,
-            and (v, a) for an acceleration.
+        rates: Arrays (n, nv): () for a placement, (v,) for a velocity, (v, a) for an acceleration.
         state: (n or 1, 24) state of the moving base.
-        query: The same configurations for the oracle, converted independently from the user's arguments.
+        query: The n configurations for the oracle, converted from the user's arguments.
         options: Other arguments of the method, by name.
     """
 
@@ -59,7 +58,7 @@ class Call:
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
         given: The inputs of the quantity: q, or q and v, or q, v and a.
-        also: Frames that are computed after the frames in `frame` and are not returned.
+        also: Further frames to compute, which the caller does not return.
         options: Other arguments of the method, by name.
 
     Raises:
@@ -125,16 +124,18 @@ class Call:
         """Number of results of the call: the number of configurations times the number of frames."""
         return self.n * len(self.links)
 
-    def flat(self, out: FloatArray | None, own: tuple[int, ...]) -> FloatArray | None:
+    def flat(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
-        Subclasses of NumPy's array are rejected. For example, `reshape` of a NumPy matrix returns a different
-        shape than requested. A kernel would then write past the end of the array. InputError is raised if
-        `out` has a wrong type, dtype, layout or shape, or shares memory with an input.
+        Subclasses of NumPy's array are rejected. For example, `reshape` of a NumPy matrix may return another
+        shape than requested, and a kernel would then write past the end of the array.
+
+        Raises:
+            InputError: `out` has a wrong type, dtype, layout or shape, or shares memory with an input.
         """
         if out is None:
             return None
-        wanted = (*self.shape, *((len(self.links),) if self.several else ()), *own)
+        wanted = (*self.shape, *((len(self.links),) if self.several else ()), *shape)
         good = type(out) in _PLAIN and out.dtype == np.float64 and out.flags.carray
         if not good or out.shape != wanted:
             raise InputError(
@@ -144,17 +145,17 @@ class Call:
                 if isinstance(out, np.ndarray) and type(out) not in _PLAIN
                 else None,
             )
-        self.question.read()  # the inputs may be views of `out`, so they are read now
+        self.question.read()
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
             raise InputError("out must not share memory with q, v or a, because the check reads them again")
-        return out.reshape(self.n, len(self.links), *own)
+        return out.reshape(self.n, len(self.links), *shape)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Reshape a result (n, frames, ...) to the caller's batch shape; a single frame has no axis."""
+        """Reshape a result (n, frames, ...) to the caller's batch shape; one frame has no axis of frames."""
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
-        """Call `evaluate`; if an input is not finite, raise an error with the name of its joint."""
+        """Call `evaluate`; if an input is not finite, raise an error with the name of the joint."""
         try:
             return evaluate(*arguments, **options)
         except NotFiniteError:
@@ -163,7 +164,7 @@ class Call:
             raise
 
     def part(self, part: slice | IntArray) -> Part:
-        """Return the configurations with the given indices, so that they can be checked."""
+        """Return the configurations with the indices `part`."""
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
         query = self.question.rows(part)
@@ -175,7 +176,7 @@ class Call:
 
 
 def _described(out: object) -> str:
-    """Describe an invalid argument `out` by its type and, if it is an array, its shape, dtype and layout."""
+    """Describe an invalid argument `out`: the type, and for an array also shape, dtype and layout."""
     if not isinstance(out, np.ndarray):
         return type(out).__name__
     flags = {
@@ -188,7 +189,7 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list, and its names; unknown names are reported later."""
+    """Return whether `frame` is a list, and the names."""
     if isinstance(frame, str):
         return False, (frame,)
     try:

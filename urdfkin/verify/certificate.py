@@ -1,7 +1,4 @@
-"""Certificates, which record the checked and the unchecked results of a robot.
-
-The module also compares results within a bound, and defines the exception `VerificationError`.
-"""
+"""Certificates, which record the checked and the unchecked results of a robot, and `VerificationError`."""
 
 from __future__ import annotations
 
@@ -19,15 +16,14 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.system.documents import Count, DocumentKind, Header, Size, plain, says
 from urdfkin.system.files import at_home, write_file
 from urdfkin.system.locks import lock_over_forks
-from urdfkin.verify.bounds import Bound, result_k
-from urdfkin.verify.comparison import worst_of_each
+from urdfkin.verify.comparison import BatchComparison
 from urdfkin.verify.oracles import versions
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason why results of calls with verify=False are unchecked.
-NOT_ASKED_FOR = "the check was turned off by verify=False"
-#: Lock for the entries of all ledgers.
-_entering = lock_over_forks()
+CHECK_TURNED_OFF = "the check was turned off by verify=False"
+#: Lock for all ledgers.
+_ledger_lock = lock_over_forks()
 
 
 class VerificationError(UrdfkinError):
@@ -38,11 +34,11 @@ class VerificationError(UrdfkinError):
         frame: Name of the frame.
         reference: Reference frame; for an analytical Jacobian, the representation.
         index: Index of the worst sample in the batch.
-        ours: urdfkin's result for that sample.
-        theirs: The oracle's result for that sample.
+        ours: urdfkin's result for the worst sample.
+        theirs: The oracle's result for the worst sample.
         bound: Largest allowed difference between `ours` and `theirs`, for each number of the result.
         units: The difference between `ours` and `theirs` in multiples of eps * scale.
-        reproduce: A command or a line of Python that computes the case again.
+        reproduce: A shell command or a line of Python that computes the sample again.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.VerificationError, urdfkin.UrdfkinError)
@@ -75,64 +71,6 @@ class VerificationError(UrdfkinError):
         self.quantity, self.frame, self.reference, self.index = quantity, frame, reference, index
         self.ours, self.theirs, self.bound = ours, theirs, bound
         self.units, self.reproduce = units, reproduce
-
-
-@dataclass(frozen=True, slots=True)
-class BatchComparison:
-    """Comparison of a batch of urdfkin's results (matrices or six-vectors) with the oracle's results.
-
-    Attributes:
-        worst: Largest difference of two numbers, in multiples of eps * scale.
-        share: Largest ratio of a difference to its bound; above 1 is a failure.
-        index: Indices, in the array of results, of the result with the largest ratio `share`.
-    """
-
-    results: int
-    worst: float
-    share: float
-    index: tuple[int, ...]
-
-    @classmethod
-    def of_nothing(cls) -> BatchComparison:
-        """Return the comparison of an empty batch, which agrees."""
-        return cls(0, 0.0, 0.0, ())
-
-    def __add__(self, other: BatchComparison) -> BatchComparison:
-        """Combine the comparisons of two batches.
-
-        The `index` is the index from the batch with the larger ratio `share`. A ratio of NaN counts as larger
-        than any number.
-        """
-        second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
-        first, second = (other, self) if second_is_larger else (self, other)
-        return BatchComparison(
-            self.results + other.results,
-            float(np.maximum(self.worst, other.worst)),
-            first.share,
-            first.index or second.index,
-        )
-
-    @property
-    def agrees(self) -> bool:
-        """Whether every difference is within its bound."""
-        return self.share <= 1.0
-
-
-def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
-    """Compare results of urdfkin and of the oracle; the first `axes` axes are not axes of one result.
-
-    For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix.
-    """
-    return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
-
-
-def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare the largest difference of each result, in multiples of eps * scale, with the result's bound."""
-    if not units.size:
-        return BatchComparison.of_nothing()
-    share = units / result_k(bound, units.shape)
-    index = np.unravel_index(int(share.argmax()), share.shape)
-    return BatchComparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,12 +137,11 @@ class Certificate(Displayable):
     Attributes:
         robot: The robot's name.
         oracle: Name and version of the oracle: "Pinocchio 4.1.0".
-        lines: One line for each quantity that was computed.
+        lines: One line for each computed quantity.
         not_verified: Reasons why results were not checked; empty if all were checked.
-        reading: Result of the check of the conversion to URDF, if the robot was read from another format;
-            empty for a URDF.
+        reading: Result of the check of the conversion to URDF from another format; empty for a URDF.
         source: Source of the robot: a path, a catalogue name or "<text>".
-        sha256: SHA-256 digest of the MJCF file, or of the URDF text in UTF-8.
+        sha256: SHA-256 digest of the MJCF or USD file, or of the URDF text in UTF-8.
         urdfkin: Version of urdfkin.
 
     >>> import urdfkin
@@ -284,13 +221,14 @@ class Certificate(Displayable):
             for x in self.lines
         ]
         word = "verified" if self.verified else "NOT verified"
-        made = f"Computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256})."
-        reasons = [f"Not verified: {reason}." for reason in self.not_verified]
-        read = [f"Read: {self.reading}."] if self.reading else []
-        return TextDocument(
-            f"{self.robot}: {word} by {self.oracle}",
-            (Table(heads, rows), *reasons, *read, *([made] if self.sha256 else [])),
-        )
+        parts: list[str | Table] = [
+            Table(heads, rows),
+            *(f"Not verified: {reason}." for reason in self.not_verified),
+            *([f"Read: {self.reading}."] if self.reading else []),
+        ]
+        if self.sha256:
+            parts.append(f"Computed by urdfkin {self.urdfkin} from {self.source} (sha256 {self.sha256}).")
+        return TextDocument(f"{self.robot}: {word} by {self.oracle}", parts)
 
     def __str__(self) -> str:
         head = f"{self.robot}, checked by {self.oracle}"
@@ -312,33 +250,30 @@ class Account:
     """Numbers of checked and unchecked results of one quantity.
 
     Attributes:
-        unchecked: Number of results without a check: the oracle could not check them, or `verify="sample"`
-            did not select them.
-        not_asked_for: Number of results of calls with verify=False.
-        counters: Pairs (array, index), one for each fast evaluator. The element array[index] is the number of
-            unchecked results that the evaluator has returned.
+        unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
+        turned_off: Number of results of calls with verify=False.
+        counters: A pair (array, index) for each fast evaluator without checks: array[index] is the number of
+            results that the evaluator has returned.
     """
 
-    checked: BatchComparison = field(default_factory=BatchComparison.of_nothing)
+    checked: BatchComparison = field(default_factory=BatchComparison)
     unchecked: int = 0
-    not_asked_for: int = 0
+    turned_off: int = 0
     counters: list[tuple[IntArray, int]] = field(default_factory=list)
-
-    @property
-    def unwanted(self) -> int:
-        """Number of results of calls with verify=False, including the results of fast evaluators."""
-        return self.not_asked_for + sum(int(counts[place]) for counts, place in self.counters)
 
     def line(self, quantity: str) -> CertificateLine:
         found = self.checked
-        return CertificateLine(
-            quantity, found.results, found.worst, found.share, self.unchecked + self.unwanted
-        )
+        unchecked = self.unchecked + self.turned_off_in_all()
+        return CertificateLine(quantity, found.results, found.worst, found.share, unchecked)
+
+    def turned_off_in_all(self) -> int:
+        """Return the number of results of calls with verify=False, and of fast evaluators without checks."""
+        return self.turned_off + sum(int(counts[index]) for counts, index in self.counters)
 
 
 @dataclass
 class Ledger:
-    """Counts the checked and the unchecked results of a robot; several threads may use the same ledger."""
+    """Counts the checked and the unchecked results of a robot, from any number of threads."""
 
     _accounts: dict[str, Account] = field(default_factory=dict)
     _reasons: dict[str, None] = field(default_factory=dict)
@@ -347,38 +282,34 @@ class Ledger:
         """Return the account of a quantity; later calls return the same object."""
         if (known := self._accounts.get(quantity)) is not None:
             return known
-        with _entering:
+        with _ledger_lock:
             return self._accounts.setdefault(quantity, Account())
 
     def checked(self, quantity: str, comparison: BatchComparison) -> None:
         account = self.account(quantity)
-        with _entering:
+        with _ledger_lock:
             account.checked += comparison
 
     def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Count results that were not checked; the reason is None for calls with verify=False."""
+        """Count results without a check, for a `reason`; None: calls with verify=False."""
         account = self.account(quantity)
-        with _entering:
+        with _ledger_lock:
             if reason is None:
-                account.not_asked_for += results
+                account.turned_off += results
             else:
                 account.unchecked += results
                 self._reasons[reason] = None
 
     def certificate(self, robot: str, oracle: str) -> Certificate:
-        with _entering:
-            found = [
-                (quantity, self._accounts[quantity]) for quantity in QUANTITIES if quantity in self._accounts
-            ]
-            reasons = [NOT_ASKED_FOR] if any(account.unwanted for _, account in found) else []
-            lines = [account.line(quantity) for quantity, account in found]
+        with _ledger_lock:
+            accounts = {name: self._accounts[name] for name in QUANTITIES if name in self._accounts}
+            off = any(account.turned_off_in_all() for account in accounts.values())
+            reasons = (*([CHECK_TURNED_OFF] if off else []), *self._reasons)
+            lines = [account.line(name) for name, account in accounts.items()]
             return Certificate(
-                robot,
-                oracle,
-                tuple(line for line in lines if line.checked or line.unchecked),
-                (*reasons, *self._reasons),
+                robot, oracle, tuple(line for line in lines if line.checked or line.unchecked), reasons
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copy of a ledger has no counts, because it may be in another process.
+        # A copied ledger has no counts, because the copy may be in another process.
         return type(self), ()

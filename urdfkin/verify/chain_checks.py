@@ -1,8 +1,12 @@
 """Check chains, OPW solvers and products of exponentials with Pinocchio's placements.
 
-- `check_chain`: the origin and the direction of each joint, and the tip
-- `check_opw`: the forward kinematics of an OPW (ortho-parallel wrist) solver
-- `check_screws`: the motion of the tip relative to the base, to rounding
+| Function | Compared |
+|---|---|
+| `check_chain` | the origin and the direction of each joint, and the tip |
+| `check_opw` | the forward kinematics of an OPW (ortho-parallel wrist) solver |
+| `check_screws` | the placement of the tip relative to the base |
+
+Each function returns a line of text with the result, or None if Pinocchio cannot check the robot.
 """
 
 from __future__ import annotations
@@ -22,14 +26,14 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """Return a line about the agreement of a chain with Pinocchio at q (n, nq); None: Pinocchio cannot check.
+    """Compare the joints and the tip of a chain with Pinocchio at q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the joint's child link. In a chain that leads from the parent
-    link to the child link, this frame comes after the joint's motion. In a chain that leads from the child
-    link to the parent link, this frame comes before the joint's motion. Pinocchio computes the poses of the
-    first and the last frame of the chain from the root. urdfkin computes along the chain, from the first
-    frame to the last frame. The bound depends on all joints and lengths of the two paths from the root to
-    these two frames. These paths contain every joint and length of both computations.
+    Pinocchio's frame of a joint is the frame of the child link. A chain towards the tips reaches this frame
+    after the motion of the joint, and a chain towards the root before the motion.
+
+    Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
+    computes along the chain, which is a part of the two paths. The bound counts all joints and lengths of
+    both paths.
 
     Raises:
         TableError: the chain and Pinocchio differ by more than rounding.
@@ -40,23 +44,23 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     names = [path.base, *(JointFrame.of(joint.name) for joint in path.joints), path.tip]
     theirs = verifier.oracle().placements(QueryBatch(names, (q,)))
     base, theirs = theirs[:, :1], theirs[:, 1:]
-    values = path.coupling.values(path.coupling.select(tree, q))
-    ours = base @ path.frames(path.coupling.select(tree, q))
-    along = theirs.copy()
+    coordinates = path.coupling.select(tree, q)
+    values, ours = path.coupling.values(coordinates), base @ path.frames(coordinates)
+    expected = theirs.copy()
     for i, joint in enumerate(path.joints):
         axis = tree.joints[tree.joint_index(joint.name)].axis
-        along[:, i, :3, 2] = theirs[:, i, :3, :3] @ (-axis if joint.backwards else axis)
+        expected[:, i, :3, 2] = theirs[:, i, :3, :3] @ (-axis if joint.backwards else axis)
         if not joint.backwards and not joint.kind.turns:
-            along[:, i, :3, 3] -= values[:, i, np.newaxis] * along[:, i, :3, 2]
-    off = np.abs(ours - along)[:, :, :3]
+            expected[:, i, :3, 3] -= values[:, i, np.newaxis] * expected[:, i, :3, 2]
+    off = np.abs(ours - expected)[:, :, :3]
     metres = float(off[..., 3].max(initial=0.0))
     turned = max(float(off[..., 2].max(initial=0.0)), float(off[:, -1, :, :3].max(initial=0.0)))
     ends = [i for end in (path.base, path.tip) for i in tree.path(tree.frame_link(end))]
     unit = EPS * float(of_joints(len(ends) + 2, sum(tree.joints[i].tilt for i in ends)))
-    way = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
+    length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
     slides = values[:, [not joint.kind.turns for joint in path.joints]]
-    way += np.abs(slides).sum(axis=-1).max(initial=0.0)
-    share = max(metres / (unit * way + LEAST_UNIT), turned / unit)
+    length += np.abs(slides).sum(axis=-1).max(initial=0.0)
+    share = max(metres / (unit * length + LEAST_UNIT), turned / unit)
     if share > 1.0:
         raise TableError(
             "the chain's axes disagree with Pinocchio's",
@@ -70,13 +74,12 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    """Return a sentence about the error of an OPW solver's forward kinematics; None: no check is possible."""
+    """Compare the forward kinematics of an OPW solver with Pinocchio."""
     if verifier.cannot() is not None:
         return None
-    q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
-    base, tip = np.moveaxis(verifier.oracle().placements(QueryBatch([path.base, path.tip], (q,))), 1, 0)
-    own = path.coupling.values(path.coupling.select(verifier.tree, q))
-    off = np.abs(base @ found.placement(own) - tip)[:, :3]
+    q, base, tip = _sampled_ends(verifier, path.base, path.tip)
+    values = path.coupling.values(path.coupling.select(verifier.tree, q))
+    off = np.abs(base @ found.placement(values) - tip)[:, :3]
     return (
         f"base . F(sign q - offset) . tool is off by at most {off[..., 3].max():.2e} m"
         f" and {off[..., :3].max():.2e} rad on {len(q)} samples"
@@ -84,24 +87,23 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
 
 
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
-    """Return a line about the agreement of a product of exponentials with Pinocchio; None: no check.
+    """Compare a product of exponentials with Pinocchio.
 
     Raises:
         TableError: the product of exponentials and Pinocchio differ by more than rounding.
     """
     if verifier.cannot() is not None:
         return None
-    q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
-    ends = QueryBatch([screws.base_frame, screws.tip_frame], (q,))
-    base, tip = np.moveaxis(verifier.oracle().placements(ends), 1, 0)
-    own = screws.coupling.select(verifier.tree, q)
-    off = np.abs(base @ screws.placement(own) - tip)[:, :3]
+    q, base, tip = _sampled_ends(verifier, screws.base_frame, screws.tip_frame)
+    coordinates = screws.coupling.select(verifier.tree, q)
+    size = np.abs(coordinates).sum(axis=-1)
+    off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes the poses of base and tip from the root; the product goes from base to tip.
+    # Pinocchio computes base and tip along two paths from the root, and the product from base to tip.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
-    unit = EPS * (of_joints(joints) + np.abs(own).sum(axis=-1)) + left_out(path)
-    allowed = screws.rounding(own) + unit * (lever + np.abs(own).sum(axis=-1))
+    unit = EPS * (of_joints(joints) + size) + left_out(path)
+    allowed = screws.rounding(coordinates) + unit * (lever + size)
     share = float((off[..., 3].max(axis=-1) / (allowed + LEAST_UNIT)).max(initial=0.0))
     turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
     if not max(share, turn) <= 1.0:
@@ -115,3 +117,10 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
         f"agrees within rounding on {len(q)} samples: tip within {off[..., 3].max():.2e} m"
         f" ({max(share, turn):.0%} of the bound)"
     )
+
+
+def _sampled_ends(verifier: Verifier, base: str, tip: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return random configurations, and Pinocchio's placements (n, 4, 4) of base and tip."""
+    q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
+    T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
+    return q, T[:, 0], T[:, 1]

@@ -1,33 +1,93 @@
-"""Compute the largest difference of each result from the oracle's result (`bounds.disagreement`).
+"""Compare results with an oracle's, in multiples of eps * scale and as a fraction of the bound.
 
-For large batches a compiled kernel computes the differences in one pass, because NumPy would take as long as
-Pinocchio itself. The kernel and NumPy return equal numbers.
+`disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes these
+differences in one pass, because NumPy would take as long as Pinocchio.
 """
 
 from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
 from urdfkin.compiled import preload
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.tree import FloatArray
+from urdfkin.verify.bounds import KERNELS, Bound, result_k
 
-#: `CHECKS` names the kernels that check one configuration, `_OF_BATCHES` the kernel of batches.
-KERNELS = "urdfkin.verify.kernels"
+#: Names of the kernels that check a single configuration.
 CHECKS = "worst", "coupling"
-_OF_BATCHES = "lengths"
 _NO_BITS = np.empty(0, dtype=np.int64)
 
 
-def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """Return the largest difference of each result, in multiples of eps * scale (`bounds.disagreement`).
+@dataclass(frozen=True, slots=True)
+class BatchComparison:
+    """Comparison of a batch of urdfkin's results (matrices or six-vectors) with the oracle's results.
 
-    The shape of the array is that of the first `axes` axes, which are not axes of one result. For placements
-    (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix. The scale can be broadcast to the
-    shape of the results.
+    Attributes:
+        results: Number of compared results.
+        worst: Largest difference of two numbers, in multiples of eps * scale.
+        share: Largest ratio of a difference to its bound; above 1 is a failure.
+        index: Indices of the result with the largest ratio `share` in the batch.
+    """
+
+    results: int = 0
+    worst: float = 0.0
+    share: float = 0.0
+    index: tuple[int, ...] = ()
+
+    def __add__(self, other: BatchComparison) -> BatchComparison:
+        """Combine the comparisons of two batches, with the `index` of the batch with the larger `share`.
+
+        A `share` of NaN counts as larger than any number.
+        """
+        second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
+        first, second = (other, self) if second_is_larger else (self, other)
+        return BatchComparison(
+            self.results + other.results,
+            float(np.maximum(self.worst, other.worst)),
+            first.share,
+            first.index or second.index,
+        )
+
+    @property
+    def agrees(self) -> bool:
+        return self.share <= 1.0
+
+
+def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
+    """Compare urdfkin's results with the oracle's; `worst_of_each` describes `axes`."""
+    return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
+
+
+def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
+    """Compare the largest difference of each result, in multiples of eps * scale, with the result's bound."""
+    if not units.size:
+        return BatchComparison()
+    share = units / result_k(bound, units.shape)
+    index = np.unravel_index(int(share.argmax()), share.shape)
+    return BatchComparison(units.size, float(units.max()), float(share.max()), tuple(int(i) for i in index))
+
+
+@np.errstate(all="ignore")
+def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return |ours - theirs| in multiples of eps * scale.
+
+    The result is inf if `ours`, `theirs` or `scale` is not finite, or if different numbers have the scale 0.
+    """
+    unit = np.where(scale > 0.0, np.maximum(EPS * scale, LEAST_UNIT), 0.0)
+    difference = np.abs(ours - theirs)
+    units = np.where(difference == 0.0, 0.0, difference / unit)
+    return np.where(np.isfinite(difference) & np.isfinite(scale), units, np.inf)
+
+
+def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
+    """Return the largest `disagreement` of each result, as an array with the first `axes` axes of `ours`.
+
+    For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix. The scale can be
+    broadcast to the shape of the results.
     """
     leading, own = ours.shape[:axes], ours.shape[axes:]
     n, numbers = math.prod(leading), math.prod(own)
@@ -37,7 +97,8 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     size = _rows(scale, shape, math.prod(shape[:axes]), numbers)
     if (kernel := preload.kernel("worst", home=KERNELS)) is None:
         begin = time.thread_time()
-        worst = _worst(one, other, size if len(size) == n else size[np.arange(n) % len(size)])
+        scale_of_each = size if len(size) == n else size[np.arange(n) % len(size)]
+        worst: FloatArray = disagreement(one, other, scale_of_each).max(axis=1, initial=0.0)
         preload.spend("worst", time.thread_time() - begin)
     else:
         worst = units = unit = np.empty(n)
@@ -50,27 +111,13 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 
 def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
-    if x.shape != shape:
+    if x.shape != shape:  # `broadcast_to` is slow
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)
-
-
-@np.errstate(all="ignore")
-def _worst(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
-    """Return the largest difference in each row, in eps * scale; inf if a number is not finite."""
-    difference = np.abs(ours - theirs)
-    units = np.where(
-        scale > 0.0,
-        difference / np.maximum(EPS * scale, LEAST_UNIT),
-        np.where(difference > 0.0, np.inf, 0.0),
-    )
-    finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in (ours, theirs, scale)])
-    worst: FloatArray = np.where(finite, units.max(axis=1, initial=0.0), np.inf)
-    return worst
 
 
 def load_kernels() -> None:
     """Compile or load all Numba kernels, so that worker processes do not compile them."""
     preload.load_kernels()
-    for name in (*CHECKS, _OF_BATCHES):
+    for name in (*CHECKS, "lengths"):
         preload.load(name, KERNELS)

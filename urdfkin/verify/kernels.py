@@ -1,7 +1,10 @@
 """Compiled functions for the checks.
 
-`worst` compares results, `lengths` computes magnitudes for error bounds, and `coupling` adds columns of mimic
-joints.
+| Function | Purpose |
+|---|---|
+| `worst` | compares results |
+| `coupling` | adds Jacobian columns of mimic joints |
+| `lengths` | computes magnitudes for error bounds |
 """
 
 from __future__ import annotations
@@ -30,13 +33,13 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 #: Bit pattern of inf, as an integer.
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: Row i + `_AHEAD` is loaded into the processor's cache while row i is compared.
+#: Distance in rows between the compared row and the row that is loaded into the processor's cache.
 _AHEAD = 4
 
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
-    """Return whether a row is finite; otherwise, 0 * x and the sum are NaN."""
+    """Return whether a row is finite; for inf and NaN, 0 * x is NaN."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -60,7 +63,7 @@ def _units(difference, size):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference between two rows of finite numbers; the scale is in row `k`."""
+    """Return the largest difference in row `i` of finite numbers, with row `k` of the scale."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -80,10 +83,9 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each group of three numbers to `units`.
+    """Write the largest difference of each three numbers with a common scale to `units`, in eps * scale.
 
-    The three numbers of a group have the same scale. The difference is in multiples of eps * scale and may be
-    NaN or inf.
+    The difference may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -91,16 +93,16 @@ def _divide_threes(ours, theirs, unit, width, units):
         z = abs(ours[j + 2 * width] - theirs[j + 2 * width])
         largest = x if x > y else y
         largest = z if z > largest else largest
-        share = largest / unit[j]
-        units[j] = (share if largest != 0.0 else 0.0) + (0.0 * x + 0.0 * y + 0.0 * z)
+        multiple = largest / unit[j]
+        units[j] = (multiple if largest != 0.0 else 0.0) + (0.0 * x + 0.0 * y + 0.0 * z)
 
 
 @helper()
 def _most(x, count):
     """Return the bit pattern of the largest of several non-negative numbers, which may be inf or NaN.
 
-    If x < y for two non-negative doubles, the bit pattern of x, read as an integer, is less than that of y.
-    Some processors set the sign bit of NaN, so the sign bit is removed.
+    The bit patterns of non-negative doubles have the order of the doubles. The sign bit, which some
+    processors set for NaN, is removed.
     """
     most = 0
     for j in range(count):
@@ -112,20 +114,18 @@ def _most(x, count):
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     """Write the largest difference in each row to `out`. If a row contains inf or NaN, write inf.
 
-    If `scale` has fewer rows than `out`, its rows are repeated. The arrays `out_bits` and `bits` contain the
-    doubles of `out` and `units` as integers, because the compiler can vectorize the maximum of integers but
-    not of doubles.
+    `out_bits` and `bits` are views of `out` and `units` as integers, because the compiler can vectorize the
+    maximum of integers but not of doubles.
 
     Args:
         ours: urdfkin's results.
         theirs: The oracle's results.
-        scale: Scale of the bound.
+        scale: Scale of the bound. Its rows are repeated if `scale` has fewer rows than `out`.
         out: The largest difference in each row.
-        out_bits: View of `out` that interprets the doubles as 64-bit integers.
-        unit: Working memory in the shape of `scale`. The kernel uses it only if `scale` has fewer rows than
-            `out`.
+        out_bits: View of `out` as 64-bit integers.
+        unit: Working memory in the shape of `scale`, used only if `scale` has fewer rows than `out`.
         units: Working memory for one row.
-        bits: View of `units` that interprets the doubles as 64-bit integers.
+        bits: View of `units` as 64-bit integers.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
@@ -144,8 +144,8 @@ def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
         if in_threes:
             fetch(address, min(i + _AHEAD, len(out) - 1) * numbers, numbers)
             for first in (0, 3 * width):
-                own, of_scale = slice(first, first + 3 * width), unit[k * numbers + first :]
-                _divide_threes(ours[i, own], theirs[i, own], of_scale, width, units[first // 3 :])
+                rows, of_scale = slice(first, first + 3 * width), unit[k * numbers + first :]
+                _divide_threes(ours[i, rows], theirs[i, rows], of_scale, width, units[first // 3 :])
             out_bits[i] = min(_most(bits, 2 * width), _INFINITE)
         elif not (_finite_difference(ours, theirs, i) and (known or _finite(scale, k))):
             out[i] = math.inf
@@ -167,7 +167,7 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(JointMotion.TURN), int(JointMotion.SLIDE)
-#: Number of values in the state of a link, and in the array `free` for each planar or floating joint.
+#: Number of values in the state of a link, and in `free` for each planar or floating joint.
 _STATE = _FREE = 5
 
 
@@ -194,8 +194,8 @@ _LENGTHS = {
     **dict.fromkeys(("times", "dot", "cross"), _product),
 }
 _EQUATIONS: Any = ModuleType("length_equations")  # Numba finds the functions of a module
-vars(_EQUATIONS).update(vars(bound(made=helper(), **_LENGTHS)))
-_STEPS = rebound(steps, made=helper(), others={"eq": _EQUATIONS})
+vars(_EQUATIONS).update(vars(bound(decorate=helper(), **_LENGTHS)))
+_STEPS = rebound(steps, decorate=helper(), others={"eq": _EQUATIONS})
 _carried, _turned, _slid, _freed = (_STEPS[name] for name in ("carried", "turned", "slid", "freed"))
 
 
@@ -216,10 +216,7 @@ def _of_row(x, row, at):
 
 @helper()
 def _read(x, first, m, at, factor, to):
-    """Write factor * |x[k, at]| to the array `to`, for the m configurations k that begin with `first`.
-
-    If `x` has only one row, this row is used for all configurations.
-    """
+    """Write factor * |x[k, at]| to `to` for m configurations k from `first` on; one row of `x` serves all."""
     step = 1 if len(x) > 1 else 0
     for i in range(m):
         to[i] = _product(factor, abs(x[(first + i) * step, at]))
@@ -234,38 +231,39 @@ def _over_turn(before, after, m, d, rates):
 @helper()
 def _over_slide(before, after, m, d, constant, rates):
     for i in range(m):
-        way = d + (rates[2, i] + constant)
-        _put(after, i, _slid(_state(before, i), way, rates[0, i], rates[1, i]))
+        length = d + (rates[2, i] + constant)
+        _put(after, i, _slid(_state(before, i), length, rates[0, i], rates[1, i]))
 
 
 @helper()
 def _over_free(before, after, first, m, d, free, at):
     step = 1 if len(free) > 1 else 0
     for i in range(m):
-        way, o, u, o_rate, u_rate = _of_row(free, (first + i) * step, at)
-        _put(after, i, _freed(_state(before, i), d + way, o, u, o_rate, u_rate))
+        displacement, o, u, o_rate, u_rate = _of_row(free, (first + i) * step, at)
+        _put(after, i, _freed(_state(before, i), d + displacement, o, u, o_rate, u_rate))
 
 
 @kernel(TABLE, ROWS, TABLE, NUMBERS, ROWS, ROWS, ROWS, ROWS, ROWS, STATES, SCRATCH)
 def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
     """Compute the fields `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes`, and write them to `out`.
 
+    Each of the arrays q, v, a, free and base has a row for each configuration, or one row for all.
+
     Args:
-        links: For each moving joint: its kind, its index in q, its index in v, and the moving joint before
-            it.
-        sizes: For each moving joint: the length of the path from the moving joint before it, its mimic
-            multiplier, and its mimic offset.
-        ends: For each frame: the last moving joint before the frame, and the index of the frame in `out`.
+        links: For each moving joint: kind, index in q, index in v, and index of the previous moving joint.
+        sizes: For each moving joint: length of the path from the previous moving joint, mimic multiplier, and
+            mimic offset.
+        ends: For each frame: index of the last moving joint before the frame, and index of the frame in
+            `out`.
         tips: Length of the path from the last moving joint to each frame.
-        q: Coordinates. If one of the arrays q, v, a, free and base has only one row, this row is used for all
-            configurations.
+        q: Coordinates.
         v: Joint velocities.
         a: Joint accelerations.
-        free: Five lengths for each planar and floating joint: of the displacement, the velocities and the
+        free: For each planar and floating joint: lengths of the displacement, the velocities and the
             accelerations (`urdfkin.verify.bounds._free_lengths`).
         base: State of the base.
-        s: Working memory for a block of configurations. It contains the states of the base and of all moving
-            joints, and one more state.
+        s: Working memory for a block of configurations: states of the base and of all moving joints, and one
+            more state.
         out: The computed p, w, vel, alpha and acc.
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]

@@ -1,10 +1,12 @@
 """Read an MJCF file in a process with limits on time and memory, and compare the robot with MuJoCo's model.
 
-Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
-the conversion from the MJCF file to the tree. Therefore `load` compares the placements of bodies and sites
-with those of MuJoCo's own model of the file, and the mimic rules with the model's joint equalities. In
-addition, `load` compares the placements with those of Pinocchio's MJCF reader. Pinocchio's reader is known to
-read some files differently, so a difference from this reader is reported but is not an error.
+Pinocchio checks every result with the URDF text that urdfkin writes for the tree, but not the conversion from
+the MJCF file to the tree. `load` therefore makes three comparisons:
+
+- the placements of bodies and sites with those of MuJoCo's model of the file
+- the mimic rules with the joint equalities of MuJoCo's model
+- the placements with those of Pinocchio's MJCF reader, which reads some files differently. A difference from
+  Pinocchio is reported, but is not an error.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from urdfkin.urdf.mjcf import Listed, is_text, name_of
 from urdfkin.urdf.mujoco import version
 from urdfkin.verify.bounds import Bound, about_the_root, magnitudes, mjcf_placement_bound, result_k
 from urdfkin.verify.comparison import worst_of_each
-from urdfkin.verify.mjcf_process import TOO_MUCH, complete_lines, unpacked
+from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
@@ -38,10 +40,8 @@ from urdfkin.verify.verifier import Verifier
 _SAMPLES = 8
 #: Time limit for reading a file, seconds.
 PATIENCE = 60.0
-#: Largest number of quoted characters of a MuJoCo error.
+#: Maximum number of quoted characters of a MuJoCo error.
 _QUOTED = 300
-#: Largest accepted output of the process, bytes.
-MOST = 400_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +52,10 @@ class MjcfReading:
         urdf: The tree as a URDF text.
         listed: Elements of the file that the tree does not contain.
         path: The file; None for a text.
-        answer: What the separate process returned: data of the robot, its frames, and MuJoCo's results.
-        not_whole: Reason why MuJoCo rejected the complete file, if MuJoCo compiled the file without shapes
-            and inertias; else None.
-        pinocchio: What the separate process returned about Pinocchio's reader; None if nothing.
+        answer: Answer of the process: data of the robot, its frames, and MuJoCo's results.
+        not_whole: Reason why MuJoCo compiled the file only without shapes and inertias; None: MuJoCo compiled
+            the complete file.
+        pinocchio: Answer of the process about Pinocchio's reader; None: no answer.
     """
 
     urdf: str
@@ -71,7 +71,7 @@ def read_mjcf(
 ) -> MjcfReading:
     """Read a robot from an MJCF file, text or bytes, in a process with limits on time (s) and memory.
 
-    With `check`, MuJoCo also computes placements, for `check_mjcf_source`. Included files are read too.
+    With `check`, MuJoCo also computes placements for `check_mjcf_source`. MuJoCo reads included files too.
 
     Raises:
         InputError: MuJoCo is not installed, does not accept the file, or takes too much time or memory; or
@@ -89,9 +89,6 @@ def read_mjcf(
         "seconds": ceil(patience) + 1,
     }
     answers, ending = _ask(request, patience)
-    if errors := [answer["error"] for answer in answers if "error" in answer]:
-        words = {key: errors[0].get(key) for key in ("found", "remedy")}
-        raise InputError(errors[0]["what"], where=errors[0].get("where") or name, **words)
     read = [answer for answer in answers if "urdf" in answer]
     if not read:
         raise InputError(
@@ -119,21 +116,15 @@ def _text(source: str | bytes | os.PathLike[str], name: str) -> str:
 
 
 def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
-    """Return the answers of the process, and the reason why further answers are missing."""
     command = own_python(
         "from urdfkin.verify.mjcf_process import serve; serve()", options=("-B", "-X", "utf8")
     )
     output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
-    answers = [json.loads(line) for line in complete_lines(output)]
-    if status is None:
-        return answers, f"MuJoCo did not finish within {patience:g} s"
-    if len(output) > MOST:
-        return answers, f"an answer of more than {MOST} bytes"
-    return answers, f"MuJoCo's process ended with status {status}: perhaps {TOO_MUCH}"
+    return parse_answers(output, status, library="MuJoCo", name=request["name"], patience=patience)
 
 
 def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
-    """Return a line about the comparison of a robot with MuJoCo's model of its MJCF file.
+    """Compare a robot with MuJoCo's model of the MJCF file; return a line with the result.
 
     Raises:
         OracleError: MuJoCo's placement of a body or site differs by more than the bound, or MuJoCo's model
@@ -144,31 +135,31 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # The factor 2 covers the rounded angles in the URDF text besides the errors of urdfkin and MuJoCo.
+    # The factor 2 doubles the bound to allow for the rounded angles in the URDF text.
     size = about_the_root(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
     bound = mjcf_placement_bound(bound, unpacked(answer["lengths"]), unpacked(answer["angles"]))
-    share = _shares(ours, _whole(answer["placements"]), bound)
+    share = _shares(ours, _placements(answer["placements"]), bound)
     if not (share <= 1.0).all():
         k, f = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
         raise _error(
             f"{tree.name}, {frames[f]}", f"{share[k, f]:.3g} times the bound of rounding, MuJoCo {version()}"
         )
-    coupled = _demand_the_rules(tree.name, answer)
+    rules_share = _check_rules(tree.name, answer)
     line = (
         f"compared with MuJoCo {version()}: {len(frames)} bodies and sites of the MJCF agree in {len(q)}"
         f" configurations ({share.max(initial=0.0):.1%} of the bound)"
     )
-    if coupled is not None:
-        line += f", and {len(answer['rules'])} mimic rules agree ({coupled:.1%})"
+    if rules_share is not None:
+        line += f", and {len(answer['rules'])} mimic rules agree ({rules_share:.1%})"
     if read.not_whole is not None:
         line += f"; MuJoCo compiles the file only without shapes and inertias: {read.not_whole}"
     return f"{line}; {_pinocchios(read, ours, bound)}"
 
 
-def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Return the largest ratio of a mimic rule's difference from MuJoCo's joint equality to its bound.
+def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
+    """Compare the mimic rules with MuJoCo's joint equalities; return the largest ratio to a bound.
 
     The result is None if there are no mimic rules.
     """
@@ -184,14 +175,15 @@ def _demand_the_rules(name: str, answer: Mapping[str, Any]) -> float | None:
         )
     if not rules:
         return None
-    own = sorted(rules)
+    columns = sorted(rules)
+    residuals, sizes = residuals[:, columns], sizes[:, columns]
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.abs(residuals[:, own]) / (MJCF_RULE * EPS * sizes[:, own])
-    share = np.where(residuals[:, own] == 0.0, 0.0, share)
+        share = np.abs(residuals) / (MJCF_RULE * EPS * sizes)
+    share = np.where(residuals == 0.0, 0.0, share)
     if not (share <= 1.0).all():
         k, i = np.unravel_index(int(np.nan_to_num(share, nan=np.inf).argmax()), share.shape)
-        off = abs(residuals[k, own[i]])
-        raise _error(f"{name}, mimic joint {rules[own[i]]}", f"MuJoCo {version()} differs by {off:.3g}")
+        off = abs(residuals[k, i])
+        raise _error(f"{name}, mimic joint {rules[columns[i]]}", f"MuJoCo {version()} differs by {off:.3g}")
     return float(share.max())
 
 
@@ -204,8 +196,8 @@ def _error(where: str, found: str) -> OracleError:
     )
 
 
-def _whole(found: Mapping[str, Any]) -> FloatArray:
-    """Return placements (n, frames, 4, 4) from their upper three rows."""
+def _placements(found: Mapping[str, Any]) -> FloatArray:
+    """Return placements (n, frames, 4, 4) from an array of the upper three rows."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0
@@ -219,7 +211,7 @@ def _shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
 
 
 def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
-    """Return a phrase that compares the placements with those of Pinocchio's MJCF reader."""
+    """Compare the placements with those of Pinocchio's MJCF reader; return a phrase with the result."""
     if read.path is None:
         return "not compared with Pinocchio's MJCF reader, which needs a file"
     found = read.pinocchio or {"error": "the process of the reader ended"}
@@ -229,7 +221,7 @@ def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
     if not names:
         return "Pinocchio's MJCF reader also finds no body"
     places = [name for name, _ in read.answer["frames"]]
-    bodies, theirs = [places.index(name) for name in names], _whole(found["placements"])
+    bodies, theirs = [places.index(name) for name in names], _placements(found["placements"])
     share = _shares(ours[:, bodies], theirs, Bound(bound.scale[:, bodies], bound.k[:, bodies]))
     if (share <= 1.0).all():
         return "Pinocchio's MJCF reader agrees on the bodies"

@@ -1,10 +1,12 @@
-"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader. This module runs in a separate process.
+"""Compile an MJCF file with MuJoCo and with Pinocchio's MJCF reader, in a separate process.
 
 A few lines of MJCF, such as nested `<replicate>` or `nuser_body`, can require any amount of time and memory,
-or crash a parser. The request comes on standard input. Each answer is a line of JSON on standard output:
+or crash a parser. The process reads a request from standard input, and writes each answer as a line of JSON
+to standard output:
 
-1. the robot, compiled without its shapes 2. the robot, compiled from the complete file 3. the placements of
-the bodies by Pinocchio's reader
+1. the robot, compiled without its shapes
+2. the robot, compiled from the complete file
+3. the placements of the bodies by Pinocchio's reader
 
 If the process ends early, the answers that it has already written remain valid.
 """
@@ -33,10 +35,12 @@ from urdfkin.verify.pinocchio import pinocchio
 
 #: Number of coordinates of a free joint.
 _CARTESIAN = 7
-#: Largest number of names in an error message.
+#: Maximum number of names in an error message.
 _NAMED = 5
+#: Maximum size of the output of a process, bytes.
+MOST = 400_000_000
 
-TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+_TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
@@ -50,39 +54,65 @@ def serve() -> None:
                 pinocchio()
         limit(request["seconds"])
         for answer in answers(request):
-            _say(answer)
-    except MemoryError:
-        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": TOO_MUCH}})
-    except UrdfkinError as error:
-        words = {key: getattr(error, key) for key in ("what", "where", "remedy")}
-        _say({"error": words | {"found": _plain(error.found)}})
+            write_answer(answer)
     except Exception as error:
-        message = f"{type(error).__name__}: {error}"
-        _say({"error": {"what": "MuJoCo cannot compile this MJCF", "found": message[:2000]}})
-    os._exit(0)  # the exit handlers of the libraries are skipped
+        write_answer(error_answer(error, "MuJoCo cannot compile this MJCF"))
+    os._exit(0)  # without the exit handlers of the libraries
 
 
-def _plain(found: str | None) -> str | None:
-    """Return MuJoCo's message, with a hint if MuJoCo reports lack of memory as "unknown exception"."""
-    return f"{found} Perhaps {TOO_MUCH}" if found and found.endswith("unknown exception!") else found
+def error_answer(error: Exception, what: str) -> dict[str, Any]:
+    """Return an answer from which `parse_answers` raises an error; `what` describes an unexpected error."""
+    if isinstance(error, UrdfkinError):
+        parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
+        return {"error": parts | {"found": _with_memory_hint(error.found)}}
+    found = _TOO_MUCH if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"[:2000]
+    return {"error": {"what": what, "found": found}}
 
 
-def _say(answer: Mapping[str, Any]) -> None:
+def _with_memory_hint(found: str | None) -> str | None:
+    """Add a hint about memory to the message "unknown exception" of MuJoCo."""
+    return f"{found} Perhaps {_TOO_MUCH}" if found and found.endswith("unknown exception!") else found
+
+
+def write_answer(answer: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
 
 
-def complete_lines(output: bytes) -> list[bytes]:
-    """Return the answers in a process's output, without texts of libraries and lines cut off by a crash."""
+def parse_answers(
+    output: bytes, status: int | None, *, library: str, name: str, patience: float
+) -> tuple[list[dict[str, Any]], str]:
+    """Return the answers in the output of a process, and the reason why further answers are missing.
+
+    Texts of libraries, and a last line that a crash has cut off, are skipped.
+
+    Args:
+        output: Output of the process.
+        status: Exit status of the process; None: the process ran longer than `patience`.
+        library: Name of the library in messages.
+        name: Name of the file in messages.
+        patience: Time limit, s.
+
+    Raises:
+        InputError: an answer of the process is an error.
+    """
     lines = output.splitlines(keepends=True)
-    return [line for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
+    answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
+    for answer in answers:
+        if (error := answer.get("error")) is not None:
+            parts = {key: error.get(key) for key in ("found", "remedy")}
+            raise InputError(error["what"], where=error.get("where") or name, **parts)
+    if status is None:
+        return answers, f"{library} did not finish within {patience:g} s"
+    if len(output) > MOST:
+        return answers, f"an answer of more than {MOST} bytes"
+    return answers, f"{library}'s process ended with status {status}: perhaps {_TOO_MUCH}"
 
 
 def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield the answers to a request with the keys `path` or `text`, `name` (for messages) and `samples`.
 
-    `samples` is the number of random configurations besides the zero configuration. If it is 0, the zero
-    configuration is left out too.
+    `samples` is the number of random configurations besides the zero configuration; 0: no configurations.
     """
     path, samples = request["path"], int(request["samples"])
     source = path if path is not None else request["text"]
@@ -99,13 +129,13 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             if isinstance(error, InputError) and error.remedy is not None:
                 raise  # MuJoCo compiles the file, but the result is not a tree
             found = error.found if isinstance(error, InputError) else str(error)
-            yield {"not_whole": _plain(found) or TOO_MUCH}
+            yield {"not_whole": _with_memory_hint(found) or _TOO_MUCH}
     if samples and path is not None:
         yield {"pinocchio": _pinocchios(path, read, q)}
 
 
 def _configurations(read: Mjcf, samples: int) -> FloatArray:
-    """Return the zero configuration and `samples` random configurations (n, nq); none if `samples` is 0."""
+    """Return the zero configuration and `samples` random configurations (n, nq); `samples` = 0: none."""
     if not samples:
         return np.empty((0, read.tree.nq))
     drawn = sample(read.tree, samples, np.random.default_rng(0))
@@ -158,8 +188,7 @@ def _pinocchio_placements(
 ) -> FloatArray:
     """Return the placements (n, bodies, 4, 4) that Pinocchio computes from an MJCF file at MuJoCo's `qpos`.
 
-    The joints and bodies of Pinocchio and MuJoCo are matched by name. `coordinates` is the index of each
-    joint's first number in `qpos`.
+    `coordinates` is the index of each joint's first number in `qpos`, by the joint's name.
 
     Raises:
         OracleError: Pinocchio does not accept the file, or reads other joints or bodies from it.
@@ -167,7 +196,7 @@ def _pinocchio_placements(
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)
-    except Exception as error:  # Pinocchio's parsers raise other types of exceptions
+    except Exception as error:  # Pinocchio's parsers raise many types of exceptions
         raise OracleError("the reader does not accept the file", found=str(error).strip()) from error
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
@@ -185,7 +214,7 @@ def _pinocchio_placements(
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # Pinocchio stores a revolute joint without limits as cosine and sine
+            else:  # a revolute joint without limits has the coordinates cosine and sine
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]
@@ -195,8 +224,8 @@ def _pinocchio_placements(
 def _numbered(model: Any, names: Sequence[str]) -> Iterator[tuple[str, tuple[int, int]]]:
     """Yield the name of each joint with its index in q and its number of coordinates.
 
-    Pinocchio combines several joints of a body into one joint, `Composite_` followed by the name of the first
-    joint. In q, each of the original joints has one number.
+    Pinocchio combines several joints of a body into one joint with the name `Composite_` and the name of the
+    first joint. In q, each of the combined joints has one number.
     """
     for j, name in list(enumerate(map(str, model.names)))[1:]:
         joint, first = model.joints[j], name.removeprefix("Composite_")

@@ -1,8 +1,11 @@
 """Check the URDF text that urdfkin writes for a `pinocchio.Model` or for a Denavit-Hartenberg table.
 
-Pinocchio checks a robot's results with the robot's URDF text. This module checks the text. For a model, it
-compares the placements of all links with the model's placements. For a table, it compares Pinocchio's
-placements of the tip with the product of the table's matrices (eq. 7.64).
+Pinocchio checks a robot's results with the URDF text, so an error in the text would remain unnoticed.
+
+| Source of the text | Comparison |
+|---|---|
+| `pinocchio.Model` | placements of all links with the model's placements |
+| table | Pinocchio's placements of the tip with the product of the table's matrices (eq. 7.64) |
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import Modelled
 from urdfkin.verify.bounds import Bound, magnitudes
-from urdfkin.verify.certificate import compare
+from urdfkin.verify.comparison import compare
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import MOST_RATES, pinocchio, version
 from urdfkin.verify.quantities import PLACEMENT
@@ -33,9 +36,9 @@ _SAMPLES = 8
 
 
 def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
-    """Return a line about the comparison of a robot with the Pinocchio model from which it was made.
+    """Compare a robot with the Pinocchio model from which urdfkin made the robot; return the result as text.
 
-    `source` is the model, or a RobotWrapper that contains it.
+    `source` is the model, or a RobotWrapper that contains the model.
 
     Raises:
         OracleError: a placement differs by more than the bound.
@@ -48,7 +51,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # The factor 2 covers the rounded angles in the URDF text besides the errors of urdfkin and Pinocchio.
+    # The factor 2 doubles the bound to allow for the rounded angles in the URDF text.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -65,7 +68,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
 
 
 def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
-    """Return the model's placements (n, links, 4, 4): joints first, then frames."""
+    """Return the model's placements (n, joints + frames, 4, 4)."""
     pin = pinocchio()
     data = model.createData()
     out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
@@ -77,24 +80,24 @@ def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
 
 
 def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations (n, model.nq) of the model for the tree's q; joints are matched by name."""
+    """Return configurations (n, model.nq) of the model for the tree's q, with joints matched by name."""
     full = np.zeros((len(q), int(model.nq)))
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if not joint.nq:
             continue
         theirs = model.joints[model.getJointId(joint.name)]
         to, size = int(theirs.idx_q), int(theirs.nq)
-        own = q[:, at : at + joint.nq]
+        numbers = q[:, at : at + joint.nq]
         if joint.kind is JointKind.PLANAR:
-            own = np.column_stack((own[:, :2], np.cos(own[:, 2]), np.sin(own[:, 2])))
+            numbers = np.column_stack((numbers[:, :2], np.cos(numbers[:, 2]), np.sin(numbers[:, 2])))
         elif size == 2:
-            own = np.column_stack((np.cos(own), np.sin(own)))
-        full[:, to : to + size] = own
+            numbers = np.column_stack((np.cos(numbers), np.sin(numbers)))
+        full[:, to : to + size] = numbers
     return full
 
 
 def check_table_source(verifier: Verifier, table: DHTable) -> None:
-    """Compare the robot that Pinocchio reads from the URDF with the table from which the URDF was made.
+    """Compare Pinocchio's placements of the tip with those of the table from which urdfkin made the URDF.
 
     Raises:
         TableError: the placements of the tip differ by more than rounding.
@@ -105,7 +108,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     own = table.coupling.select(verifier.tree, q)
     theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
     off = np.abs(theirs - table.placement(own))[:, :3]
-    # The table may round base and tool to six digits, but the URDF has exact rotations.
+    # Base and tool of the table may be rounded to six digits; the rotations in the URDF are exact.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
     turn = EPS * of_rows_read_back(rows) + defect
     allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
@@ -119,6 +122,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return |R^T R - 1| of the base plus that of the tool, whose numbers may be rounded to six digits."""
+    """Return the sum of |R^T R - 1| over the rotations R of base and tool."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -1,21 +1,20 @@
 """The oracle MuJoCo.
 
-MuJoCo reads the positions and axes of links and joints from the URDF text with its own parser. MuJoCo
-computes with unit quaternions, and its six-vectors have a centre of mass as the reference point. urdfkin and
-Pinocchio use neither method. Before MuJoCo reads the text, this module makes these changes:
+MuJoCo reads the origins and axes of joints from the URDF text with its own parser. Unlike urdfkin and
+Pinocchio, MuJoCo computes with unit quaternions, and its six-vectors refer to a centre of mass. This module
+changes the text before MuJoCo reads it:
 
-- Meshes and inertials are removed. Each link becomes a body. Only the root has a mass. Therefore, the centre
-  of mass, to which MuJoCo's results refer, is the root's origin.
+- Each link becomes a body. Meshes and inertials are removed, and only the root has a mass. The centre of
+  mass, to which MuJoCo's results refer, is therefore the root's origin.
 - Links and joints get numbers as names, because MuJoCo reserves some names.
-- A floating joint becomes three slide joints and a ball joint. A planar joint becomes two slide joints and a
-  hinge. MuJoCo's own free joint is not used, because it can only connect a body to the world.
-- The rules of `rules_of_text` couple the mimic joints. MuJoCo would turn the mimic rules into constraints,
-  and its kinematics ignores constraints.
+- A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
+  body to the world. A planar joint becomes two slide joints and a hinge.
+- The mimic joints are coupled by `rules_of_text`, because MuJoCo's kinematics ignores constraints.
 
-MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v. If J is MuJoCo's Jacobian, the robot's Jacobian
-is J S. The matrix S contains the multipliers of mimic joints. For a floating or planar joint, S also contains
-a rotation matrix. This matrix converts urdfkin's linear velocity, which is in the axes of the child link, to
-the axes of the slide joints. The axes of the slide joints are fixed in the parent link.
+MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
+Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
+floating or planar joint, S also contains the rotation from the axes of the child link, in which v is, to the
+axes of the parent link, in which the slide joints are fixed.
 """
 
 from __future__ import annotations
@@ -46,15 +45,13 @@ from urdfkin.verify.pinocchio import depth_of
 
 #: Mass (kg) and moments of inertia (kg m^2) of each link while MuJoCo reads the text.
 _MASS = "1"
-#: Longest accepted chain of links.
-#: MuJoCo rejects a robot with more than 1,023 links, but only after a time quadratic in that number.
+#: Maximum length of a chain of links. MuJoCo rejects more than 1,023 links, but after a quadratic time.
 _DEEPEST = 1_000
-#: MuJoCo's joints for the coordinates of a planar or floating joint, in order.
+#: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Numbers of coordinates and of joint velocities in urdfkin's layout.
-_ONE = ("revolute", "continuous", "prismatic")
-_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6), **dict.fromkeys(_ONE, (1, 1))}
+#: Numbers of coordinates and of joint velocities in urdfkin's layout; (1, 1) for all other kinds of joints.
+_SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,13 +67,13 @@ class _Joint:
 class _MujocoIndices:
     """Indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
-    The joints of a moving base have the indices q = v = -1, because they are not in urdfkin's q and v. A
-    locked joint has the index v = -1, and its value is stored as the offset.
+    The joint of a moving base, which is not in urdfkin's q and v, has q = v = -1. A locked joint has v = -1,
+    and the offset is the value of the joint.
     """
 
     kind: str
-    their_q: int
-    their_v: int
+    qpos: int
+    qvel: int
     q: int
     v: int
     multiplier: float
@@ -103,16 +100,16 @@ class MujocoOracle(Oracle):
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         moving = [joint.name for joint in joints if joint.kind != "fixed"]
         coupled = mimic_rules(text, moving, tree.name) if self.mimic else {}
-        held = locked_by_rules(self.lock, coupled)  # locked joints stay in MuJoCo's model
-        rules = self.rules([name for name in moving if name not in held])
-        carrier = [_Joint("", "floating", "", links[0])] if self.moving_base else []
-        self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if carrier else []), *links])}
-        self._model = self._compiled([*carrier, *joints], links[0])
-        self._places = list(self._laid_out([*carrier, *joints], rules, held))
+        locked = locked_by_rules(self.lock, coupled)  # locked joints stay in MuJoCo's model
+        rules = self.rules([name for name in moving if name not in locked])
+        base = [_Joint("", "floating", "", links[0])] if self.moving_base else []
+        self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if base else []), *links])}
+        self._model = self._compiled([*base, *joints], links[0])
+        self._indices = list(self._joint_indices([*base, *joints], rules, locked))
         bodies = {link: self._model.body(self._bodies[link]).id for link in links}
-        own = {joint.name: bodies[joint.child] for joint in joints}
-        self._frames = Frames(self.title, tree.name, bodies, own, {})
-        self._constant = all(place.kind not in _PARTS for place in self._places)
+        children = {joint.name: bodies[joint.child] for joint in joints}
+        self._frames = Frames(self.title, tree.name, bodies, children, {})
+        self._constant = all(joint.kind not in _PARTS for joint in self._indices)
         self.new_data = lambda: self._mujoco.MjData(self._model)
 
     # -- the model -----------------------------------------------------------------------------------
@@ -138,7 +135,7 @@ class MujocoOracle(Oracle):
                     kind = getattr(mujoco.mjtJoint, f"mjJNT_{what.upper()}")
                     body = spec.body(self._bodies[joint.child])
                     body.add_joint(name=f"j{i} {part}", type=kind, axis=_AXES[axis or "z"])
-            return _weighing_its_root(compiled(spec), self._bodies[root])
+            return _with_mass_at_root(compiled(spec), self._bodies[root])
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             first = str(error).strip().replace("\n", "; ")
             raise OracleError(
@@ -146,7 +143,7 @@ class MujocoOracle(Oracle):
             ) from error
 
     def _joint(self, i: int, joint: _Joint) -> Element:
-        """Return a joint element for MuJoCo; only the origin and the axis are copied from the URDF text."""
+        """Return a joint element for MuJoCo, with the origin and the axis of the URDF text."""
         kind = "fixed" if joint.kind in _PARTS else joint.kind
         element = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
         SubElement(element, "parent", link=self._bodies[joint.parent])
@@ -157,37 +154,35 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        if kind == "prismatic":  # MuJoCo requires limits, although its kinematics ignores them
+        if kind == "prismatic":  # MuJoCo requires limits, but ignores limits in its kinematics
             SubElement(element, "limit", lower="-1", upper="1")
         return element
 
-    def _laid_out(
-        self, joints: Sequence[_Joint], rules: Mapping[str, Mimic], held: Mapping[str, float]
+    def _joint_indices(
+        self, joints: Sequence[_Joint], rules: Mapping[str, Mimic], locked: Mapping[str, float]
     ) -> Iterator[_MujocoIndices]:
         leaders, q, v = dict[str, tuple[int, int]](), 0, 0
         for joint in joints:
-            sizes = _SIZES[joint.kind]
-            if joint.name and joint.name not in rules and joint.name not in held:
+            if joint.name and joint.name not in rules and joint.name not in locked:
+                nq, nv = _SIZES.get(joint.kind, (1, 1))
                 leaders[joint.name] = q, v
-                q, v = q + sizes[0], v + sizes[1]
+                q, v = q + nq, v + nv
         for i, joint in enumerate(joints):
             if joint.kind == "fixed":
                 continue
             first = _PARTS.get(joint.kind, ("",))[0]
-            own = self._model.joint(f"j{i} {first}" if first else f"j{i}")
-            if joint.name in held:
-                their = int(own.qposadr[0]), int(own.dofadr[0])
-                yield _MujocoIndices(joint.kind, *their, 0, -1, 0.0, held[joint.name])
+            compiled_joint = self._model.joint(f"j{i} {first}" if first else f"j{i}")
+            indices = int(compiled_joint.qposadr[0]), int(compiled_joint.dofadr[0])
+            if joint.name in locked:
+                yield _MujocoIndices(joint.kind, *indices, 0, -1, 0.0, locked[joint.name])
                 continue
             rule = rules.get(joint.name, Mimic(joint.name, 1.0, 0.0))
             if joint.name and rule.leader not in leaders:
                 raise OracleError(
                     "the mimicked joint does not exist", where=f"joint {joint.name}", found=rule.leader
                 )
-            at = leaders.get(rule.leader, (-1, -1))  # the motion of the base is not part of q
-            yield _MujocoIndices(
-                joint.kind, int(own.qposadr[0]), int(own.dofadr[0]), *at, rule.multiplier, rule.offset
-            )
+            ours = leaders.get(rule.leader, (-1, -1))  # the motion of the base is not part of q
+            yield _MujocoIndices(joint.kind, *indices, *ours, rule.multiplier, rule.offset)
 
     # -- quantities ----------------------------------------------------------------------------------
 
@@ -205,11 +200,11 @@ class MujocoOracle(Oracle):
         poses, velocity, acceleration = self._moved(x, 3)
         if not Reference.of(x.reference).at_world:
             return _referred(x.reference, poses, acceleration)
-        # Only a spatial acceleration can be moved to the world origin.
+        # Only a spatial acceleration can be converted to the world origin as its reference point.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
-        out, there = _referred(x.reference, poses, spatial), _referred(x.reference, poses, velocity)
-        out[..., :3] += np.cross(there[..., 3:], there[..., :3])
+        out, velocity = _referred(x.reference, poses, spatial), _referred(x.reference, poses, velocity)
+        out[..., :3] += np.cross(velocity[..., 3:], velocity[..., :3])
         return out
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
@@ -239,7 +234,7 @@ class MujocoOracle(Oracle):
         poses = self._poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # the axes of the frame rotate
+        if which.own_axes:  # the derivative of rotating axes contains -w x J
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(which, poses, rate, columns=True)
@@ -259,9 +254,10 @@ class MujocoOracle(Oracle):
         return self._poses(x, count, read), velocity, acceleration
 
     def _poses(self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]) -> FloatArray:
-        """Return placements (n, frames, 4, 4); call `read` (body, index) for each sample and frame.
+        """Return placements (n, frames, 4, 4); call `read` for each sample k and frame f.
 
-        MuJoCo receives the first `count` of the inputs q, v and a. The function `read` reads `self.data`.
+        MuJoCo receives the first `count` of the inputs q, v and a. The function `read(body, (k, f))` can then
+        read further results from `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.index(name) for name in x.frames]
@@ -303,23 +299,21 @@ class MujocoOracle(Oracle):
         """Return MuJoCo's inputs qpos, qvel and qacc, each an array (n, ...)."""
         q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
-        for place in self._places:
-            at, own = place.their_q, q[:, place.q : place.q + 7]
-            if place.q < 0:
+        for joint in self._indices:
+            at, coordinates = joint.qpos, q[:, joint.q : joint.q + 7]
+            if joint.q < 0:
                 T = np.eye(4) if base is None else np.asarray(base.placement)
-                qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = (
-                    T[..., :3, 3],
-                    _scalar_first(nearest_quaternion(T[..., :3, :3])),
-                )
-            elif place.kind == "floating":
-                unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)
-                qpos[:, at : at + 3], qpos[:, at + 3 : at + 7] = own[:, :3], _scalar_first(unit)
-            elif place.kind == "planar":
-                qpos[:, at : at + 3] = own[:, :3]
-            elif place.v < 0:
-                qpos[:, at] = place.offset
+                qpos[:, at : at + 3] = T[..., :3, 3]
+                qpos[:, at + 3 : at + 7] = _scalar_first(nearest_quaternion(T[..., :3, :3]))
+            elif joint.kind == "floating":
+                qpos[:, at : at + 3] = coordinates[:, :3]
+                qpos[:, at + 3 : at + 7] = _unit_quaternion(coordinates)
+            elif joint.kind == "planar":
+                qpos[:, at : at + 3] = coordinates[:, :3]
+            elif joint.v < 0:
+                qpos[:, at] = joint.offset
             else:
-                qpos[:, at] = place.multiplier * own[:, 0] + place.offset
+                qpos[:, at] = joint.multiplier * coordinates[:, 0] + joint.offset
         if count == 1:
             return qpos, None, None
         S, v = self._spread(q), x.v
@@ -329,8 +323,9 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The base moves on three slide joints in world axes, and on a ball joint in its own axes.
-            at, back = self._places[0].their_v, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
+            # The velocity of the base's slide joints is in world axes, that of the ball joint in the base's
+            # axes.
+            at, back = self._indices[0].qvel, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
             rates[:, at + 3 : at + 6] = (back @ velocity[..., 3:, None])[..., 0]
@@ -342,47 +337,53 @@ class MujocoOracle(Oracle):
     def _spread(self, q: FloatArray) -> FloatArray:
         """Return S (n or 1, MuJoCo's nv, nv), with qvel = S v."""
         S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
-        for place in self._places:
-            at, own = place.their_v, place.v
-            if own < 0:
+        for joint in self._indices:
+            at, v = joint.qvel, joint.v
+            if v < 0:
                 continue
-            if place.kind in _PARTS:
-                R, slides = self._turn(place, q)
-                S[:, at : at + slides, own : own + slides] = R
-                turns = slice(slides, 2 * slides if slides == 3 else 3)
-                S[:, range(at, at + 6)[turns], range(own, own + 6)[turns]] = 1.0
+            if joint.kind in _PARTS:
+                R, slides = _rotation_of_joint(joint, q)
+                S[:, at : at + slides, v : v + slides] = R
+                rotations = np.arange(slides, _SIZES[joint.kind][1])
+                S[:, at + rotations, v + rotations] = 1.0
             else:
-                S[:, at, own] = place.multiplier
+                S[:, at, v] = joint.multiplier
         return S
 
     def _spread_rate(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the time derivative S' of S, computed from R' = R [w]x of floating and planar joints."""
         S_rate = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
-        for place in self._places:
-            at, own = place.their_v, place.v
-            if own >= 0 and place.kind in _PARTS:
-                R, slides = self._turn(place, q)
+        for joint in self._indices:
+            at, first = joint.qvel, joint.v
+            if first >= 0 and joint.kind in _PARTS:
+                R, slides = _rotation_of_joint(joint, q)
                 w = np.zeros((len(q), 3))
-                w[:, (0 if slides == 3 else 2) :] = v[:, own + slides : own + (6 if slides == 3 else 3)]
-                crossed = np.cross(w[:, None, :], np.eye(3)[None]).swapaxes(-1, -2)
-                S_rate[:, at : at + slides, own : own + slides] = R @ crossed[:, :slides, :slides]
+                w[:, (0 if slides == 3 else 2) :] = v[:, first + slides : first + _SIZES[joint.kind][1]]
+                w_cross = np.cross(w[:, None, :], np.eye(3)[None]).swapaxes(-1, -2)
+                S_rate[:, at : at + slides, first : first + slides] = R @ w_cross[:, :slides, :slides]
         return S_rate
 
-    def _turn(self, place: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-        """Return the rotation (n, 3, 3) or (n, 2, 2) of a floating or planar joint, and its slide count."""
-        own = q[:, place.q : place.q + 7]
-        if place.kind == "floating":
-            unit = own[:, 3:] / np.linalg.norm(own[:, 3:], axis=1, keepdims=True)
-            return _rotation(_scalar_first(unit)), 3
-        c, s = np.cos(own[:, 2]), np.sin(own[:, 2])
-        return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), 2
+
+def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
+    """Return the rotation (n, 3, 3) or (n, 2, 2) of a floating or planar joint, and its slide count."""
+    coordinates = q[:, joint.q : joint.q + 7]
+    if joint.kind == "floating":
+        return _rotation(_unit_quaternion(coordinates)), 3
+    c, s = np.cos(coordinates[:, 2]), np.sin(coordinates[:, 2])
+    return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), -2), 2
 
 
-def _weighing_its_root(model: Any, root: str) -> Any:
+def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
+    """Return the unit quaternion (w, x, y, z) of a floating joint's coordinates (n, 7)."""
+    quaternion = coordinates[:, 3:]
+    return _scalar_first(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
+
+
+def _with_mass_at_root(model: Any, root: str) -> Any:
     """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
 
-    MuJoCo computes velocities relative to the centre of mass. If the centre of mass is at the root's origin,
-    MuJoCo computes a lever arm of length zero as exactly zero.
+    MuJoCo computes velocities at the centre of mass. With the centre at the root's origin, MuJoCo computes
+    lever arms of length zero exactly.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
@@ -399,33 +400,33 @@ def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]
     """Return the joints of the text (depth first, siblings sorted by name), and the links (root first)."""
     robot = plain_xml(text)
     links = [element.get("name", "") for element in robot.iterfind("link")]
-    below, carried = dict[str, list[_Joint]](), set[str]()
+    children, child_links = dict[str, list[_Joint]](), set[str]()
     for element in robot.iterfind("joint"):
         parent, child = (element.find(tag) for tag in ("parent", "child"))
         if parent is None or child is None:
             raise ValueError(f"joint {element.get('name')} has no parent or child link")
-        words = (
+        names = (
             element.get("name", ""),
             element.get("type", ""),
             parent.get("link", ""),
             child.get("link", ""),
         )
-        joint = _Joint(*words, element)
-        below.setdefault(joint.parent, []).append(joint)
-        carried.add(joint.child)
-    root = next(link for link in links if link not in carried)
+        joint = _Joint(*names, element)
+        children.setdefault(joint.parent, []).append(joint)
+        child_links.add(joint.child)
+    root = next(link for link in links if link not in child_links)
     if root_joint is not None:
-        below[WORLD] = [_Joint("root_joint", root_joint, WORLD, root)]
+        children[WORLD] = [_Joint("root_joint", root_joint, WORLD, root)]
         root = WORLD
-    joints, stack = list[_Joint](), sorted(below.get(root, []), key=_name, reverse=True)
+
+    def joints_of(link: str) -> list[_Joint]:
+        return sorted(children.get(link, []), key=lambda joint: joint.name.encode(), reverse=True)
+
+    joints, stack = list[_Joint](), joints_of(root)
     while stack:
         joints.append(stack.pop())
-        stack += sorted(below.get(joints[-1].child, []), key=_name, reverse=True)
+        stack += joints_of(joints[-1].child)
     return joints, [root, *(joint.child for joint in joints)]
-
-
-def _name(joint: _Joint) -> bytes:
-    return joint.name.encode()
 
 
 def _scalar_first(quaternion: FloatArray) -> FloatArray:

@@ -1,11 +1,10 @@
-"""Base class of the oracles (Pinocchio and MuJoCo), and conversion of a call's arguments for an oracle.
+"""Base class of the oracles Pinocchio and MuJoCo, and conversion of a call's arguments for an oracle.
 
 An oracle is a library whose results urdfkin compares with its own results. urdfkin converts the arguments of
-a call for its own computation. This module converts the same arguments a second time, for the oracle. Apart
-from the exceptions below, the two conversions share no code. A wrong broadcast, order or name in one of them
-therefore leads to a disagreement.
+a call for its own computation, and this module converts them a second time for the oracle. The two
+conversions are independent, so a wrong broadcast, order or name in one of them causes a disagreement.
 
-| Part | In this module | In urdfkin's own computation |
+| Subject | In this module | In urdfkin's own computation |
 |---|---|---|
 | mimic rules | `rules_of_text` | `urdfkin.urdf.lint`, `urdfkin.urdf.reader` |
 | names, batch shapes | `OracleQuery` | `urdfkin.verify.call` |
@@ -13,20 +12,19 @@ therefore leads to a disagreement.
 | frame of a name | `Frames` | `KinematicTree.frame_link` |
 | moving base | `free_flyer` and others | `BaseMotion` |
 
-This module looks up names in the list of joints. The oracle compares the order of this list with the order of
-joints in the oracle's model. There are two exceptions. Both conversions parse units with
-`urdfkin.errors.numbers`, and both use the same values of named poses.
+Both conversions parse units with `urdfkin.errors.numbers`, and use the same values of named poses.
 
-Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`), so this module reads the
-rules. For this, the module parses the URDF text a second time when the first result is checked.
+Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`). When the first result is
+checked, this module parses the URDF text again and reads the mimic rules.
 
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
-planar joint three, a floating joint seven, and a mimic joint none.
+planar joint three, a floating joint seven, and a mimic joint none. `Oracle.rules` compares this order with
+the order of joints in the oracle's model.
 
-Moving base: the base's rotation is the rotation nearest to the given matrix M. urdfkin computes this rotation
-with a Newton step (`urdfkin.kinematics.rotation`). This module uses Davenport's q-method: among unit
-quaternions, q^T K q = trace(R(q)^T M) is largest for the nearest rotation. The quaternion q is therefore the
-eigenvector of K for the largest eigenvalue.
+Moving base: the base's rotation is the rotation nearest to the user's matrix M. urdfkin computes this
+rotation with a Newton step (`urdfkin.kinematics.rotation`). This module uses Davenport's q-method: among all
+unit quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest rotation. The quaternion of the
+nearest rotation is therefore the eigenvector of K for the largest eigenvalue.
 """
 
 from __future__ import annotations
@@ -51,14 +49,11 @@ from urdfkin.errors.numbers import parse_float, parse_quantity
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, LinkFrame, Mimic
 from urdfkin.system.plain_xml import plain_xml
-from urdfkin.verify.comparison import KERNELS
-
-#: An array of indices, for example in urdfkin's v for Pinocchio's joint velocities.
-Places = np.ndarray[Any, np.dtype[np.int64]]
+from urdfkin.verify.bounds import KERNELS
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return the rule of each mimic joint in `joints` relative to an independent joint.
+    """Return a rule for each mimic joint in `joints`, relative to an independent joint.
 
     Raises:
         ValueError: a multiplier or offset is not a number.
@@ -75,26 +70,23 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 
 
 def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
-    """Return mimic rules in which every mimicked joint is independent, not a mimic joint."""
-    known: dict[str, Mimic] = {}
-    return {name: _resolved(name, rules, known) for name in rules}
+    """Return mimic rules q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1 of independent joints.
 
-
-def _resolved(joint: str, rules: dict[str, Mimic], known: dict[str, Mimic]) -> Mimic:
-    """Return the resolved rule q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
-
-    The computation starts with the rule of the independent joint. The results are stored in `known`, so each
-    rule of a chain is resolved only once.
+    A chain of mimic joints is resolved from the independent joint on, and each rule only once.
     """
-    chain = [joint]
-    while (leader := rules[chain[-1]].leader) in rules and leader not in known and len(chain) <= len(rules):
-        chain.append(leader)
-    for name in reversed(chain):
-        rule = rules[name]
-        end = known.get(rule.leader, Mimic(rule.leader, 1.0, 0.0))
-        offset = rule.multiplier * end.offset + rule.offset
-        known[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
-    return known[joint]
+    known: dict[str, Mimic] = {}
+    for joint in rules:
+        chain = [joint]
+        while (leader := rules[chain[-1]].leader) in rules and leader not in known:
+            if len(chain) > len(rules):  # the rules form a cycle
+                break
+            chain.append(leader)
+        for name in reversed(chain):
+            rule = rules[name]
+            end = known.get(rule.leader, Mimic(rule.leader, 1.0, 0.0))
+            offset = rule.multiplier * end.offset + rule.offset
+            known[name] = Mimic(end.leader, rule.multiplier * end.multiplier, offset)
+    return {joint: known[joint] for joint in rules}
 
 
 def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> dict[str, float]:
@@ -111,16 +103,20 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
     return {**lock, **moved}
 
 
-#: Number of coordinates in urdfkin of a joint with nq coordinates and nv velocities in Pinocchio.
+#: Maps (nq, nv), the size of a joint in Pinocchio, to the joint's number of coordinates in urdfkin.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
-    """First index of a joint's coordinates, first index of its joint velocities, and its mimic rule.
+    """Indices of a joint's first coordinate and first joint velocity, and the joint's mimic rule.
 
-    `full_q` and `full_v` are the indices in Pinocchio's vectors, `q` and `v` those in urdfkin's. `sizes` is
-    the joint's pair (nq, nv) in Pinocchio.
+    Attributes:
+        sizes: The pair (nq, nv) of the joint in Pinocchio.
+        full_q: Index of the first coordinate in Pinocchio's vector.
+        full_v: Index of the first joint velocity in Pinocchio's vector.
+        q: Index of the first coordinate in urdfkin's q.
+        v: Index of the first joint velocity in urdfkin's v.
     """
 
     sizes: tuple[int, int]
@@ -138,14 +134,13 @@ class PinocchioLayout:
     Args:
         model: Pinocchio's model.
         joints: Pinocchio's indices of the robot's joints, in order.
-        names: Names of these joints.
+        names: Names of the joints, in the order of `joints`.
         rules: The resolved rule of each mimic joint.
 
     Attributes:
         nq: Length of q.
         nv: Length of v.
-        rate_columns: Indices of the columns of Pinocchio's Jacobian that belong to moving joints, including
-            mimic joints.
+        rate_columns: Indices of the columns of Pinocchio's Jacobian for moving joints, mimic joints included.
     """
 
     def __init__(
@@ -154,67 +149,66 @@ class PinocchioLayout:
         self._model = model
         sizes = [(int(model.joints[j].nq), int(model.joints[j].nv)) for j in joints]
         at, self.nq, self.nv = dict[str, tuple[int, int]](), 0, 0
-        for name, own in zip(names, sizes, strict=True):
+        for name, size in zip(names, sizes, strict=True):
             if name not in rules:
                 at[name] = self.nq, self.nv
-                self.nq, self.nv = self.nq + _COORDINATES[own], self.nv + own[1]
-        self._places = list[_JointIndices]()
-        for j, name, own in zip(joints, names, sizes, strict=True):
+                self.nq, self.nv = self.nq + _COORDINATES[size], self.nv + size[1]
+        self._joints = list[_JointIndices]()
+        for j, name, size in zip(joints, names, sizes, strict=True):
             rule = rules.get(name, Mimic(name, 1.0, 0.0))
             if rule.leader not in at:
                 raise OracleError(
                     "Pinocchio has no such mimicked joint", where=f"joint {name}", found=repr(rule.leader)
                 )
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
-            self._places.append(_JointIndices(own, *full, *at[rule.leader], rule.multiplier, rule.offset))
-        self.rate_columns = [place.full_v + c for place in self._places for c in range(place.sizes[1])]
-        self._index, self._factor = self._rates()
+            self._joints.append(_JointIndices(size, *full, *at[rule.leader], rule.multiplier, rule.offset))
+        self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
+        #: Index in v and factor in G of each Pinocchio joint velocity; 0 for the base.
+        self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
+        for joint in self._joints:
+            for c in range(joint.sizes[1]):
+                self._index[joint.full_v + c] = joint.v + c
+                self._factor[joint.full_v + c] = joint.multiplier
         self._columns = np.array(self.rate_columns, dtype=np.int64)
-        self._free = [place for place in self._places if place.sizes in (_PLANAR, _FLOATING)]
+        self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: True if Pinocchio's coordinates (or joint velocities) are the robot's numbers.
-        plain = [(p.q, (1, 1), 1.0, 0.0) == (p.full_q, p.sizes, p.multiplier, p.offset) for p in self._places]
-        self._same_q = all(plain) and model.nq == self.nq
+        #: True if Pinocchio's coordinates, or joint velocities, are the numbers of q, or of v.
+        self._same_q = model.nq == self.nq and all(
+            (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
+            for joint in self._joints
+        )
         self._same_v = model.nv == self.nv and bool((self._factor == 1.0).all())
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
-    def _of_sizes(self, sizes: tuple[int, int]) -> tuple[Places, Places, FloatArray, FloatArray]:
+    def _of_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
         """Return indices in both vectors q, multipliers and offsets of the joints with one pair (nq, nv)."""
-        own = [place for place in self._places if place.sizes == sizes]
+        joints = [joint for joint in self._joints if joint.sizes == sizes]
         return (
-            np.array([place.full_q for place in own], dtype=np.int64),
-            np.array([place.q for place in own], dtype=np.int64),
-            np.array([place.multiplier for place in own]),
-            np.array([place.offset for place in own]),
+            np.array([joint.full_q for joint in joints], dtype=np.int64),
+            np.array([joint.q for joint in joints], dtype=np.int64),
+            np.array([joint.multiplier for joint in joints]),
+            np.array([joint.offset for joint in joints]),
         )
-
-    def _rates(self) -> tuple[Places, FloatArray]:
-        """Return the index in v and the factor in G of each Pinocchio joint velocity; 0 for the base's."""
-        index, factor = np.zeros(self._model.nv, dtype=np.int64), np.zeros(self._model.nv)
-        for place in self._places:
-            for c in range(place.sizes[1]):
-                index[place.full_v + c] = place.v + c
-                factor[place.full_v + c] = place.multiplier
-        return index, factor
 
     def configurations(self, q: FloatArray) -> FloatArray:
         """Return Pinocchio's configurations (n, model.nq) for q (n, nq); quaternions are normalized."""
         if self._same_q:
             return np.ascontiguousarray(q)
         full = np.zeros((len(q), self._model.nq))
-        to, of, multiplier, offset = self._single
-        full[:, to] = multiplier * q[:, of] + offset
-        to, of, multiplier, offset = self._angles
+        to, at, multiplier, offset = self._single
+        full[:, to] = multiplier * q[:, at] + offset
+        to, at, multiplier, offset = self._angles
         if len(to):
-            angles = multiplier * q[:, of] + offset
+            angles = multiplier * q[:, at] + offset
             full[:, to], full[:, to + 1] = np.cos(angles), np.sin(angles)
-        for sizes, at, _, own, *_ in self._free:
-            if sizes == _FLOATING:
-                full[:, at : at + 7] = q[:, own : own + 7]
-                full[:, at + 3 : at + 7] /= np.linalg.norm(full[:, at + 3 : at + 7], axis=1, keepdims=True)
+        for joint in self._free:
+            i, k = joint.full_q, joint.q
+            if joint.sizes == _FLOATING:
+                full[:, i : i + 7] = q[:, k : k + 7]
+                full[:, i + 3 : i + 7] /= np.linalg.norm(full[:, i + 3 : i + 7], axis=1, keepdims=True)
             else:
-                full[:, at : at + 2] = q[:, own : own + 2]
-                full[:, at + 2], full[:, at + 3] = np.cos(q[:, own + 2]), np.sin(q[:, own + 2])
+                full[:, i : i + 2] = q[:, k : k + 2]
+                full[:, i + 2], full[:, i + 3] = np.cos(q[:, k + 2]), np.sin(q[:, k + 2])
         return full
 
     def rates(self, v: FloatArray) -> FloatArray:
@@ -227,10 +221,7 @@ class PinocchioLayout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G without the base's columns.
-
-        G adds the column of a mimic joint to the column of the mimicked joint.
-        """
+        """Return J_full G without the base; G adds mimic joints' columns to those of mimicked joints."""
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)
@@ -249,8 +240,8 @@ class Frames:
         robot: Name of the robot, for errors.
         bodies: Index of the frame of each link.
         joints: Index of the frame of each joint.
-        carriers: Index of the frame of the parent joint, by the index of a link's frame. Links whose frame
-            has the same index as the frame of the parent joint are left out.
+        parents: Index of the frame of a link's parent joint, by the index of the link's frame. A missing
+            entry means that the two frames have the same index.
     """
 
     def __init__(
@@ -259,10 +250,10 @@ class Frames:
         robot: str,
         bodies: Mapping[str, int],
         joints: Mapping[str, int],
-        carriers: Mapping[int, int],
+        parents: Mapping[int, int],
     ) -> None:
         self._oracle, self._robot = oracle, robot
-        self._bodies, self._joints, self._carriers = bodies, joints, carriers
+        self._bodies, self._joints, self._parents = bodies, joints, parents
 
     def index(self, name: str) -> int:
         """Return the index of the frame with a name.
@@ -271,11 +262,11 @@ class Frames:
             OracleError: no frame has this name, or a body and an unrelated joint have this name.
         """
         if isinstance(name, LinkFrame):
-            return self._known(self._bodies, name, str(name)[5:])
+            return self._index_in(self._bodies, name, str(name)[5:])
         if isinstance(name, JointFrame):
-            return self._known(self._joints, name, str(name)[6:])
+            return self._index_in(self._joints, name, str(name)[6:])
         body, joint = self._bodies.get(name), self._joints.get(name)
-        if body is not None and joint is not None and self._carriers.get(body, body) != joint:
+        if body is not None and joint is not None and self._parents.get(body, body) != joint:
             raise self._error(f"two of {self._oracle}'s frames have this name", name)
         if body is not None:
             return body
@@ -283,11 +274,11 @@ class Frames:
             return joint
         if (parts := _PREFIXED.fullmatch(name)) is None:
             raise self._error(f"{self._oracle} has no such frame", name)
-        return self._known(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
+        return self._index_in(self._bodies if parts[1] == "link" else self._joints, name, parts[2])
 
-    def _known(self, names: Mapping[str, int], asked: str, own: str) -> int:
-        if (index := names.get(own)) is None:
-            raise self._error(f"{self._oracle} has no such frame", asked)
+    def _index_in(self, frames: Mapping[str, int], name: str, plain_name: str) -> int:
+        if (index := frames.get(plain_name)) is None:
+            raise self._error(f"{self._oracle} has no such frame", name)
         return index
 
     def _error(self, what: str, name: str) -> OracleError:
@@ -295,7 +286,10 @@ class Frames:
 
 
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
-    """Return the frames of a model from Pinocchio's URDF parser; with a root joint, the world is a link."""
+    """Return the frames of a model from Pinocchio's URDF parser.
+
+    If `stands_on_world` is True, the first frame is that of the link "universe", the parent of a root joint.
+    """
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # the first frame is the world
@@ -307,10 +301,7 @@ def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
 
 
 class BaseNumbers(Protocol):
-    """Placement, velocity and acceleration of the base, as the user gave them.
-
-    An array of several samples has one additional axis at the front.
-    """
+    """Placement, velocity and acceleration of the base, as the user gave them; samples are leading axes."""
 
     @property
     def placement(self) -> FloatArray:
@@ -332,12 +323,12 @@ def free_flyer(base: BaseNumbers) -> FloatArray:
 
 
 def free_flyer_rates(base: BaseNumbers) -> FloatArray:
-    """Return the base's velocity in its own axes, (..., 6)."""
+    """Return the base's velocity in the axes of the base, (..., 6)."""
     return _in_own_axes(free_flyer(base)[..., 3:], np.asarray(base.velocity))
 
 
 def free_flyer_second_rates(base: BaseNumbers) -> FloatArray:
-    """Return the base's spatial acceleration, acc - w x vel, in its own axes, (..., 6)."""
+    """Return the base's spatial acceleration, acc - w x vel, in the axes of the base, (..., 6)."""
     vel, acc = np.broadcast_arrays(base.velocity, base.acceleration)
     linear = acc[..., :3] - np.cross(vel[..., 3:], vel[..., :3])
     return _in_own_axes(free_flyer(base)[..., 3:], np.concatenate((linear, acc[..., 3:]), axis=-1))
@@ -347,15 +338,15 @@ def nearest_quaternion(M: FloatArray) -> FloatArray:
     """Return the unit quaternion (..., 4), scalar last, of the rotation nearest to M (..., 3, 3)."""
     K = davenport(M)
     q = np.linalg.eigh(K).eigenvectors[..., -1:]
-    # The computed q has small components along the other eigenvectors.
-    # The product (K + I) q removes these components, because K + I = 4 q q^T for a rotation.
+    # Rounding gives the computed q small components along the other eigenvectors of K.
+    # For a rotation, K + I = 4 q q^T, so multiplication by K + I removes these components.
     q = (K @ q + q)[..., 0]
     unit: FloatArray = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
 
 
 def davenport(M: NDArray[Any]) -> NDArray[Any]:
-    """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); for a rotation it is 4 q q^T - I."""
+    """Return Davenport's matrix K (..., 4, 4) of M (..., 3, 3); K = 4 q q^T - I for a rotation M."""
     K = np.empty((*M.shape[:-2], 4, 4), dtype=M.dtype)
     K[..., :3, :3] = M + np.swapaxes(M, -1, -2)
     trace = np.trace(M, axis1=-2, axis2=-1)
@@ -367,64 +358,63 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Rotate the linear part and the angular part of a six-vector by R^T.
+    """Rotate both halves y of six-vectors by R^T: R^T y = y + 2 w c + 2 (c x u), with c = y x u.
 
-    The rotation is given by a quaternion with the vector part u and the scalar part w. Let y be the linear or
-    the angular half, and let c be the cross product of y and u. Then R^T y is y + 2 w c + 2 (c x u).
+    The vector part of the quaternion is u, and the scalar part is w.
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
-    x = six.reshape(*six.shape[:-1], 2, 3)
-    aside = 2.0 * np.cross(x, u)
-    turned: FloatArray = x + w * aside + np.cross(aside, u)
-    return turned.reshape(*turned.shape[:-2], 6)
+    y = six.reshape(*six.shape[:-1], 2, 3)
+    twice_c = 2.0 * np.cross(y, u)
+    rotated: FloatArray = y + w * twice_c + np.cross(twice_c, u)
+    return rotated.reshape(*rotated.shape[:-2], 6)
 
 
-#: Largest number of names in an error.
+#: Maximum number of names in an error.
 _NAMED = 5
 
-#: Names of the coordinates and of the joint velocities of a planar (3) and of a floating joint (6).
+#: Names of the coordinates of a joint with 3 joint velocities (planar) or 6 (floating).
 _OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
+#: Names of the joint velocities of a planar joint (3) or a floating joint (6).
 _OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
-class _Names:
+class _CoordinateNames:
     """Lookup from names to indices in q or v.
 
     Args:
-        joints: Pairs of a joint's name and its number of joint velocities, in the order of the joints.
-        of: `_OF_Q` or `_OF_RATES`.
+        joints: Name and number of joint velocities of each joint, in order.
+        suffixes: `_OF_Q` or `_OF_RATES`.
 
-    >>> names = _Names([("base", 3), ("elbow", 1)], _OF_Q)
+    >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _OF_Q)
     >>> names.place("base.y"), names.place("base"), names.place("elbow")
     (1, slice(0, 3, None), 3)
     >>> names.pairs("ready, base.x = 5mm, elbow=pi / 2")
     [('base.x', '5mm'), ('elbow', 'pi / 2')]
     """
 
-    def __init__(self, joints: Sequence[tuple[str, int]], of: Mapping[int, tuple[str, ...]]) -> None:
+    def __init__(self, joints: Sequence[tuple[str, int]], suffixes: Mapping[int, tuple[str, ...]]) -> None:
         self._joints, at = dict[str, tuple[int, tuple[str, ...]]](), 0
         for joint, rates in joints:
-            own = of.get(rates, ())
-            self._joints[joint] = at, own
-            at += len(own) or 1
+            self._joints[joint] = at, suffixes.get(rates, ())
+            at += len(suffixes.get(rates, "1"))
 
     def place(self, name: str) -> int | slice:
         """Return the index of a coordinate or the slice of a joint; raise OracleError for an unknown name."""
         if name in self._joints:
-            at, own = self._joints[name]
-            return slice(at, at + len(own)) if own else at
-        for joint, (at, own) in self._joints.items():
+            at, suffixes = self._joints[name]
+            return slice(at, at + len(suffixes)) if suffixes else at
+        for joint, (at, suffixes) in self._joints.items():
             suffix = name.removeprefix(joint).lstrip(".:")
-            if name.startswith(joint) and suffix in own:
-                return at + own.index(suffix)
+            if name.startswith(joint) and suffix in suffixes:
+                return at + suffixes.index(suffix)
         raise OracleError("the robot has no coordinate with this name", found=repr(name[:60]))
 
     def pairs(self, text: str) -> list[tuple[str, str]]:
         plain = " ".join(text.split())
         plain = plain[1:-1].strip() if plain[:1] + plain[-1:] in ("[]", "()", "{}") else plain
         names = [
-            f"{re.escape(joint)}(?:[.:]+(?:{'|'.join(own)}))?" if own else re.escape(joint)
-            for joint, (_, own) in self._joints.items()
+            f"{re.escape(joint)}(?:[.:]+(?:{'|'.join(suffixes)}))?" if suffixes else re.escape(joint)
+            for joint, (_, suffixes) in self._joints.items()
         ]
         known = "|".join(sorted(names, key=len, reverse=True))
         starts = list(re.finditer(rf"(?:^|(?<=[ ,]))({known}) ?= ?", plain))
@@ -454,13 +444,12 @@ class QueryBatch(NamedTuple):
     Attributes:
         frames: Names of the frames, as the user gave them. If `joints` is True, the frames are `JointFrame`
             objects.
-        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv). A method ignores inputs that it does not
-            need.
-        reference: The reference frame, as the user gave it. Placements ignore it.
+        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv).
+        reference: Reference frame, as the user gave it; without effect on placements.
         base: Motion of the base; None: fixed at the world origin.
-        joints: True: use the library's functions for joints, if it has them.
-        divided: True: `frames` is one part of a longer list. Then the oracle uses its functions for several
-            frames even for one frame, so that the results are the same as for the whole list.
+        joints: True: use the library's functions for joints, if the library has such functions.
+        divided: True: `frames` is a section of a longer list. Then the oracle uses its function for several
+            frames even for one frame, because a function for one frame may round differently.
 
     >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
     >>> x.q.shape, x.v.shape, x.reference.name
@@ -495,7 +484,7 @@ class OracleQuery:
         reference: A `Reference` or its name.
         base: Motion of the base; None: fixed at the world origin.
         inputs: q, or q and v, or q, v and a, as arrays of numbers that can be broadcast.
-        named: Original argument of each input, if this argument contains names; otherwise None.
+        named: The user's argument for each input, if this argument contains names; otherwise None.
         joints: Name and number of joint velocities of each joint with coordinates, in order.
     """
 
@@ -511,25 +500,27 @@ class OracleQuery:
         self._is_one = isinstance(frame, str)
         self.frames = (frame,) if isinstance(frame, str) else tuple(frame)
         self.reference, self.base = reference, base
-        self._given, self._named, self._joints = inputs, named or [None] * len(inputs), joints
+        self._arrays, self._named, self._joints = inputs, named or [None] * len(inputs), joints
 
     def read(self) -> None:
-        """Convert the inputs now; they may be views of `out`, which the computation overwrites."""
+        """Convert the inputs before the computation writes to `out`, which may share memory with an input."""
         _ = self._inputs
 
     @cached_property
     def _inputs(self) -> tuple[FloatArray, ...]:
         return tuple(
-            np.asarray(x, dtype=np.float64) if given is None else self._by_name(np.array(x, float), given, of)
-            for x, given, of in zip(self._given, self._named, (_OF_Q, _OF_RATES, _OF_RATES), strict=False)
+            np.asarray(x, dtype=np.float64)
+            if named is None
+            else self._with_named(np.array(x, float), named, of)
+            for x, named, of in zip(self._arrays, self._named, (_OF_Q, _OF_RATES, _OF_RATES), strict=False)
         )
 
-    def _by_name(
-        self, x: FloatArray, given: str | Mapping[str, ArrayLike], of: Mapping[int, tuple[str, ...]]
+    def _with_named(
+        self, x: FloatArray, named: str | Mapping[str, ArrayLike], suffixes: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
         """Return `x` with the numbers that the user gave by name."""
-        names = _Names(self._joints, of)
-        for name, value in given.items() if isinstance(given, Mapping) else names.pairs(given):
+        names = _CoordinateNames(self._joints, suffixes)
+        for name, value in named.items() if isinstance(named, Mapping) else names.pairs(named):
             x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
         return x
 
@@ -546,7 +537,7 @@ class OracleQuery:
         return math.prod(self.shape)
 
     def rows(self, part: slice | IntArray) -> QueryBatch:
-        """Return the configurations with the given indices in the flat batch (C order)."""
+        """Return the configurations with the indices `part` in the flat batch (C order)."""
 
         def pick(x: FloatArray, own: int = 1) -> FloatArray:
             batch, one = x.shape[: x.ndim - own], x.shape[x.ndim - own :]
@@ -562,7 +553,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """Reshape results to (n, frames, ...); one result has `axes` axes. Other shapes raise OracleError."""
+        """Reshape results to (n, frames, ...), where one result has `axes` axes; check the shape."""
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
             raise OracleError(
@@ -584,23 +575,21 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 class Oracle:
     """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    A subclass builds the library's model in `__init__`. It implements five methods: `placements`,
-    `velocities`, `accelerations`, `jacobians` and `jacobian_rates`. Each method takes a query and returns an
-    array (n, frames, ...).
+    A subclass builds the library's model in `__init__`, and implements the methods `placements`,
+    `velocities`, `accelerations`, `jacobians` and `jacobian_rates`.
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of the same text, only for a comparison of the joints, their order and the mimic
-            joints.
+        tree: urdfkin's tree of the text. An oracle uses only the joints of the tree, for a comparison.
         mimic: True: couple mimic joints. False: every mimic joint moves freely.
         moving_base: Build the model on a free-flyer, which receives the base's motion.
-        root_joint: "floating" or "planar" if urdfkin has added a root joint of this kind to the tree. The
-            URDF text does not contain this joint.
+        root_joint: Kind of the root joint that urdfkin has added to the tree, "floating" or "planar", and
+            that the text does not contain; None: urdfkin has added no joint.
         lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
 
     Attributes:
         title: Name of the library.
-        new_data: Function that returns a new data structure of the library; each thread has its own.
+        new_data: Function that returns a new data structure of the library, for one thread.
 
     Raises:
         OracleError: the library does not accept the text, or reads other joints from it.
@@ -625,11 +614,10 @@ class Oracle:
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
     def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
-        """Return the mimic rules of the library's moving joints, read independently of urdfkin's reader.
+        """Return the mimic rules of `joints`, the library's moving joints.
 
         Raises:
-            OracleError: the rules cannot be read, or the joints or their order differ from the tree's. The
-                numbers of q would then belong to different joints.
+            OracleError: the rules cannot be read, or the joints or their order differ from the tree's.
         """
         tree = self.tree
         rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -647,7 +635,7 @@ class Oracle:
 
     @property
     def data(self) -> Any:
-        """The data structure of the library for this robot; each thread has its own."""
+        """The library's data structure of this robot for the current thread."""
         if not hasattr(self._local, "data"):
             self._local.data = self.new_data()
         return self._local.data
@@ -669,7 +657,7 @@ class Oracle:
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians in blocks that fit into the cache; the next block may overwrite a block."""
+        """Yield the Jacobians in blocks of configurations; each block may overwrite the previous block."""
         yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
@@ -688,15 +676,18 @@ class Oracle:
         return np.where(out[..., 3:] < 0.0, -out, out)
 
 
-def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray, nv: int) -> FloatArray:
+def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
-    For large batches, a compiled kernel reads all Jacobians from memory only once; NumPy would read them once
-    for each column. With NumPy, adding the columns would take longer than Pinocchio's computation of the
-    Jacobians. The kernel and NumPy return equal numbers.
+    A compiled kernel computes large batches, because NumPy would take longer than Pinocchio takes for the
+    Jacobians. The kernel and NumPy return the same bits.
 
-    The columns of J_full are added in the order of `columns`. For each column of J_full, `index` is an index
-    in v, and `factor` is the nonzero element of G.
+    Args:
+        full: J_full (..., columns).
+        columns: Columns of J_full to add, in this order.
+        index: Index in v of each column of J_full.
+        factor: Nonzero element of G for each column of J_full.
+        nv: Length of v.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:
@@ -710,7 +701,7 @@ def coupled(full: FloatArray, columns: Places, index: Places, factor: FloatArray
 
 
 @np.errstate(all="ignore")
-def _coupled(rows: FloatArray, columns: Places, index: Places, factor: FloatArray, nv: int) -> FloatArray:
+def _coupled(rows: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
     sums = np.zeros((len(rows), nv))
     for column in columns:
         sums[:, index[column]] += rows[:, column] * factor[column]

@@ -20,17 +20,17 @@ OracleName = Literal["pinocchio", "mujoco"]
 
 @dataclass(frozen=True, slots=True)
 class OracleLibrary:
-    """An oracle: a library that reads the URDF text itself and computes the same quantities.
+    """An oracle: a library that reads the URDF text and computes the quantities that urdfkin computes.
 
     Attributes:
         name: Name of the oracle in arguments.
         title: Name of the oracle in sentences.
         package: Name of the library's Python package.
         version: Function that returns the installed version without importing the library.
-        oracle: Function that returns the oracle's model of a robot. The arguments are text, tree, mimic=,
-            moving_base=, root_joint= and lock=.
-        size: Function that returns the `Magnitudes` for error bounds of this oracle
-            (`urdfkin.verify.bounds`). Its argument is the `Magnitudes` for Pinocchio.
+        oracle: Function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the oracle's
+            model of a robot.
+        size: Function that converts Pinocchio's `Magnitudes` (`urdfkin.verify.bounds`) to those of this
+            oracle.
     """
 
     name: OracleName
@@ -41,11 +41,11 @@ class OracleLibrary:
     size: Callable[[Any], Any]
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
-        return _known, (self.name,)
+        return _library, (self.name,)
 
     @property
     def words(self) -> str:
-        """Name and version, such as "Pinocchio 4.1.0"."""
+        """Title and version, such as "Pinocchio 4.1.0"."""
         return f"{self.title} {self.version()}"
 
 
@@ -68,22 +68,22 @@ MUJOCO = OracleLibrary(
 ORACLES: dict[str, OracleLibrary] = {oracle.name: oracle for oracle in (PINOCCHIO, MUJOCO)}
 
 
-def _known(name: str) -> OracleLibrary:
+def _library(name: str) -> OracleLibrary:
     return ORACLES[name]
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle with a name; raise UnknownNameError, or InputError if it is not installed."""
+    """Return the oracle with a name; raise UnknownNameError, or InputError for a missing library."""
     wanted = as_str(name, "oracle")
     if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)
     if oracle is not PINOCCHIO:
-        oracle.version()  # an error is raised now, not at the first check
+        oracle.version()  # raises an error if the library is missing
     return oracle
 
 
 def version(package: str) -> str:
-    """Return the version of an installed package, or a text which states that the version is unknown."""
+    """Return the version of a package, or "not installed"; for urdfkin, "a checkout"."""
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 

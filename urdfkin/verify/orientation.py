@@ -1,8 +1,7 @@
 """Check roll-pitch-yaw angles and quaternions by converting them back to rotation matrices with Pinocchio.
 
-The comparison uses the matrices and not the angles or quaternions. Two correct programs may return different
-angles for the same rotation at gimbal lock. Two correct programs may also return quaternions of opposite
-signs.
+Only the matrices can be compared: at gimbal lock, two correct programs may return different angles for a
+rotation, and two correct quaternions may have opposite signs.
 """
 
 from __future__ import annotations
@@ -16,24 +15,21 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio import pinocchio
 
-#: Upper bound on the sum of the rounding errors of urdfkin and of Pinocchio, in eps.
-#: Each of the two errors is less than 8 eps, counted as in `urdfkin.kinematics.roundings`.
-#: For angles, the operations are arctan2, sines, cosines and products of three numbers.
-#: For quaternions, the operations are a square root, a quotient and products of two numbers.
+#: Upper bound on the sum of the rounding errors of urdfkin and of Pinocchio, in eps: less than 8 eps each.
+#: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
+#: Quaternions need a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0
 
 
 def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
     """Compare rotations that Pinocchio computes from angles or quaternions with the original rotations.
 
-    Rounding makes `R` differ from an exact rotation matrix. Angles and quaternions can represent only exact
-    rotations, so Pinocchio's rotation must differ from `R` as well. Therefore, the bound includes the
-    distance between `R` and the nearest rotation matrix.
+    Angles and quaternions represent exact rotations, but `R` has rounding errors. The bound therefore
+    includes the distance between `R` and the nearest rotation matrix.
 
     Args:
         numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.
-        R: (n, 3, 3) rotations from which the angles or quaternions were computed. The caller has already
-            checked these rotations.
+        R: (n, 3, 3) verified rotations from which the angles or quaternions were computed.
         frame: Name of the frame, for the message.
         again: Function that returns a shell command, or lines of Python, to compute a sample again.
 

@@ -1,17 +1,16 @@
 """The oracle Pinocchio.
 
-No other module but `urdfkin.verify.adapters` imports Pinocchio. On PyPI, Pinocchio has the name `pin`. The
-PyPI project `pinocchio` is a different one: plugins for the test runner nose, in a module that is also called
-`pinocchio`. If both projects are installed, Python finds the module of the plugins first.
+Only this module and `urdfkin.verify.adapters` import Pinocchio. On PyPI, Pinocchio has the name `pin`. The
+PyPI project `pinocchio` contains plugins for the test runner nose, in a module that is also called
+`pinocchio`. If both projects are installed, Python imports the plugins.
 
-The oracle shares no code with urdfkin's computation. The oracle reads the URDF text with Pinocchio's own
-parser. `urdfkin.verify.oracle` converts the user's original arguments a second time. That module finds frames
-and joints by their names in Pinocchio's model, and it converts the base's motion.
+The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF text with its own parser.
+`urdfkin.verify.oracle` converts the user's arguments for Pinocchio and finds frames and joints by name.
 
 Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
-robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text a second time. The
-rules define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The name
-"full" marks Pinocchio's vectors, which contain numbers for the mimic joints too.
+robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text. The rules define a
+matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The suffix "full" marks
+Pinocchio's vectors, which contain numbers for the mimic joints too.
 """
 
 from __future__ import annotations
@@ -41,9 +40,9 @@ from urdfkin.verify.oracle import (
     mimic_rules,
 )
 
-#: The definitions of accelerations and J-dot were tested with these versions.
+#: Tests compare the definitions of accelerations and J-dot with these versions of Pinocchio.
 _MAJOR = "4"
-_WANTED = "'pin>=4,<5'"
+_REQUIREMENT = "'pin>=4,<5'"
 
 
 def pinocchio() -> Any:
@@ -54,25 +53,27 @@ def pinocchio() -> Any:
             of the same name.
     """
     try:
-        import pinocchio as found
+        import pinocchio as module
     except ImportError as error:
         if error.name == "pinocchio":
-            raise InstallationError("Pinocchio is not installed", remedy=f"pip install {_WANTED}") from None
+            raise InstallationError(
+                "Pinocchio is not installed", remedy=f"pip install {_REQUIREMENT}"
+            ) from None
         raise InstallationError(
             "Pinocchio cannot be imported",
             found=str(error),
-            remedy=f"pip install --force-reinstall {_WANTED}",
+            remedy=f"pip install --force-reinstall {_REQUIREMENT}",
         ) from error
-    if not hasattr(found, "buildModelFromXML"):
-        raise _impostor(found)
-    if not str(found.__version__).startswith(f"{_MAJOR}."):
+    if not hasattr(module, "buildModelFromXML"):
+        raise _wrong_module(module)
+    if not str(module.__version__).startswith(f"{_MAJOR}."):
         raise InstallationError(
             f"urdfkin needs Pinocchio {_MAJOR} for its checks",
-            where=str(found.__file__),
-            found=str(found.__version__),
-            remedy=f"pip install {_WANTED}",
+            where=str(module.__file__),
+            found=str(module.__version__),
+            remedy=f"pip install {_REQUIREMENT}",
         )
-    return found
+    return module
 
 
 def version() -> str:
@@ -83,49 +84,46 @@ def version() -> str:
         return "not installed"
 
 
-def _impostor(found: Any) -> InstallationError:
-    file = found.__file__ or next(iter(found.__path__), "a folder without modules")
-    owner = _owner(Path(file))
-    cure = f"pip uninstall {owner[0]}" if owner else f"rename or remove {file}"
-    what = f"{owner[0]} {owner[1]}, another project" if owner else "a file of no installed package"
+def _wrong_module(module: Any) -> InstallationError:
+    file = module.__file__ or next(iter(module.__path__), "a folder without modules")
+    project = _project_of(Path(file))
+    cure = f"pip uninstall {project[0]}" if project else f"rename or remove {file}"
+    found = f"{project[0]} {project[1]}, another project" if project else "a file of no installed package"
     return InstallationError(
         "the module `pinocchio` is not Pinocchio, the library that checks results",
         where=str(file),
-        found=what,
-        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_WANTED}",
+        found=found,
+        remedy=f"Pinocchio's package is called pin: {cure}; pip install {_REQUIREMENT}",
         question=QuestionsSection.WRONG_PINOCCHIO,
     )
 
 
-def _owner(file: Path) -> tuple[str, str] | None:
+def _project_of(file: Path) -> tuple[str, str] | None:
     """Return the name and the version of the installed project that contains a file."""
     from importlib import metadata
 
     for project in metadata.distributions():
-        for one in project.files or ():
-            if one.name == file.name and Path(str(project.locate_file(one))) == file:
+        for member in project.files or ():
+            if member.name == file.name and Path(str(project.locate_file(member))) == file:
                 return project.metadata["Name"], project.version
     return None
 
 
-#: Bytes of stack for each link.
-#: Pinocchio processes links recursively; version 4.1.0 needs less than 4 kB for each link.
+#: Bytes of stack for each link; Pinocchio 4.1.0, which is recursive, needs less than 4 kB for each link.
 _STACK_FOR_A_LINK = 16_384
-#: A chain of fewer links fits into any stack.
+#: Chains with fewer links than this number fit into any stack.
 _SHALLOW = 100
-#: Largest nv that is accepted.
-#: Pinocchio 4.1.0 needs about 64 bytes * nv^3 (measured), so the memory stays below 2 GB.
+#: Maximum nv of a robot; Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), at most 2 GB.
 MOST_RATES = 315
 
-#: Number of floating-point values that are collected and then copied to one array.
-#: This number of values fits into the processor's cache.
-_AT_A_TIME = 16384
-#: Function that returns the results for the given number of next configurations.
+#: Number of floating-point values of a block of results, which fits into the processor's cache.
+_BLOCK_SIZE = 16384
+#: Function (n) that returns the results for the next n configurations.
 _Next = Callable[[int], list[FloatArray]]
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
-#: Prefix of link names while Pinocchio reduces a model.
+#: Prefix of link names while Pinocchio reduces a model; no XML text can contain this character.
 _LINK_MARK = "\x01"
 
 
@@ -138,18 +136,18 @@ def build_model(
     lock: Mapping[str, float] = MappingProxyType({}),
     coupled: bool = True,
 ) -> Any:
-    """Return Pinocchio's model of a URDF text, whose size urdfkin's tree gives.
+    """Return Pinocchio's model of a URDF text.
 
-    A robot that needs too much memory is rejected. A robot with a long chain of links is parsed with a larger
-    stack. Otherwise such robots would crash the process.
+    Pinocchio would crash the process for a robot that needs too much memory, or for a long chain of links.
+    The robot is rejected; the chain is parsed with a larger stack.
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of the text.
-        root_joint: "floating" or "planar" to connect the root to the world by such a joint.
-        mimic: True: the mimic joints move by their mimic rules. False: they are independent joints.
+        tree: urdfkin's tree of the text, for the size of the model.
+        root_joint: Kind of the joint between the world and the root: "floating" or "planar"; None: fixed.
+        mimic: True: the mimic joints follow their mimic rules. False: each mimic joint is independent.
         lock: Value (rad or m) of each locked joint, which `buildReducedModel` removes from the model.
-        coupled: Whether a locked joint locks its mimic joints too.
+        coupled: Whether a locked joint also locks the joints that mimic the locked joint.
 
     Raises:
         OracleError: Pinocchio does not accept the text, or the robot is too large.
@@ -174,16 +172,15 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
     """Return a model without the locked joints, by `buildReducedModel`."""
     pin, q = pinocchio(), pinocchio().neutral(model)
     rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if coupled else {}
-    held = locked_by_rules(lock, rules)
-    ids = [int(model.getJointId(name)) for name in held]
-    for i, (name, value) in zip(ids, held.items(), strict=True):
+    locked = locked_by_rules(lock, rules)
+    ids = [int(model.getJointId(name)) for name in locked]
+    for i, (name, value) in zip(ids, locked.items(), strict=True):
         if i >= model.njoints:
             raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` finds frames by their names only, but a link may have the same name as a joint.
-    # The prefix of the link names, which no XML text can contain, avoids this error.
+    # `buildReducedModel` confuses a link with a joint of the same name; a prefix of link names avoids this.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_MARK + frame.name
@@ -201,7 +198,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # The reason is unknown: `check` raises an error for each known one.
+        # `check` reports every known reason, so the reason of this error is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -231,23 +228,22 @@ class PinocchioOracle(Oracle):
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames.
 
-        An existing root joint is kept. The frame of the world becomes the frame of the base.
+        The frame of the world becomes the frame of the base.
         """
-        pin, model, nowhere = self._pin, self._model, self._pin.SE3.Identity()
-        # appendModel rejects a link with the name of a joint or of the free-flyer.
-        # Numbers as names avoid this error.
+        pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
+        # `appendModel` rejects equal names of a link and a joint; numbers as names avoid this error.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
             model.frames[i].name = str(i)
-        carrier = pin.Model()
-        joint = carrier.addJoint(0, pin.JointModelFreeFlyer(), nowhere, _BASE)
-        base = carrier.addFrame(pin.Frame(_BASE, joint, 0, nowhere, pin.FrameType.BODY))
-        self._model = pin.appendModel(carrier, model, base, nowhere)
-        to = {frame.name: i for i, frame in enumerate(self._model.frames)}
+        free_flyer_model = pin.Model()
+        joint = free_flyer_model.addJoint(0, pin.JointModelFreeFlyer(), identity, _BASE)
+        base = free_flyer_model.addFrame(pin.Frame(_BASE, joint, 0, identity, pin.FrameType.BODY))
+        self._model = pin.appendModel(free_flyer_model, model, base, identity)
+        frames = {frame.name: i for i, frame in enumerate(self._model.frames)}
         return (
             [int(self._model.getJointId(f"joint {j}")) for j in joints],
-            [base, *(to[str(i)] for i in range(1, model.nframes))],
+            [base, *(frames[str(i)] for i in range(1, model.nframes))],
         )
 
     def _ids(self, x: QueryBatch) -> list[int]:
@@ -262,15 +258,15 @@ class PinocchioOracle(Oracle):
     def _inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
         """Convert the first `count` of urdfkin's inputs q, v and a to Pinocchio's vectors.
 
-        Velocities and spatial accelerations of the free-flyer of a moving base are in the base's own axes.
+        The free-flyer of a moving base has its velocity and spatial acceleration in the base's axes.
         """
-        q, *rates = x.inputs[:count]
-        full = [self._layout.configurations(q), *map(self._layout.rates, rates)]
+        q, *v_and_a = x.inputs[:count]
+        full = [self._layout.configurations(q), *map(self._layout.rates, v_and_a)]
         if self.moving_base:
             full[0][:, :7] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0) if x.base is None else free_flyer(x.base)
         if self.moving_base and x.base is not None:
-            for own, of in zip(full[1:], (free_flyer_rates, free_flyer_second_rates), strict=False):
-                own[:, :6] = of(x.base)
+            for rates, of_base in zip(full[1:], (free_flyer_rates, free_flyer_second_rates), strict=False):
+                rates[:, :6] = of_base(x.base)
         return tuple(full)
 
     # -- quantities ----------------------------------------------------------------------------------
@@ -295,19 +291,20 @@ class PinocchioOracle(Oracle):
         return self._six(x, 3, self._pin.getFrameClassicalAcceleration)
 
     def _six(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
-        model, data, ids, wanted = self._model, self.data, self._ids(x), self._reference(x.reference)
-        steps = self._each(self._pin.forwardKinematics, self._inputs(x, count))
-        return _stacked(
-            lambda n: [get(model, data, one, wanted).vector for _ in islice(steps, n) for one in ids],
-            *(len(x.q), len(ids), 6),
+        return self._collected(
+            (6,),
+            self._inputs(x, count),
+            self._pin.forwardKinematics,
+            lambda *arguments: get(*arguments).vector,
+            self._ids(x),
+            self._reference(x.reference),
         )
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
         """Return Jacobians (n, frames, 6, nv).
 
-        `computeFrameJacobian` computes the Jacobian of a single frame, from the joints on its path only.
-        `getFrameJacobian` computes the Jacobians of several frames. `getJointJacobian` computes the Jacobians
-        of joints.
+        `computeFrameJacobian` computes the Jacobian of a single frame, `getFrameJacobian` the Jacobians of
+        several frames, and `getJointJacobian` the Jacobians of joints.
         """
         pin = self._pin
         if len(x.frames) == 1 and not (x.joints or x.divided):
@@ -317,7 +314,7 @@ class PinocchioOracle(Oracle):
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians; for one frame, in blocks of configurations that fit into the cache."""
+        """Yield the Jacobians; those of one frame are in blocks of configurations that fit into the cache."""
         if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return
@@ -347,31 +344,30 @@ class PinocchioOracle(Oracle):
 
         Two errors of Pinocchio 4.1 are corrected:
 
-        - Pinocchio returns the numbers in Eigen's order (the first index varies fastest), but in a NumPy
-          array with C order (the last index varies fastest).
-        - In LOCAL, entries [i, j] with i and j of the same joint are not 0 if another joint precedes this
-          joint. The true value of these entries is 0, because the joint does not move its own axes relative
-          to the frame.
+        - The returned NumPy array has C order, but the numbers are in Eigen's order: the first index varies
+          fastest.
+        - In LOCAL, entries [i, j] of two velocities i and j of the same joint may differ from 0. The true
+          value is 0, because a joint does not move its own axes relative to the frame.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._ids(x), self._reference(x.reference), model.nv
         out = np.zeros((len(x.q), len(ids), 6, nv, nv))
-        carried = [(f, i) for f, i in enumerate(ids) if nv and model.frames[i].parentJoint]
+        moving = [(f, i) for f, i in enumerate(ids) if nv and model.frames[i].parentJoint]
         for to, q_k in zip(out, *self._inputs(x, 1), strict=True):
             pin.computeJointJacobians(model, data, q_k)
             pin.computeJointKinematicHessians(model, data)
-            for f, frame in carried:
+            for f, frame in moving:
                 numbers = pin.getFrameKinematicHessian(model, data, frame, wanted).ravel("K")
                 to[f] = numbers.reshape(nv, nv, 6).T
         if wanted == pin.LOCAL:
             for joint in model.joints[1:]:
-                own = slice(joint.idx_v, joint.idx_v + joint.nv)
-                out[..., own, own] = 0.0
-        by_leaders = self._layout.couple(out)
-        return self._layout.couple(by_leaders.swapaxes(-1, -2)).swapaxes(-1, -2)
+                columns = slice(joint.idx_v, joint.idx_v + joint.nv)
+                out[..., columns, columns] = 0.0
+        coupled_j = self._layout.couple(out)
+        return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return `data.J` of `computeJointJacobians` (n, 6, columns), mimic joints included."""
+        """Return the columns (n, 6, columns) of `data.J` after `computeJointJacobians`, mimic joints too."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
         # Pinocchio 4.1 crashes the process if nv is 0, and returns a vector if nv is 1.
@@ -387,18 +383,18 @@ class PinocchioOracle(Oracle):
 
     def _collected(
         self,
-        own: tuple[int, ...],
+        shape: tuple[int, ...],
         inputs: tuple[FloatArray, ...],
         compute: Callable[..., object],
         get: Callable[..., FloatArray],
         ids: Sequence[int],
         *reference: Any,
     ) -> FloatArray:
-        """Return results (n, ids, *own): call `compute` for each configuration, then `get` for each id."""
+        """Return results (n, ids, *shape): call `compute` for each configuration, then `get` for each id."""
         model, data, steps = self._model, self.data, self._each(compute, inputs)
         return _stacked(
             lambda n: [get(model, data, one, *reference) for _ in islice(steps, n) for one in ids],
-            *(len(inputs[0]), len(ids), *own),
+            *(len(inputs[0]), len(ids), *shape),
         )
 
 
@@ -411,28 +407,27 @@ def _stacked(compute: _Next, *shape: int) -> FloatArray:
 
 
 def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
-    """Write the results of n configurations to `memory` in blocks. Yield the array of each block.
+    """Write the results of n configurations to `memory` (rows, frames, ...) in blocks, and yield each block.
 
-    If the results contain no numbers, nothing is computed. Pinocchio 4.1 crashes the process for a Jacobian
-    without columns, and returns a vector for one column. The array `memory` has the shape (rows, frames,
-    ...). An array of n rows finally contains all results. In a smaller array, each block overwrites the block
-    before it.
+    If `memory` has fewer than n rows, each block overwrites the previous block. Results without numbers are
+    not computed: for a Jacobian without columns, Pinocchio 4.1 crashes the process.
     """
     if 0 in memory.shape:
         yield memory
         return
-    step, of_one = _block(*memory.shape[1:]), memory.shape[1] * memory.shape[2]
+    step, rows_of_one = _block(*memory.shape[1:]), memory.shape[1] * memory.shape[2]
+    # For a Jacobian with one column, Pinocchio 4.1 returns a vector.
     rows = memory.reshape(-1, *(size for size in memory.shape[3:] if size > 1))
     for first in range(0, n, step):
-        at = first % memory.shape[0]
-        end = at + (step if first + step < n else n - first)
-        np.concatenate(compute(end - at), out=rows[at * of_one : end * of_one])
-        yield memory[at:end]
+        start = first % memory.shape[0]
+        end = start + min(step, n - first)
+        np.concatenate(compute(end - start), out=rows[start * rows_of_one : end * rows_of_one])
+        yield memory[start:end]
 
 
 def _block(*shape: int) -> int:
-    """Return the number of configurations whose results are collected and then copied together."""
-    return _AT_A_TIME // (math.prod(shape) or 1) or 1
+    """Return the number of configurations in a block, for one result of the given shape."""
+    return _BLOCK_SIZE // (math.prod(shape) or 1) or 1
 
 
 def depth_of(tree: KinematicTree) -> int:

@@ -1,7 +1,7 @@
 """The table of quantities: names, shapes, functions for computation and checks, bounds and help texts.
 
-The methods of `Robot`, the checks, reports and the command line use this table. Functions are given by name
-and imported at first use, so that `--help` does not import NumPy.
+The methods of `Robot`, the checks, reports and the command line use this table. The table names functions by
+text and imports them at their first use, so that `--help` does not import NumPy.
 
 >>> for quantity in recursive_quantities():
 ...     print(quantity.name, quantity.inputs, quantity.shape)
@@ -15,6 +15,7 @@ acceleration qva (6,)
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -29,20 +30,17 @@ if TYPE_CHECKING:
     from urdfkin.compiled.plan import CompiledTree
     from urdfkin.model.reference import Reference
     from urdfkin.model.tree import FloatArray
+    from urdfkin.urdf.sources import Origin
     from urdfkin.verify.bounds import Bound, Magnitudes
     from urdfkin.verify.oracle import Oracle, QueryBatch
 
 #: Rows of a velocity, an acceleration or a Jacobian.
 SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
-#: Function (oracle, part, ours, by) that returns the oracle's results and the bound.
-Against = Callable[..., "tuple[FloatArray, Bound]"]
 
 
 def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], Any]:
-    def ask(oracle: Any, x: QueryBatch) -> Any:
-        return getattr(oracle, name)(x)
-
-    return ask
+    """Return a function (oracle, query) that calls the oracle's method `name`."""
+    return lambda oracle, query: getattr(oracle, name)(query)
 
 
 _bound = lazy_import("urdfkin.verify.bounds:bound_of")
@@ -50,39 +48,37 @@ _bound = lazy_import("urdfkin.verify.bounds:bound_of")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Quantity:
-    """A row of the table.
+    """A quantity, such as the velocity of a frame: a row of the table.
 
     Attributes:
         name: Name in certificates, errors and reports.
         title: Name in sentences.
         inputs: The inputs of the quantity: "q", "qv" or "qva".
-        shape: Shape of one result. The string "nv" is replaced by the robot's number of joint velocities.
+        shape: Shape of one result; "nv" stands for the robot's number of joint velocities.
         equations: Equations of the textbook.
-        compute: Function that returns urdfkin's results (n, frames, ...). Its arguments are (plan, *inputs,
-            reference, base=, out=, threads=). If `recursive` is False, the arguments are different.
-        ask: Function with the arguments (oracle, query), which returns the oracle's results (n, frames, ...).
-        blocks: Generator with the arguments (oracle, query), which yields the oracle's results for one block
-            of configurations at a time. It is used for large results.
-        scale: Function with the arguments (plan, magnitudes, reference), which returns the scale of the bound
+        compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
+            frames, ...). If `recursive` is False, the function has other arguments.
+        ask: Function (oracle, query) that returns the oracle's results (n, frames, ...).
+        blocks: Generator (oracle, query) that yields the oracle's results in blocks of configurations, for
+            large results.
+        scale: Function (plan, magnitudes, reference) that returns the scale of the bound
             (`urdfkin.verify.bounds`).
-        factors: Number of factors in the bound of the quantity (`urdfkin.verify.bounds`), for the reference
-            frame LOCAL_WORLD_ALIGNED.
-        against: Function with the arguments (oracle, part, ours, by). It returns the oracle's results and the
-            bound. If a quantity has this function, its check does not call `ask` and `scale`.
-        exact: Function with the arguments (motion, link, reference), which returns intervals that contain the
-            true values. The accuracy study and `Robot.enclose` call this function.
+        factors: Number of factors in the bound (`urdfkin.verify.bounds`) for LOCAL_WORLD_ALIGNED.
+        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound; used
+            instead of `ask` and `scale`.
+        exact: Function (motion, link, reference) that returns intervals around the true values, for the
+            accuracy study and `Robot.enclose`.
         recursive: True if the forward recursion computes the quantity for any frames.
-        validated: True if `validate`, the accuracy study and plots include the quantity. The Hessian is not
-            included, because it has nv times as many numbers as a Jacobian and consists of products of the
-            Jacobian's columns.
-        referred: True if the quantity depends on a reference frame. If False, for example for the placement,
-            `compute` has no argument `reference`.
+        validated: True if `validate`, the accuracy study and plots include the quantity. False for the
+            Hessian, which has nv times as many numbers as a Jacobian.
+        referred: True if the quantity depends on a reference frame. If False, as for the placement, `compute`
+            has no argument `reference`.
         of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
-        head: Heading of the column in reports. Quantities with the same heading share a column.
-        labels: Names of a result's rows, if any.
-        units: Mapping from the name of a group of three numbers to the unit of the group.
-        command: Name of the urdfkin command that computes the quantity, if there is one.
-        summary: Line in the list of commands, if the quantity has a command of its own.
+        head: Heading of the column in reports; several quantities may share a column.
+        labels: Names of the rows of a result.
+        units: Unit of each group of three numbers, by the name of the group.
+        command: Name of the urdfkin command that computes the quantity; empty without a command.
+        summary: Line in the list of commands.
         page: Help text of the command, without the summary.
         example: Example command line.
     """
@@ -97,7 +93,7 @@ class Quantity:
     scale: Callable[..., Any]
     factors: int
     blocks: Callable[[Oracle, QueryBatch], Iterator[FloatArray]] | None = None
-    against: Against | None = None
+    against: Callable[..., tuple[FloatArray, Bound]] | None = None
     exact: Callable[..., Any] | None = None
     recursive: bool = True
     validated: bool = True
@@ -118,7 +114,7 @@ class Quantity:
 
     @property
     def axes(self) -> int:
-        """Number of axes of one result: one for [linear; angular], two for a matrix, three for a Hessian."""
+        """Number of axes of one result: 1 for a six-vector, 2 for a matrix, 3 for a Hessian."""
         return len(self.shape)
 
     @property
@@ -139,9 +135,9 @@ class Quantity:
     def ours(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        """Return urdfkin's results (n, frames, ...); inputs that the quantity does not need are ignored."""
-        found: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
-        return found
+        """Return urdfkin's results (n, frames, ...) for the first of `inputs` (q, v, a)."""
+        results: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
+        return results
 
     def bound(self, plan: CompiledTree, size: Magnitudes, reference: Reference | None) -> Bound:
         scale = self.scale(plan, size, *self._in(reference))
@@ -359,15 +355,12 @@ def validated(of: str = "frames") -> list[Quantity]:
 
 
 def compared() -> str:
-    """Return words that list the quantities that a validation compares."""
+    """Return the titles of the quantities that a validation compares, such as "placement and velocity"."""
     return _listed([row.title for row in validated()])
 
 
 def not_compared() -> str:
-    """Return words that list the quantities that a validation does not compare.
-
-    A method of `Robot` that computes such a quantity checks each result.
-    """
+    """Return the titles of the quantities of frames that a validation does not compare."""
     return _listed(
         [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
     )
@@ -378,7 +371,7 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Return the quantity that each urdfkin command computes, by the name of the command."""
+    """Return the quantities that have a command, by the name of the command."""
     return {row.command: row for row in recursive_quantities() if row.command}
 
 
@@ -387,3 +380,20 @@ def quantity(name: str) -> Quantity:
     if (found := QUANTITIES.get(name)) is None:
         raise UnknownNameError("quantity", name, QUANTITIES)
     return found
+
+
+def replay_line(
+    origin: Origin, command: str, frame: str, reference: str | None, values: Mapping[str, Sequence[float]]
+) -> str:
+    """Return the shell command that computes one sample again, with all digits of the numbers.
+
+    >>> from urdfkin.urdf.sources import Origin
+    >>> replay_line(Origin("ur5"), "velocity", "tool 0", "local", {"q": [0.5, 0.1], "v": []})
+    "urdfkin velocity ur5 --frame 'tool 0' --reference local --q 0.5,0.1 --v neutral"
+    """
+    words = ["urdfkin", command, origin.words, "--frame", shlex.quote(frame)]
+    if reference:
+        words += ["--reference", reference]
+    for letter, numbers in values.items():
+        words += [f"--{letter}", ",".join(repr(float(x)) for x in numbers) or "neutral"]
+    return " ".join(words)

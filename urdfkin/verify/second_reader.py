@@ -1,11 +1,11 @@
 """Read a robot's URDF a second time with yourdfpy, and compare yourdfpy's tree with urdfkin's tree.
 
-Pinocchio checks the computed results. This module checks the data of the robot itself: links, joint kinds,
-origins, axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
+Pinocchio checks the computed results. This module checks the data of the robot: links, joint kinds, origins,
+axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-Two faults of yourdfpy (0.0.60) with respect to the URDF specification are named and do not count as
-differences: yourdfpy ignores the attribute `quat_xyzw` of an origin, and does not normalise axes. yourdfpy
-returns None for a missing number, which then counts as the default value of the specification.
+yourdfpy (0.0.60) has two known faults, which the report separates from other differences: yourdfpy ignores
+the attribute `quat_xyzw` of an origin, and does not normalise axes. For a missing number, yourdfpy returns
+None, which counts as the default value of the URDF specification.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from urdfkin.verify.oracle import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Largest difference between the entries of two rotation matrices from the same angles.
-#: In each computation, a sine and a cosine have an error of one eps each.
-#: Two products and a sum have an error of half an eps each.
-#: The sum of the terms is at most 1.
+#: Bound on the difference between entries of rotation matrices that two programs compute from the same
+#: angles.
+#: Errors: one eps each for a sine and a cosine; half an eps each for two products and a sum, which is at most
+#: 1.
 _ROTATION = 9.0 * EPS
-#: Largest difference between the components of two normalised axes.
-#: In each computation, the length has an error of 2 eps, and the quotient is rounded once.
+#: Bound on the difference between components of an axis that two programs normalise.
+#: The length has an error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
-#: An axis counts as not normalised if its length differs from 1 by more than this number.
+#: Largest difference from 1 of the length of a normalised axis.
 _UNIT = 1e-6
-#: Largest number of differences, or of joints with a known fault, in a report.
+#: Maximum number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
-#: Largest number of quoted characters of an error of yourdfpy.
+#: Maximum number of quoted characters of an error of yourdfpy.
 _QUOTED = 200
-#: The specification ignores position limits of other kinds of joints.
+#: Kinds of joints with position limits in the specification.
 _BOUNDED = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -56,10 +56,11 @@ class SecondReading:
     """Result of the comparison with yourdfpy's tree.
 
     Attributes:
+        by: Name and version of yourdfpy.
         joints: Number of compared joints, fixed joints included.
-        differences: Differences between the trees, caused by an error of urdfkin or of yourdfpy.
-        known: Differences that are known faults of yourdfpy.
-        unread: Reason why yourdfpy cannot read the text; None if it can.
+        differences: Differences between the trees, due to an unknown error of urdfkin or of yourdfpy.
+        known: Differences due to known faults of yourdfpy.
+        unread: Reason why yourdfpy cannot read the text; None if yourdfpy can.
     """
 
     by: str
@@ -74,8 +75,12 @@ def second_reading(
 ) -> SecondReading:
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
 
-    If `mimic` is False, urdfkin's tree does not couple the mimic joints, and the rules are not compared. If
-    `root_joint` is True, `load` has added the first joint and link, which the text does not contain.
+    Args:
+        text: The URDF text.
+        tree: urdfkin's tree of the text.
+        mimic: Whether the tree couples mimic joints; if not, the mimic rules are not compared.
+        root_joint: Whether `load` has added the first joint and link of the tree, which the text does not
+            contain.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     if "<!DOCTYPE" in text:  # yourdfpy would read the files and entities that a document type names
@@ -113,7 +118,7 @@ def read(text: str) -> yourdf.Robot:
     """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow
 
-    # The text is now UTF-8, even if the file declares another encoding.
+    # The encoded text is UTF-8, even if the removed declaration names another encoding.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
     logger = logging.getLogger("yourdfpy.urdf")
     before, logger.disabled = logger.disabled, True
@@ -127,7 +132,7 @@ def read(text: str) -> yourdf.Robot:
 def _differences(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield each difference of a joint, and the known fault that explains it, if any."""
+    """Yield each difference of a joint, with the known fault of yourdfpy that explains it, or ""."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""
@@ -191,7 +196,7 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield a line of text for each name that the two readers do not find equally often."""
+    """Yield a line for each name that the two readers find a different number of times."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:

@@ -1,18 +1,18 @@
 """Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
-Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <= |E|. The norm |E| can be
-any norm that is not smaller than the spectral norm. This module uses the Frobenius norm. The matrix E is the
-sum of two errors. The first error is the error of J, for which `urdfkin.verify.bounds` computes a bound. The
-second error is the residual of the decomposition, J - U S V^T.
+*Error of J and residual.* Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <=
+|E| in the spectral norm, and also in the larger Frobenius norm, which this module uses. The matrix E is the
+sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
 
-The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b. By Ostrowski's
-theorem, each singular value of U S V^T is a singular value of S times a factor. This factor lies between (1 -
+*Orthogonality.* The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b.
+By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor between (1 -
 a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
 
-The computed residuals have rounding errors too. The error of a sum of m products is at most m eps times the
-sum of the absolute values of the products. No intermediate value leaves the range of doubles. To compute a
-norm, the module first divides all numbers by the largest number. To compute a product, the module handles
-mantissas and exponents separately.
+*Rounding.* The computed residuals have rounding errors too. The error of a sum of m products is at most m eps
+times the sum of the absolute values of the products.
+
+*Range.* No intermediate value leaves the range of doubles: the numbers of a norm are divided by the largest
+number, and products are computed from mantissas and exponents.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from urdfkin.verify.singularity import FrameColumns, Singularity, explain
 
 #: Bound on the relative rounding error of a few dozen sums and products of positive numbers.
 _OUTWARD = 256.0 * EPS
-#: Number of samples of a batch that `print` displays.
+#: Maximum number of samples of a batch in the printed table.
 _SHOWN = 10
 
 
@@ -52,13 +52,11 @@ class SingularValues(Displayable):
 
     Attributes:
         rows: The rows of the Jacobian that are used, as a slice.
-        values: (..., k) the singular values, largest first; k is the number of rows or of columns, whichever
-            is smaller.
-        U: (..., rows, k) left singular vectors, which are directions of the frame's velocity.
-        V: (..., nv, k) right singular vectors, which are directions of v; a component of V is 0 for a joint
-            that does not move the frame.
-        columns: The Jacobian with the names of its frame and joints; None if the matrix is not a robot's
-            Jacobian.
+        values: (..., k) the singular values, largest first; k is the smaller of the numbers of rows and
+            columns.
+        U: (..., rows, k) left singular vectors, directions of the frame's velocity.
+        V: (..., nv, k) right singular vectors, directions of v; 0 for a joint that does not move the frame.
+        columns: The Jacobian with the names of the frame and of the joints; None for another matrix.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -106,9 +104,7 @@ class SingularValues(Displayable):
         return TextDocument(title, [table, *(str(found).splitlines() if found else [])])
 
     def singularity(self, *sample: int) -> Singularity:
-        """Return the rank in one configuration, and explain a loss of rank.
-
-        The explanation consists of the lost directions and the joints that cause the loss.
+        """Return the rank in one configuration, with the lost directions and the joints that cause the loss.
 
         Args:
             sample: Indices of the configuration in the batch. For a single configuration, give no indices.
@@ -132,10 +128,9 @@ class SingularValues(Displayable):
 
     @cached_property
     def manipulability(self) -> Between:
-        """Product of the singular values, (...).
+        """Product of the singular values, (...): Yoshikawa's manipulability sqrt(det J J^T).
 
-        This product is Yoshikawa's manipulability sqrt(det J J^T), or sqrt(det J^T J) if J has more rows than
-        columns.
+        If J has more rows than columns, the manipulability is sqrt(det J^T J).
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -179,10 +174,9 @@ class SingularValues(Displayable):
     def manipulability_gradient(self, H: FloatArray) -> FloatArray:
         """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
 
-        The derivative of a singular value is u^T J' v, where u and v are the singular vectors of this value.
-        The product rule gives the derivative of the product of all singular values without a division. If the
-        smallest singular value may be 0, the manipulability may not be differentiable. The gradient is then
-        NaN.
+        The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
+        product rule gives the derivative of the product without a division. The gradient is NaN if the
+        smallest singular value may be 0, because the manipulability may not be differentiable there.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -214,10 +208,10 @@ def singular_values(
     rows: slice = slice(None),
     columns: FrameColumns | None = None,
 ) -> SingularValues:
-    """Return the singular values of some rows of finite matrices (..., m, nv), with guaranteed bounds.
+    """Return the singular values of some rows of finite matrices J (..., m, nv), with guaranteed bounds.
 
     `error` bounds the error of each number of J. `moving` (nv,) is False for columns that are 0 in every
-    configuration. `columns` is None if the matrix is not a robot's Jacobian.
+    configuration.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -235,7 +229,7 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # Bounds that are not finite become 0 and inf.
+    # A lower bound that is not finite becomes 0, and an upper bound becomes inf.
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
@@ -250,7 +244,7 @@ def _skew(U: FloatArray) -> FloatArray:
 def _norm(E: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # A matrix that contains inf has the norm inf.
+    # The norm of a matrix that contains inf is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

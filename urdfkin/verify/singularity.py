@@ -1,14 +1,15 @@
 """Explain a singular Jacobian: its rank, the lost directions, and the joints that cause the loss of rank.
 
-A left null vector u of J is a lost direction. The frame cannot move along u, because u^T J v = 0 for every v.
-A right null vector is a null motion, which consists of joint velocities that do not move the frame. A minimal
-dependent set is a set of columns that are linearly dependent. If any column is removed, the remaining columns
-are independent. Such a set shows which joints cause the loss of rank. A geometric reason, such as parallel
-axes, is stated only if the columns satisfy its condition within the error bound of J.
+- Lost direction: a left null vector u of J. The frame cannot move along u, because u^T J v = 0 for every v.
+- Null motion: a right null vector of J, that is, joint velocities that do not move the frame.
+- Minimal dependent set: linearly dependent columns that become independent if any column is removed. The
+  joints of such columns cause the loss of rank.
 
-The column of a revolute joint is [a x z; z]. Here z is the direction of the axis, and the vector a leads from
-the frame's origin to a point of the axis. Therefore, two joint axes are collinear if their columns are equal
-up to sign. An axis passes through the frame's origin if the linear part of its Jacobian column is 0.
+A geometric reason, such as parallel axes, is stated only if the columns satisfy the condition of the reason
+within the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the
+axis, and a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if
+their columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column
+is 0.
 """
 
 from __future__ import annotations
@@ -24,13 +25,14 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: The search for linearly dependent columns stops at sets of `_LARGEST_SET` columns.
-#: A Jacobian with more than `_MOST_COLUMNS` columns is not searched.
-_LARGEST_SET, _MOST_COLUMNS = 4, 16
-#: Rounding error of a small singular value decomposition, in eps for each row or column.
+#: Maximum number of columns in a minimal dependent set.
+_LARGEST_SET = 4
+#: Maximum number of columns of a Jacobian that is searched for minimal dependent sets.
+_MOST_COLUMNS = 16
+#: Rounding error of the singular value decomposition of a small matrix, in eps for each row and each column.
 _ROUNDINGS = 16.0
-#: At random configurations, a singular value below this fraction of the norm counts as 0.
-_USUAL = 1e-9
+#: Largest fraction of the norm at which a singular value counts as 0, for random configurations.
+_NEGLIGIBLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +44,12 @@ class FrameColumns:
         error: (..., 6, nv) bound on the error of each number of J.
         frame: Name of the frame.
         joints: (nv,) name of each column.
-        turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint. None
+        turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint, None
             for a column that does not belong to a single joint axis.
         active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the user gives the base's motion. The lost directions of a robot on a moving base
-            cannot be compared with those of `samples`, because `samples` has a fixed base.
+        moving_base: Whether the base moves. Lost directions on a moving base cannot be compared with
+            `samples`.
     """
 
     J: FloatArray
@@ -60,25 +62,15 @@ class FrameColumns:
     moving_base: bool
 
 
-def columns_of(
-    tree: KinematicTree,
-    J: FloatArray,
-    error: FloatArray,
-    frame: str,
-    joints: Sequence[str],
-    active: NDArray[np.bool_],
-    samples: Callable[[], FloatArray],
-    *,
-    moving_base: bool,
-) -> FrameColumns:
-    """Return a Jacobian with its names; `FrameColumns` describes the arguments."""
-    turns: list[bool | None] = [None] * len(joints)
+def axis_kinds(tree: KinematicTree) -> tuple[bool | None, ...]:
+    """Return the attribute `turns` of `FrameColumns` for a robot."""
+    turns: list[bool | None] = [None] * tree.nv
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
     for i, joint in moving:
         at = tree.v_index[i]
         if joint.kind.nv == 1 and sum(tree.v_index[k] == at for k, _ in moving) == 1:
             turns[at] = joint.kind.turns
-    return FrameColumns(J, error, str(frame), tuple(joints), tuple(turns), active, samples, moving_base)
+    return tuple(turns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,13 +79,12 @@ class Singularity(Displayable):
 
     Attributes:
         rank: Number of singular values with a lower bound above 0.
-        full: Largest possible rank: the smaller of the number of rows and the number of columns.
+        full: Largest possible rank: the smaller of the numbers of rows and columns.
         least: Upper bound on the smallest singular value.
         lost: (d, 6) lost directions [linear; angular] in world axes, at the frame's origin; empty if the
             Jacobian has more rows than columns.
-        motions: (e, nv) independent null motions. A null motion is a vector of joint velocities that does not
-            move the frame.
-        reasons: The lost directions and their reasons, one sentence each.
+        motions: (e, nv) independent null motions, that is, joint velocities that do not move the frame.
+        reasons: Sentences about the lost directions and the reasons of the loss.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -129,12 +120,12 @@ def explain(
 ) -> Singularity:
     """Return the rank of some rows of a Jacobian, and the reasons for a loss of rank.
 
-    The rank follows from the bounds (k,) of the singular values. `sample` is the index of the configuration.
+    `sample` is the index of the configuration; `lower` and `upper` (k,) bound the singular values.
     """
     rank, full = int((lower > 0.0).sum()), len(lower)
-    nothing = np.zeros((0, 6)), np.zeros((0, columns.J.shape[-1]))
     if rank == full:
-        return Singularity(rank, full, float(upper[-1]) if full else 0.0, *nothing, ())
+        least = float(upper[-1]) if full else 0.0
+        return Singularity(rank, full, least, np.zeros((0, 6)), np.zeros((0, columns.J.shape[-1])), ())
     return _Explanation(columns, sample, rows, rank).result(full, float(upper[-1]))
 
 
@@ -154,18 +145,13 @@ class _Explanation:
     def result(self, full: int, least: float) -> Singularity:
         """Return the rank with lost directions and reasons; `least` bounds the smallest singular value."""
         U, s, Vt = np.linalg.svd(self._A)
-        self._noise = (
-            8.0
-            * (float(np.linalg.norm(self._off)) + self._rounding(self._A))
-            / (s[self._rank - 1] if self._rank else 1.0)
-        )
+        self._noise = 8.0 * self._matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
         motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
         motions[:, self._moving] = _sparse(Vt[self._rank :])
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # An arm with fewer joints than rows loses directions in every configuration.
-        # These directions depend on the configuration.
+        # An arm with fewer joints than rows loses other directions in each configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -182,14 +168,14 @@ class _Explanation:
         return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
 
     def _of_samples(self) -> tuple[int, FloatArray]:
-        """Return the rank at random configurations, and an orthonormal basis of their lost directions."""
+        """Return the rank at random configurations, and an orthonormal basis of directions lost in all."""
         samples = self._columns.samples()[:, self._rows[:, None], self._moving]
-        usual = max(int(np.linalg.matrix_rank(one, tol=_USUAL * np.linalg.norm(one))) for one in samples)
+        usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
-        return usual, U[:, int((s > _USUAL * s[0]).sum()) :]
+        return usual, U[:, int((s > _NEGLIGIBLE * s[0]).sum()) :]
 
     def _without_noise(self, rows: FloatArray) -> FloatArray:
-        """Return rows in which numbers below the error of the Jacobian are 0."""
+        """Replace numbers below the error of the Jacobian by 0."""
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _directions(self, lost: FloatArray) -> Iterator[str]:
@@ -213,20 +199,12 @@ class _Explanation:
         if len(motions) == 1:
             yield self._null_motion(motions[0, self._moving])
         else:
-            joints = _listed(
-                [
-                    n
-                    for n, x in zip(self._names, self._without_noise(motions)[:, self._moving].T, strict=True)
-                    if x.any()
-                ]
-            )
+            moved = np.flatnonzero(self._without_noise(motions)[:, self._moving].any(axis=0))
+            joints = _listed([self._names[i] for i in moved])
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield each set of linearly dependent columns that contains no smaller dependent set.
-
-        A set contains indices of columns. Columns of joints that do not move the frame have no index.
-        """
+        """Yield each minimal dependent set, as indices of the columns of joints that move the frame."""
         if self._A.shape[1] > _MOST_COLUMNS:
             return
         found: list[set[int]] = []
@@ -243,17 +221,15 @@ class _Explanation:
     def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         """Replace overlapping pairs of dependent columns by their union.
 
-        For example, any two columns of three parallel prismatic joints are linearly dependent. These three
-        pairs become one set of three columns.
+        For example, the three pairs of columns of three parallel prismatic joints become one set.
         """
         joined: list[set[int]] = []
         if self._linear_only:
             return sets
-        for pair in (set(one) for one in sets if len(one) == len(("a", "pair"))):
-            near = [one for one in joined if one & pair]
-            joined = [one for one in joined if not one & pair] + [pair.union(*near)]
-        others = [one for one in sets if len(one) != len(("a", "pair"))]
-        return [*(tuple(sorted(one)) for one in joined), *others]
+        for pair in (set(one) for one in sets if len(one) == 2):
+            overlapping = [one for one in joined if one & pair]
+            joined = [one for one in joined if not one & pair] + [pair.union(*overlapping)]
+        return [*(tuple(sorted(one)) for one in joined), *(one for one in sets if len(one) != 2)]
 
     def _reason(self, one: tuple[int, ...]) -> str:
         indices = self._moving[list(one)]
@@ -266,7 +242,7 @@ class _Explanation:
                 reason = self._of_linear_rows(one, turns)
             elif all(turns):
                 reason = self._of_revolute_axes(one)
-            elif not any(turns) and np.linalg.matrix_rank(self._A[:, one], tol=_USUAL) == 1:
+            elif not any(turns) and np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1:
                 reason = f"{self._joints(one)} slide along parallel axes."
         if reason is not None:
             return reason
@@ -276,7 +252,7 @@ class _Explanation:
         return self._null_motion(motion)
 
     def _of_angular_rows(self, one: tuple[int, ...]) -> str | None:
-        if np.linalg.matrix_rank(self._A[:, one], tol=_USUAL) == 1:
+        if np.linalg.matrix_rank(self._A[:, one], tol=_NEGLIGIBLE) == 1:
             return f"The axes of {self._joints(one)} are parallel."
         return f"The axes of {self._joints(one)} are parallel to one plane."
 
@@ -291,10 +267,7 @@ class _Explanation:
         return None
 
     def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        """Return the geometric reason why columns of revolute joints are dependent, such as collinear axes.
-
-        If no known reason applies, the result is None.
-        """
+        """Return the geometric reason why columns of revolute joints are dependent; None: no known reason."""
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())
@@ -305,28 +278,23 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
-        # Three linearly dependent directions lie in a plane; four directions are always dependent.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
-        # Axes through one point a satisfy a x z = v, for the direction z of each axis.
-        # The vector v is the linear part of the joint's Jacobian column.
+        # If all axes pass through a point a, each column [v; z] satisfies v = a x z.
         crosses = np.concatenate([np.cross(np.eye(3), -axis) for axis in z])
         a, *_ = np.linalg.lstsq(crosses, v.ravel(), rcond=None)
         if np.abs(crosses @ a - v.ravel()).max() > off * float(np.linalg.cond(crosses)):
             return None
-        # Three linearly dependent lines through one point lie in one plane.
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return a sentence about the line that all joint axes intersect; None: there is no such line."""
+        """Return a sentence about the line that all joint axes intersect; None: no line."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
         if not all(self._columns.turns[i] for i in self._moving):
             return None
-        off = (
-            4.0 * (float(np.linalg.norm(self._off)) + self._rounding(self._A)) * (1.0 + np.abs(self._A).max())
-        )
+        off = 4.0 * self._matrix_error() * (1.0 + np.abs(self._A).max())
         if abs(f @ m) > off * float(f @ f):
             return None
         point = np.cross(f, m) / (f @ f)
@@ -348,6 +316,9 @@ class _Explanation:
         names = _listed([self._names[i] for i in one])
         return f"{'joint' if len(one) == 1 else 'joints'} {names}"
 
+    def _matrix_error(self) -> float:
+        return float(np.linalg.norm(self._off)) + self._rounding(self._A)
+
     @staticmethod
     def _rounding(A: FloatArray) -> float:
         return float(_ROUNDINGS * sum(A.shape) * EPS * np.linalg.norm(A))
@@ -368,7 +339,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the row space of projections of orthonormal vectors."""
+    """Return an orthonormal basis of the space of `rows`, which are projections of orthonormal vectors."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
 

@@ -1,28 +1,27 @@
 """Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of its tip.
 
-Pinocchio computes frames in the world. A table's numbers are relative to the table's base. This base may move
-too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the motion of
-base b and of tip t in the world, and r = p_t - p_b:
+Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. This base
+may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
+motion of base b and of tip t in the world, and r = p_t - p_b:
 
     w    = R_b^T (w_t - w_b)
     vel  = R_b^T (v_t - v_b - w_b x r)
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module implements the
-equations a second time. The check would not be independent if it used `urdfkin.kinematics.equations`, which
-computes the table's results. The bound is the sum of the rounding errors of urdfkin and of Pinocchio. If the
-table was changed by snapping, the bound also includes the deviation that the table states for snapping.
+These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module implements
+these equations a second time, because `urdfkin.kinematics.equations` computes the table's results.
 
-The bound on rounding errors is proportional to the robot's reach. Here the reach is the length of the paths
-from the root to the table's base and to its tip, with prismatic displacements. If the sum of all lengths in
-the table is larger than the reach, the bound uses this sum, but at most `PROMISED` times the reach. Lengths
-in tables with Hayati rows never exceed that limit. The bound on a Jacobian column is multiplied by the mimic
-multipliers.
+The bound is the sum of the rounding errors of urdfkin and of Pinocchio. For a table that was changed by
+snapping, the bound also includes the deviation that the table states. The bound on rounding errors is
+proportional to the robot's reach: the length of the paths from the root to the table's base and to its tip,
+with prismatic displacements. If the sum of all lengths in the table is larger than the reach, the bound uses
+this sum, but at most `PROMISED` times the reach. Tables with Hayati rows never exceed this limit. The bound
+on a Jacobian column is multiplied by the mimic multipliers.
 
 A row has only four parameters, so nearly parallel axes may need lengths of kilometres. If two such lengths
-cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference that is within this
-error. Such a table is less accurate, and `TableCheck.loss` states the error.
+cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this error, and
+`TableCheck.loss` states the error.
 """
 
 from __future__ import annotations
@@ -67,13 +66,12 @@ class TableCheck:
     Attributes:
         samples: Number of configurations.
         metres: Distance between the table's tip and Pinocchio's tip, m.
-        radians: Angle between the orientations of these two tips, rad.
+        radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
-        shares: Ratios of these differences to their bounds. If the table agrees with Pinocchio, no ratio is
-            above 1.
-        snapped: True if the table was changed by snapping, for example from an angle of 89.99 to 90 degrees.
-            Then the bound includes the deviation that the table states for snapping.
-        loss: Explanation of a difference above its bound if very large lengths in the table cause the
+        shares: Ratios of the differences `units` to their bounds; above 1 is a disagreement.
+        snapped: True if snapping changed the table, for example from 89.99 to 90 degrees. The bound then
+            includes the deviation that the table states.
+        loss: Explanation of a difference above the bound, if very large lengths in the table cause the
             difference; else None.
     """
 
@@ -91,7 +89,7 @@ class TableCheck:
 
     @property
     def agrees(self) -> bool:
-        """True if snapping and rounding, also of very large lengths in the table, explain the differences."""
+        """Whether snapping and rounding explain all differences."""
         return self.within or self.loss is not None
 
     def __str__(self) -> str:
@@ -118,31 +116,34 @@ def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Sa
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]
     motion = relative_motion(oracle, tree, table, samples)
     T = table.placement(own_q)
-    apart = _Apart(
-        np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
-        rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
-        np.abs(jacobian(table, own_q) - motion.jacobian[..., columns]),
-        _split(np.abs(acceleration(table, own_q, own_v, own_a) - motion.acceleration)),
-    )
+    differences = {
+        "placement": (
+            np.hypot.reduce(T[:, :3, 3] - motion.placement[:, :3, 3], axis=-1),
+            rotation_angle(T[:, :3, :3], motion.placement[:, :3, :3]),
+        ),
+        "jacobian": _halves(jacobian(table, own_q) - motion.jacobian[..., columns]),
+        "acceleration": _halves(acceleration(table, own_q, own_v, own_a) - motion.acceleration),
+    }
     size = sizes(tree, table, samples)
     slack = _Slack(table, own_q, size)
-    units, shares = _measured(apart, size, slack)
+    units, shares = _measured(differences, size, slack)
     loss = None
     own = own_length(table)
     if table.rows and max(shares.values()) > 1.0 and (own > size.reach).any():
-        _, longer = _measured(apart, size.of_length(own), slack)
+        _, longer = _measured(differences, size.of_length(own), slack)
         loss = _loss(table) if max(longer.values()) <= 1.0 else None
-    worst = (float(apart.metres.max(initial=0.0)), float(apart.radians.max(initial=0.0)))
-    return TableCheck(len(own_q), *worst, units, shares, bool(table.snap and table.snap.changes), loss)
+    metres, radians = (float(x.max(initial=0.0)) for x in differences["placement"])
+    snapped = bool(table.snap and table.snap.changes)
+    return TableCheck(len(own_q), metres, radians, units, shares, snapped, loss)
 
 
 def own_length(table: DHTable) -> float:
-    """Return the sum of all lengths of a table, base and tool included, m."""
+    """Return the sum of all lengths in a table, with base and tool, m."""
     return table.span + math.hypot(*table.base[:3, 3])
 
 
 def _loss(table: DHTable) -> str:
-    """Return the reason why a table loses digits, the size of the loss, and the remedy."""
+    """Return a text with the length that loses digits, the size of the loss, and the remedy."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -155,47 +156,46 @@ def _loss(table: DHTable) -> str:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Apart:
-    metres: FloatArray
-    radians: FloatArray
-    jacobian: FloatArray
-    acceleration: tuple[FloatArray, FloatArray]
+#: Linear and angular differences of each quantity, by the name of the quantity.
+_Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
-def _measured(apart: _Apart, size: Sizes, slack: _Slack) -> tuple[dict[str, float], dict[str, float]]:
+def _measured(
+    differences: _Differences, size: Sizes, slack: _Slack
+) -> tuple[dict[str, float], dict[str, float]]:
     """Return the largest difference of each quantity, in eps * scale and as a fraction of the bound."""
     rates = size.rates**2 + size.accelerations
-    one = np.ones_like(apart.metres)
+    one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
-    J_linear, J_angular = apart.jacobian[:, :3].max(axis=1), apart.jacobian[:, 3:].max(axis=1)
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    pairs: dict[str, tuple[tuple[FloatArray, FloatArray, FloatArray | float], ...]] = {
-        "placement": ((apart.metres, size.reach, slack.metres), (apart.radians, one, slack.turn)),
+    #: Pairs (scale, slack) for the linear and for the angular differences of each quantity.
+    limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
+        "placement": ((size.reach, slack.metres), (one, slack.turn)),
         "jacobian": (
-            (J_linear, size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
-            (J_angular, size.turning * one[:, None], slack.turn * columns),
+            (size.turning * reach + size.sliding, slack.jacobian[:, None] * columns),
+            (size.turning * one[:, None], slack.turn * columns),
         ),
         "acceleration": (
-            (apart.acceleration[0], (size.reach + slides) * rates, slack.acceleration * rates),
-            (apart.acceleration[1], rates, 4.0 * slack.turn * rates),
+            ((size.reach + slides) * rates, slack.acceleration * rates),
+            (rates, 4.0 * slack.turn * rates),
         ),
     }
     units, shares = dict[str, float](), dict[str, float]()
-    for name, halves in pairs.items():
-        units[name] = max(_worst(x, scale * EPS) for x, scale, _ in halves)
-        shares[name] = max(_worst(x, (scale.T * size.rounding).T + allowed) for x, scale, allowed in halves)
+    for name, halves in differences.items():
+        pairs = list(zip(halves, limits[name], strict=True))
+        units[name] = max(_worst(x, scale * EPS) for x, (scale, _) in pairs)
+        shares[name] = max(_worst(x, (scale.T * size.rounding).T + more) for x, (scale, more) in pairs)
     return units, shares
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """Return the largest ratio of a number in `found` to its unit. If both are 0, the ratio is 0."""
+    """Return the largest ratio of a number in `found` to its unit; 0 if both are 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
 @dataclass(frozen=True, slots=True)
 class RelativeMotion:
-    """Pinocchio's placement (n, 4, 4), Jacobian (n, 6, nv) and acceleration (n, 6) relative to a base."""
+    """Placement (n, 4, 4), Jacobian (n, 6, nv) and acceleration (n, 6) of a tip relative to a base."""
 
     placement: FloatArray
     jacobian: FloatArray
@@ -203,7 +203,7 @@ class RelativeMotion:
 
 
 def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
-    """Return the tip's motion relative to the table's base, from Pinocchio's motions of tip and base."""
+    """Return Pinocchio's motion of the table's tip relative to the table's base."""
     x = QueryBatch([table.base_frame, table.tip_frame], (samples.q, samples.v, samples.a))
     T = oracle.placements(x)
     R = T[:, 0, :3, :3]
@@ -235,13 +235,14 @@ class Sizes:
     Attributes:
         reach: (n,) length of the path from the root to the table's base plus length of the path from the root
             to the table's tip, m.
-        turning: (columns,) sum of |multiplier| over revolute joints for each coordinate of the table. The sum
-            includes the coordinate's joint and the joints that mimic it, if they are on one of these paths.
-        sliding: (columns,) sum of |multiplier| over prismatic joints for each coordinate of the table.
+        turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves,
+            on the path from the root to the table's base or tip.
+        sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate of the table
+            moves.
         rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.
         accelerations: (n,) sum of the absolute values of all joint accelerations, rad/s^2 and m/s^2.
-        rounding: (n,) upper bound on the relative error. A table may treat nearly parallel axes as parallel
-            (`urdfkin.dh.common_normals`). The bound includes the angles between these axes.
+        rounding: (n,) upper bound on the relative error. The bound includes the angles between nearly
+            parallel axes that the table treats as parallel (`urdfkin.dh.common_normals`).
     """
 
     reach: FloatArray
@@ -257,7 +258,7 @@ class Sizes:
 
 
 def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
-    """Return the sizes of the paths from the root, from which Pinocchio computes both frames of the table."""
+    """Return the sizes of the paths from the root to the two frames of the table."""
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -283,9 +284,8 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # Each joint on the two paths and each row of the table adds rounding errors.
     # `Joint.tilt` is the angle between the axis of a joint in urdfkin and in Pinocchio.
-    # The factor is 4, because a term of the relative acceleration has up to four rotated vectors.
+    # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
@@ -294,10 +294,9 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
 class _Slack:
     """Allowed differences between a snapped table and the robot, in addition to rounding errors.
 
-    Snapping rotates an axis by at most `turn` and displaces a joint origin or the tip by at most `metres`.
-    Therefore z x d changes by at most `turn` times the reach plus twice `metres`. A product of two such
-    factors changes by at most twice this amount. The cross product of two axes changes by at most twice
-    `turn`.
+    Snapping rotates an axis by at most `turn`, and displaces a joint origin or the tip by at most `metres`. A
+    vector z x d therefore changes by at most `turn` times the reach plus twice `metres`, and a product of two
+    such vectors by at most twice this amount. The cross product of two axes changes by at most twice `turn`.
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:
@@ -310,6 +309,6 @@ class _Slack:
         self.acceleration = 2.0 * self.turn * (size.reach + 2.0) + 4.0 * self.metres
 
 
-def _split(six: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two arrays (n,): the largest linear number and the largest angular number of each row."""
-    return six[:, :3].max(axis=-1), six[:, 3:].max(axis=-1)
+def _halves(six: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the largest absolute values of the linear and of the angular rows of (n, 6, ...)."""
+    return np.abs(six[:, :3]).max(axis=1), np.abs(six[:, 3:]).max(axis=1)

@@ -1,16 +1,15 @@
 """Read a USD stage in a process with limits on time and memory, and compare the robot with OpenUSD's readers.
 
-Pinocchio checks every result with the URDF text that urdfkin writes for the tree. This check does not include
-the conversion from the stage to the tree. Therefore `load` makes two comparisons:
+Pinocchio checks every result with the URDF text that urdfkin writes for the tree, but not the conversion from
+the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 
-- with OpenUSD's own parser of UsdPhysics. Both parsers must find the same bodies, frames, degrees of freedom
-  and limits for each joint. A difference is an error.
+- with OpenUSD's parser UsdPhysics. Both parsers must find the same bodies, frames, degrees of freedom and
+  limits for each joint. A difference is an error.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
-  robot in one configuration. In this configuration, each link must have the placement of its prim. The file
-  states these transforms separately from the joint frames, so a difference is a warning about the file.
+  robot in one configuration, in which each link must have the placement of its prim. The file states these
+  transforms separately from the joint frames, so a difference is a warning about the file.
 
-Both comparisons allow only differences due to rounding, because a stage stores its numbers in single
-precision.
+Both comparisons allow only rounding to single precision, in which a stage stores its numbers.
 """
 
 from __future__ import annotations
@@ -43,19 +42,18 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.system.processes import ask_python, own_python
 from urdfkin.urdf.usd import Remark, version
-from urdfkin.verify.mjcf_process import TOO_MUCH, complete_lines, unpacked
+from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 PATIENCE = 60.0
-#: Largest accepted output of the process, bytes.
-_MOST = 400_000_000
-#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE` (derived in `_demand`).
+#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE` (derived in `_check_joint`).
 _ROTATION = 18.0
-#: Number of roundings in a joint's origin (`_demand`).
+#: Number of roundings in a joint's origin (derived in `_check_joint`).
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE` (`_at_rest`).
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE`.
+#: `_compare_prims` derives this bound.
 _TRANSFORM = 6.0 * np.pi
 
 
@@ -63,7 +61,7 @@ _TRANSFORM = 6.0 * np.pi
 class UsdReading:
     """The tree of a USD stage as a URDF text, and the answer of the process that read the stage.
 
-    The remarks are about parts of the stage that the tree does not contain, and about probable mistakes.
+    The remarks name parts of the stage that the tree does not contain, and probable mistakes.
     """
 
     urdf: str
@@ -81,8 +79,13 @@ def read_usd(
 ) -> UsdReading:
     """Read the robot of a USD file in a process with limits on time (s) and memory.
 
-    The pairs (variant set, variant) are selected. `articulation` is a path or a name; None: there is only
-    one. OpenUSD's readers also read the stage and the files that it refers to, for `check_usd_source`.
+    OpenUSD's readers also read the stage and the files to which it refers, for `check_usd_source`.
+
+    Args:
+        source: Path of the USD file.
+        variants: Pairs (variant set, variant) to select.
+        articulation: Path or name of the articulation; None: the stage has only one.
+        patience: Time limit, s.
 
     Raises:
         SourceError: the file cannot be read or is too large.
@@ -102,51 +105,47 @@ def read_usd(
     command = own_python(
         "from urdfkin.verify.usd_process import serve; serve()", options=("-B", "-X", "utf8")
     )
-    output, status = ask_python(command, json.dumps(request).encode(), patience, _MOST)
-    lines = complete_lines(output)
-    if not lines or len(output) > _MOST:
-        ending = f"its process ended with status {status}: perhaps {TOO_MUCH}"
-        if status is None:
-            ending = f"it did not finish within {patience:g} s"
+    output, status = ask_python(command, json.dumps(request).encode(), patience, MOST)
+    answers, ending = parse_answers(output, status, library="OpenUSD", name=str(path), patience=patience)
+    if not answers:
         raise InputError(
             "OpenUSD cannot read this stage",
             where=str(path),
             found=ending,
             remedy="check that the file is complete",
         )
-    answer = json.loads(lines[-1])
-    if (error := answer.get("error")) is not None:
-        words = {key: error.get(key) for key in ("found", "remedy")}
-        raise InputError(error["what"], where=error.get("where") or str(path), **words)
+    answer = answers[-1]
     return UsdReading(answer["urdf"], tuple(Remark(*one) for one in answer["remarks"]), str(path), answer)
 
 
 def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
-    """Compare a robot with OpenUSD's readings of the stage from which the robot was read.
+    """Compare a robot with OpenUSD's readings of the stage from which urdfkin read the robot.
 
-    The result is a sentence for the certificate, and remarks about prims whose placements differ.
+    Returns:
+        A sentence for the certificate, and remarks about prims whose placements differ.
 
     Raises:
         OracleError: OpenUSD's parser and urdfkin disagree about a joint.
     """
     joints = read.answer["joints"]
-    share = max((_demand(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
+    share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
         f"compared with OpenUSD {version()}: its UsdPhysics parser reads the same {len(joints)} joints"
         f" ({share:.1%} of the bound of single precision)"
     )
-    rest, remarks = _at_rest(verifier.tree, read.answer)
+    rest, remarks = _compare_prims(verifier.tree, read.answer)
     return f"{line}; {rest}", remarks
 
 
-def _demand(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
-    """Return the largest ratio of a difference between urdfkin's and OpenUSD's data of a joint to its bound.
+def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
+    """Compare urdfkin's and OpenUSD's data of a joint; return the largest ratio of a difference to its bound.
 
-    Let u = `SINGLE` be the relative error of one rounding to single precision. If the four numbers of a
-    quaternion are rounded, the rotation angle changes by at most 2 u. The product of two quaternions adds an
-    error of 4 u to each of the four numbers. The vector of these four errors has the length 8 u. The angle
-    error is twice this length, that is, 16 u. The sum is `_ROTATION` u. An origin has `_ORIGIN` roundings: of
-    the scale factor, of its product with the origin, and of the transformed origin.
+    Let u = `SINGLE` be the relative error of one rounding to single precision.
+
+    - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
+      quaternions adds 4 u to each number. The vector of the four errors has the length 8 u, and the angle
+      error is twice this length, 16 u. The sum is `_ROTATION` u.
+    - Origin: `_ORIGIN` roundings, of the scale factor, of the scaled origin, and of the transformed origin.
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -178,12 +177,12 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _angle(R: FloatArray) -> float:
-    """Return the angle (rad) of a rotation; small angles are accurate too."""
+    """Return the angle (rad) of a rotation, with full accuracy for small angles."""
     sine = np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2.0
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers for each joint about rounding to single precision (`urdfkin.urdf.usd.Usd.single`).
+#: Five numbers about rounding to single precision, by the joint's name (`urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -207,30 +206,36 @@ class SinglePrecision:
 def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     """Return the largest errors of links and joints that result from rounding to single precision.
 
-    The numbers of a stage are rounded to single precision. The error of a stored number is at most half of
-    the distance to the next number in single precision. The number 0 has no error. The three errors of an
-    origin's numbers form a vector, whose length is the error of the origin. The four errors of a unit
-    quaternion form a vector, and the angle error is twice the length of this vector. An angle error moves
-    each later link by at most the angle times the length of the path to this link. The error of a mimic rule
-    m q + c is 2^-24 (|m q| + |c|), for the largest |q| within the limits.
+    The error of a stored number is at most half the distance to the next number in single precision; 0 has no
+    error.
 
-    A stage states the pose A of a joint's frame in one body and its pose B in the other body. In the zero
-    configuration, the pose of the second body relative to the first body is A B^-1. Let p be the origin of B.
-    Let w be the sum of the position errors of the poses A and B. Let e be the sum of the angle errors of A
-    and B. The angle error of A B^-1 is at most e. The position error of A B^-1 is at most w + e |p|. For a
-    revolute joint, the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
-    the revolute joint. `single` has no entry for this fixed joint, because the entry of the revolute joint
-    includes the errors of B. For all other joints, `single` contains |p| as the last of five numbers. A
-    locked prismatic joint also displaces the child link by its value q. The absolute value of q is at most
-    the length of the joint's constant offset plus the lengths of the two origins. A joint without an entry in
-    `single` has no rounding errors.
+    | Stored | Error |
+    |---|---|
+    | origin | length of the vector of the three errors |
+    | unit quaternion | angle error: twice the length of the vector of the four errors |
+    | mimic rule m q + c | 2^-24 times the sum of the sizes of m q and c, at the largest q within the limits |
+
+    An angle error moves each later link by at most the angle times the length of the path to this link.
+
+    A stage states the pose A of a joint's frame in one body, and the pose B in the other body. In the zero
+    configuration, the pose of the second body in the first body is A B^-1. Let p be the origin of B, w the
+    sum of the position errors of A and B, and e the sum of the angle errors of A and B. The angle error of A
+    B^-1 is at most e, and the position error at most w + e |p|.
+
+    - Revolute joint: the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
+      the revolute joint. The entry of the revolute joint includes the errors of B, so the fixed joint has no
+      entry.
+    - Other joints: `single` contains |p| as the last of five numbers.
+    - Locked prismatic joint: the value q also displaces the child link. |q| is at most the length of the
+      joint's constant offset plus the lengths of the two origins.
+    - Joint without an entry in `single`: no rounding errors.
     """
-    out, own = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
+    of_links, of_joints = np.zeros((len(tree.links), 2)), np.zeros((len(tree.joints), 3))
     for i, joint in enumerate(tree.joints):
         way, angle, size, share, lever = single.get(joint.name, (0.0, 0.0, 0.0, 0.0, 0.0))
         if joint.lock:
             lever = size + joint.length
-        own[i] = way + angle * (0.0 if joint.kind.turns else lever), angle, share
+        of_joints[i] = way + angle * (0.0 if joint.kind.turns else lever), angle, share
         length = max(joint.length, size)
         slides = joint.kind is JointKind.PRISMATIC
         if slides:
@@ -239,29 +244,28 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
             rule, leader = joint.mimic, tree.joints[tree.joint_index(joint.mimic.leader)]
             off = share * (abs(rule.multiplier) * _largest(leader) + abs(rule.offset))
             way, angle = (way + off, angle) if slides else (way, angle + off)
-        above = out[joint.parent]
-        out[i + 1] = above[0] + way + (above[1] + angle) * length, above[1] + angle
-    return SinglePrecision(out, own)
+        parent_way, parent_angle = of_links[joint.parent]
+        of_links[i + 1] = parent_way + way + (parent_angle + angle) * length, parent_angle + angle
+    return SinglePrecision(of_links, of_joints)
 
 
 def _largest(joint: Joint) -> float:
     return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
 
 
-def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
+def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
     """Compare the placements of links with the transforms of their prims, in the stage's configuration.
 
-    The angle error of one operation of a transform is at most `_TRANSFORM` u, with u = `SINGLE`. A rotation
-    from angles consists of at most three rotations of at most one turn. The error of each is at most 2 pi u,
-    so their sum is at most 6 pi u. A quaternion has four rounded numbers. Their errors form a vector whose
-    length is at most u. The component of this vector perpendicular to the quaternion changes the rotation by
-    at most 2 u. The component parallel to the quaternion changes the length of the quaternion by at most u.
-    UsdGeom does not normalize a quaternion. Therefore, this component changes a rotation by the angle t by at
-    most 2 u sin t. The sum of both changes is at most 4 u. A matrix has nine rounded numbers. Their errors
-    form a vector whose length is at most sqrt(3) u. Normalizing the rows does not make this vector longer. A
-    rotation by a small angle t changes the matrix by a vector of length sqrt(2) t. Therefore, the error of
-    the rotation is at most sqrt(3/2) u. `_TRANSFORM` u is the largest of these three values. Each joint on
-    the path counts as one operation.
+    Each joint on the path counts as one operation of a transform. With u = `SINGLE`, the angle error of one
+    operation is at most `_TRANSFORM` u, the largest of these three values:
+
+    - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
+    - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
+      quaternion changes the rotation by at most 2 u. The parallel component changes the length of the
+      quaternion, which UsdGeom does not normalize, and so changes a rotation by the angle t by at most 2 u
+      sin t. The sum is at most 4 u.
+    - Matrix: the vector of the nine errors is at most sqrt(3) u long, also after the rows are normalized. A
+      rotation by a small angle t changes the matrix by a vector of length sqrt(2) t: sqrt(3/2) u.
     """
     prims: dict[str, str] = answer["prims"]
     rows = unpacked(answer["rest"])
@@ -269,10 +273,10 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
-    if tree.links[0] in prims:  # the root is a body, wherever the stage places it
+    if tree.links[0] in prims:  # the stage may place the root anywhere
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
-    own = single_precision(tree, answer["single"]).links
+    of_links = single_precision(tree, answer["single"]).links
     far = float(np.linalg.norm(unpacked(answer["rest"])[:, :, 3], axis=1).max(initial=0.0))
     remarks, worst = [], (0.0, 0.0)
     shares = []
@@ -281,8 +285,8 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
         depth = len(tree.path(link)) + 1
         off = float(np.linalg.norm(ours[k, :3, 3] - rest[k, :3, 3]))
         angle = _angle(ours[k, :3, :3].T @ rest[k, :3, :3])
-        turn = own[link, 1] + depth * _TRANSFORM * SINGLE
-        length = own[link, 0] + depth * SINGLE * (1.0 + _TRANSFORM) * 2.0 * far
+        turn = of_links[link, 1] + depth * _TRANSFORM * SINGLE
+        length = of_links[link, 0] + depth * SINGLE * (1.0 + _TRANSFORM) * 2.0 * far
         share = max(off / length if off else 0.0, angle / turn if angle else 0.0)
         shares.append(share)
         worst = max(worst[0], off), max(worst[1], angle)
@@ -305,7 +309,7 @@ def _at_rest(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple
         words = (
             f"UsdGeom places {len(remarks)} of the {len(prims)} prims elsewhere, by up to {worst[0]:.3g} m"
         )
-        # Only the first difference counts, because an error of one body moves all bodies after it.
+        # An error of one body moves all bodies after it, so only the first difference is a remark.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

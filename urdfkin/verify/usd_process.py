@@ -1,10 +1,10 @@
-"""Program that reads a USD stage in a separate process, with urdfkin's reader and with OpenUSD's own.
+"""Read a USD stage in a separate process, with urdfkin's reader and with OpenUSD's readers.
 
-A stage can require any amount of time and memory, or crash OpenUSD's parsers, which are written in C++. The
-request and the answer are JSON on standard input and standard output.
+A USD stage (scene) can require any amount of time and memory, or crash OpenUSD's parsers, which are written
+in C++. The request and the answer are JSON on standard input and standard output.
 
-The parser of OpenUSD's package UsdPhysics resolves bodies, joint frames and limits with other code than
-`urdfkin.urdf.usd`. The answer contains the numbers of both readers.
+OpenUSD's package UsdPhysics has its own code for bodies, joint frames and limits. The answer contains the
+numbers of UsdPhysics and of `urdfkin.urdf.usd`.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.errors import UrdfkinError
 from urdfkin.urdf.confinement import limit
 from urdfkin.urdf.usd import JointReading, Usd, library, read_usd
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.verify.mjcf_process import TOO_MUCH, packed
+from urdfkin.verify.mjcf_process import error_answer, packed, write_answer
 
 
 def serve() -> None:
@@ -33,21 +32,10 @@ def serve() -> None:
     try:
         library()
         limit(request["seconds"])
-        answer = answer_of(request)
-    except MemoryError:
-        answer = {"error": {"what": "OpenUSD cannot read this stage", "found": TOO_MUCH}}
-    except UrdfkinError as error:
-        answer = {"error": {key: getattr(error, key) for key in ("what", "where", "found", "remedy")}}
+        write_answer(answer_of(request))
     except Exception as error:
-        answer = {
-            "error": {
-                "what": "OpenUSD cannot read this stage",
-                "found": f"{type(error).__name__}: {error}"[:2000],
-            }
-        }
-    sys.stdout.write(json.dumps(answer) + "\n")
-    sys.stdout.flush()
-    os._exit(0)  # the exit handlers of the libraries are skipped
+        write_answer(error_answer(error, "OpenUSD cannot read this stage"))
+    os._exit(0)  # without the exit handlers of the libraries
 
 
 def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
@@ -79,14 +67,14 @@ def _second_reading(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # A joint with PhysicsArticulationRootAPI has a second description, that of the articulation.
+            # A joint with PhysicsArticulationRootAPI also has the description of an articulation.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _described(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
 
 
 def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
-    """Return a joint of OpenUSD's parser in the form of `JointReading.as_list`."""
+    """Return `JointReading.as_list` for a joint that OpenUSD's parser has read."""
     frames = []
     for i in (0, 1):
         p, quaternion = getattr(one, f"localPose{i}Position"), getattr(one, f"localPose{i}Orientation")

@@ -1,13 +1,13 @@
 """The verifier of a robot: it compares results with the oracle and records the checks.
 
-The oracle receives the user's original arguments. The comparison uses the result in the shape that the method
-returns.
+The oracle receives the user's arguments. Results are compared in the shape in which a method returns them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -23,41 +23,38 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.system.lazy_import import own_version
 from urdfkin.urdf.sources import Origin
-from urdfkin.verify import bounds
-from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.bounds import KERNELS, Bound, magnitudes
 from urdfkin.verify.call import Call, Part
-from urdfkin.verify.certificate import (
+from urdfkin.verify.certificate import Certificate, Ledger, VerificationError
+from urdfkin.verify.comparison import (
+    CHECKS,
     BatchComparison,
-    Certificate,
-    Ledger,
-    VerificationError,
     compare,
     comparison_of,
+    disagreement,
+    worst_of_each,
 )
-from urdfkin.verify.comparison import CHECKS, KERNELS, worst_of_each
 from urdfkin.verify.oracle import Oracle, QueryBatch
 from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary, OracleName, oracle_library
 from urdfkin.verify.pinocchio import build_model, pinocchio, version
-from urdfkin.verify.quantities import QUANTITIES, Quantity
-from urdfkin.verify.replay import replay_line
+from urdfkin.verify.quantities import QUANTITIES, Quantity, replay_line
 
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table; zero and limits are added.
+#: Number of random configurations in the check of a table; the zero configuration and the limits are added.
 TABLE_SAMPLES = 40
 
-#: True checks all results of a call, and False none.
-#: "sample" checks the results of `SAMPLE` configurations.
+#: True: check all results of a call. "sample": check `SAMPLE` configurations of a call. False: check none.
 Verify = bool | Literal["sample"]
 
 SAMPLE = 100
 
-#: Largest number of values in a part of a large batch; such a part fits into the processor's cache.
-_AT_A_TIME = 262_144
-#: Largest number of configurations in a part.
+#: Maximum number of values that are compared at once; they fit into the processor's cache.
+_PART_SIZE = 262_144
+#: Maximum number of configurations that are compared at once.
 _MOST = 4096
 
 
@@ -76,12 +73,13 @@ class Verifier:
     Args:
         text: The URDF text that Pinocchio reads.
         tree: urdfkin's tree of the same text.
-        origin: The arguments of `load`, for commands in error messages that repeat a failed computation.
-        policy: Default of `verify` in calls.
+        origin: The arguments of `load`, from which an error message makes a command that repeats a
+            computation.
+        policy: Default of the argument `verify` of a robot's methods.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
-        unverifiable: Known reason why Pinocchio cannot check the robot; None if there is none.
-        oracle: Name of the oracle that checks the results of the robot's methods: "pinocchio" or "mujoco".
-            Tables, the accuracy study and enclosures always use Pinocchio.
+        unverifiable: Known reason why Pinocchio cannot check the robot; None: no known reason.
+        oracle: Name of the oracle for the results of the robot's methods: "pinocchio" or "mujoco". Pinocchio
+            always checks tables, the accuracy study and enclosures.
 
     Attributes:
         ledger: Record of checked and unchecked results.
@@ -107,11 +105,11 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy has no checked results yet, and it builds Pinocchio's models again.
+        # A copy has no checked results, and builds its own models of the oracles.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot, which is built once; for a moving base, on a free-flyer.
+        """Return the oracle's model of the robot, built at the first call; a moving base has a free-flyer.
 
         Raises:
             OracleError: the oracle does not accept the text, or reads other joints from it.
@@ -147,10 +145,10 @@ class Verifier:
         )
 
     def locked(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        """Return the verifier of the robot with more locked joints, with Pinocchio's reduced model."""
-        # Pinocchio may refuse a robot with many joints, and accept it with fewer.
+        """Return the verifier of the robot with more locked joints."""
+        # Pinocchio may accept this robot, even if it refuses the robot with more moving joints.
         known = self.unverifiable if self.unverifiable not in self._refusals.values() else None
-        found = Verifier(
+        verifier = Verifier(
             self.text,
             tree,
             replace(self.origin, lock=(*self.origin.lock, *lock)),
@@ -159,8 +157,8 @@ class Verifier:
             unverifiable=known,
             oracle=self.library.name,
         )
-        found.reading = self.reading
-        return found
+        verifier.reading = self.reading
+        return verifier
 
     def cannot(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> str | None:
         """Return the reason why an oracle cannot check this robot; None if it can."""
@@ -175,13 +173,17 @@ class Verifier:
                     self.unverifiable = str(error)
         return self._refusals.get(by.name)
 
-    def wanted(self, verify: Verify | None) -> Verify:
-        """Return the valid value of `verify` for a call; None stands for the robot's default `policy`."""
+    def policy_of_call(self, verify: Verify | None) -> Verify:
+        """Return the valid value of the argument `verify` of a call; None becomes the robot's `policy`."""
         return checked_choice(self.policy if verify is None else verify)
 
-    def ready(self, verify: Verify | None) -> None:
-        """Import Pinocchio before a computation with a check; raise InstallationError without Pinocchio."""
-        if self.wanted(verify) is not False and self.unverifiable is None and self.library is PINOCCHIO:
+    def require_pinocchio(self, verify: Verify | None) -> None:
+        """Raise InstallationError if a check of the call needs Pinocchio, and Pinocchio is missing."""
+        if (
+            self.policy_of_call(verify) is not False
+            and self.unverifiable is None
+            and self.library is PINOCCHIO
+        ):
             pinocchio()
 
     def certificate(self) -> Certificate:
@@ -195,22 +197,22 @@ class Verifier:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the MJCF file, or of the URDF text as UTF-8."""
-        import hashlib  # hashlib loads OpenSSL, which is slow
+        """SHA-256 of the MJCF or USD file, or of the URDF text as UTF-8."""
+        import hashlib  # the import is slow, because hashlib loads OpenSSL
 
         return self.origin.sha256 or hashlib.sha256(self.text.encode()).hexdigest()
 
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check the results of a call in the shape in which the call returns them, and record the check.
+        """Check the results of a call, in the shape that the call returns, and record the check.
 
         Raises:
             VerificationError: the oracle's result differs by more than the bound.
             OracleError: the shape of the results does not match the arguments.
         """
-        ledger, wanted = self.ledger, self.wanted(verify)
-        if wanted is False:
+        ledger, policy = self.ledger, self.policy_of_call(verify)
+        if policy is False:
             ledger.unchecked(quantity.name, call.results)
             return
         if (reason := self.cannot(call.base, self.library)) is not None:
@@ -218,8 +220,8 @@ class Verifier:
             ledger.unchecked(quantity.name, call.results, reason)
             return
         results = call.question.flat(result, quantity.axes)
-        total, worst = BatchComparison.of_nothing(), None
-        for part in parts(wanted, call.n, results[:1].size):
+        total, worst = BatchComparison(), None
+        for part in parts(policy, call.n, results[:1].size):
             comparison, failure = self._compare(quantity, call, results[part], part)
             if failure is not None and (worst is None or comparison.share > total.share):
                 worst = failure
@@ -238,33 +240,32 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Return a function that computes one configuration with `compute`, and checks and records it.
+        """Return a function that calls `compute` for one configuration, and checks and records the result.
 
-        The function returns None if `compute` returns None, because its arguments are not supported. If the
-        oracle cannot check the robot, the function always returns None. `compute` writes the result to `out`,
-        its last argument. `frame` is the name that the user gave.
+        The last argument of `compute` is `out`. `compute` returns None for unsupported arguments. In this
+        case, and if the oracle cannot check the robot, the returned function returns None without a check.
         """
         quantity, by, frames = QUANTITIES[name], self.library, (frame,)
         if self.cannot(None, by) is not None:
-            return lambda *given: None
-        for kernel in CHECKS:  # Numba is imported already
+            return lambda *arguments: None
+        for kernel in CHECKS:
             preload.kernel(kernel, preload.LOADING, KERNELS)
 
-        def compute_and_check(*given: Any) -> FloatArray | None:
-            result = compute(*given)
+        def compute_and_check(*arguments: Any) -> FloatArray | None:
+            result = compute(*arguments)
             if result is None:
                 return None
-            rows = tuple(x[np.newaxis] for x in given[:-1])
+            rows = tuple(x[np.newaxis] for x in arguments[:-1])
             query = QueryBatch(frames, rows, reference)
             x = Part(plan, reference, rows[0], rows[1:], STILL_STATE, query)
             ours = result[np.newaxis, np.newaxis]
             theirs, bound = oracle_results_with_bound(quantity, self.oracle(None, by), x, ours, by)
             comparison = compare(ours, theirs, bound, 2)
             if comparison.agrees:
-                warn_of_degrees(self.tree, given[0])
+                warn_of_degrees(self.tree, arguments[0])
                 self.ledger.checked(name, comparison)
-            else:  # this check raises the error
-                call = Call(self.tree, lambda _: plan, frame, reference, None, given[:-1])
+            else:  # `check` raises the error
+                call = Call(self.tree, lambda _: plan, frame, reference, None, arguments[:-1])
                 self.check(quantity, call, result, True)
             return result
 
@@ -273,7 +274,7 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
-        """Compare some of urdfkin's results with the oracle's; also return an error beyond the bound."""
+        """Compare the results of some configurations with the oracle's; also return the error, if any."""
         x = call.part(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
@@ -297,13 +298,13 @@ class Verifier:
             ours=ours[i, f],
             theirs=theirs[i, f],
             bound=EPS * bound.k * bound.scale,
-            units=float(bounds.disagreement(ours[i, f], theirs[i, f], bound).max()),
+            units=float(disagreement(ours[i, f], theirs[i, f], bound.scale).max()),
             reproduce=self._replay(quantity, call, k, call.frames[f]),
             oracle=self.library.title,
         )
 
     def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
-        """Return a shell command, or else a line of Python, that computes sample `k` again."""
+        """Return a shell command, or a line of Python, that computes sample `k` again."""
         inputs = (call.q, *call.rates)
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
         reference = call.reference.name.lower() if quantity.referred else None
@@ -321,7 +322,8 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table; return None, with a warning, if Pinocchio cannot check the robot.
 
-        Warn if very large lengths in the table cause rounding errors above the usual bound.
+        A warning also reports that very large lengths in the table cause rounding errors above the usual
+        bound.
 
         Raises:
             TableError: urdfkin and Pinocchio differ by more than the bound.
@@ -346,7 +348,7 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Return a line about the agreement of all links, computed from tree parameters, with Pinocchio.
+        """Compare the placements of all links from tree parameters with Pinocchio's; return a line of text.
 
         The result is None, with a warning, if Pinocchio cannot check the robot.
 
@@ -387,26 +389,25 @@ def comparison_with_oracle(
 ) -> BatchComparison:
     """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
 
-    Large results are compared in blocks, while the oracle's results are still in the cache. OracleError is
-    raised if an oracle does not return a result for each configuration.
+    Large results are compared in blocks, while the oracle's results are still in the processor's cache.
     """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
-        _demand_all(quantity, by, len(theirs), len(ours))
+        _check_count(quantity, by, len(theirs), len(ours))
         return compare(ours, theirs, bound, 2)
     bound, units, first = bound_of(quantity, x, by), np.empty(ours.shape[:2]), 0
-    with _not_finite_is_known():
+    with _not_finite_is_reported():
         for theirs in oracle_blocks(quantity, oracle, x.query):
             part = slice(first, first + len(theirs))
             if part.stop > len(ours):
-                _demand_all(quantity, by, part.stop, len(ours))
+                _check_count(quantity, by, part.stop, len(ours))
             scale = bound.scale if len(bound.scale) == 1 else bound.scale[part]
             units[part], first = worst_of_each(ours[part], theirs, scale, 2), part.stop
-    _demand_all(quantity, by, first, len(ours))
+    _check_count(quantity, by, first, len(ours))
     return comparison_of(units, bound)
 
 
-def _demand_all(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) -> None:
+def _check_count(quantity: Quantity, by: OracleLibrary, found: int, wanted: int) -> None:
     if found != wanted:
         raise OracleError(
             f"{by.title} does not return the {quantity.name} of each configuration",
@@ -424,41 +425,40 @@ def oracle_results_with_bound(
 
 
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
-    """Return the bound on the difference between urdfkin's results and the oracle's; it can be broadcast.
+    """Return the bound on the difference between urdfkin's results and the oracle's, for broadcasting.
 
-    If a path contains no prismatic joint, its length is the same in every configuration. Therefore, the bound
-    on a placement or a Jacobian of a robot on a fixed base is computed only once, for one configuration.
+    The length of a path without prismatic joints is the same in every configuration. The bound of a placement
+    or a Jacobian on a fixed base is then computed for one configuration, stored, and used for all.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
     key = "bound", quantity.name, x.reference, by.name
-    bound: Bound | None = x.plan.made.get(key) if constant else None
+    bound: Bound | None = x.plan.cache.get(key) if constant else None
     if bound is None:
         q = x.q[:1] if constant else x.q
         bound = quantity.bound(x.plan, by.size(magnitudes(x.plan, q, v, a, x.state)), x.reference)
         if constant:
-            x.plan.made[key] = bound
+            x.plan.cache[key] = bound
     return bound
 
 
 def own_results(quantity: Quantity, x: Part) -> FloatArray:
-    """Return urdfkin's results (n, frames, ...), which the forward recursion computes."""
+    """Return the results (n, frames, ...) of urdfkin's forward recursion."""
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
-def _not_finite_is_known() -> np.errstate:
-    """Suppress NumPy's warnings about inf and NaN, because the comparison reports these values."""
-    return np.errstate(over="ignore", under="ignore", invalid="ignore")
+#: Suppresses NumPy's warnings about inf and NaN, because the comparison reports these values.
+_not_finite_is_reported = partial(np.errstate, over="ignore", under="ignore", invalid="ignore")
 
 
-@_not_finite_is_known()
+@_not_finite_is_reported()
 def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
-    """Return an oracle's results (n, frames, ...) for the user's arguments."""
+    """Return an oracle's results (n, frames, ...)."""
     return quantity.ask(oracle, query)
 
 
 def oracle_blocks(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> Iterator[FloatArray]:
-    """Yield an oracle's results in blocks of configurations; the next block may overwrite a block."""
+    """Yield an oracle's results in blocks of configurations; each block may overwrite the previous block."""
     assert quantity.blocks is not None
     return quantity.blocks(oracle, query)
 
@@ -479,10 +479,10 @@ def checked_choice(verify: object) -> Verify:
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
-    A sample is random with a fixed seed. Every k-th configuration could be a biased sample, because batches
-    are often ordered.
+    A sample is random with a fixed seed, because every k-th configuration of an ordered batch could be
+    biased.
     """
-    step = min(_MOST, max(1, _AT_A_TIME // max(1, numbers)))
+    step = min(_MOST, max(1, _PART_SIZE // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:
         drawn = np.sort(np.random.default_rng(0).choice(n, SAMPLE, replace=False))
         yield from (drawn[i : i + step] for i in range(0, SAMPLE, step))

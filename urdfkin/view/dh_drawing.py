@@ -1,8 +1,8 @@
 """Draw a chain with its Denavit-Hartenberg frames, joint axes and common normals, as SVG.
 
-This needs the extra `urdfkin[plots]`. The picture is an orthographic view. Joint axes are dashed lines along
-z. Offsets d are grey and lie on the joint axes. Lengths a are orange and lie on the common normals. Each
-frame shows its x and z axes. Arrows that end at the same point share a label.
+The picture is an orthographic view. Joint axes are dashed lines along z. Offsets d are grey and lie on the
+joint axes. Lengths a are orange and lie on the common normals. Each frame shows its x and z axes. Arrows that
+end at the same point share a label. The module needs the extra `urdfkin[plots]`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, styl
 
 _X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#222222"
 
-#: The view has an elevation above the base's x-y plane and an azimuth about its z axis, in degrees.
-_ELEVATION, _AZIMUTH = 20.0, -55.0
+#: Direction of view (rad): elevation above the base's x-y plane, and azimuth about the base's z axis
+_ELEVATION, _AZIMUTH = math.radians(20.0), math.radians(-55.0)
 
 
 def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
@@ -43,10 +43,9 @@ def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) ->
         points = np.concatenate(
             [frames[:, :3, 3], row_corners(table, frames), tip[None, :3, 3], np.zeros((1, 3))]
         )
-        projection = _view(math.radians(_ELEVATION), math.radians(_AZIMUTH))
-        canvas = _Canvas(axes, projection, max(float(np.ptp(points, axis=0).max()), 1e-3))
+        canvas = _Canvas(axes, _projection(), max(float(np.ptp(points, axis=0).max()), 1e-3))
         _draw(canvas, table, frames, tip)
-        canvas.write_labels()
+        canvas.draw_labels()
         axes.set_aspect("equal")
         axes.set_axis_off()
         title = label(f"{table.robot}: {table.base_frame} to {table.tip_frame}")
@@ -56,15 +55,15 @@ def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) ->
     return out.getvalue()
 
 
-def _view(elevation: float, azimuth: float) -> FloatArray:
+def _projection() -> FloatArray:
     """Return (2, 3): the right and up directions of the picture in the base's axes."""
-    ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
+    ca, sa, ce, se = math.cos(_AZIMUTH), math.sin(_AZIMUTH), math.cos(_ELEVATION), math.sin(_ELEVATION)
     return np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce]])
 
 
 @dataclass
 class _Canvas:
-    """A two-dimensional drawing of points in space; its labels are drawn last.
+    """A two-dimensional drawing of points in space; the labels are drawn last.
 
     Attributes:
         projection: (2, 3) right and up directions of the picture in the base's axes.
@@ -82,53 +81,45 @@ class _Canvas:
         self.axes.plot([x, u], [y, v], solid_capstyle="round", **style)
 
     def arrow(self, start: FloatArray, along: FloatArray, color: str, name: str) -> None:
-        """Draw an arrow with its label beyond the tip; an arrow towards the viewer appears as a dot."""
+        """Draw an arrow, with a label beyond its tip; an arrow towards the viewer appears as a dot."""
         a, b = self.projection @ start, self.projection @ (start + along)
-        self.axes.annotate(
-            "",
-            xy=b,
-            xytext=a,
-            zorder=4,
-            arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.5, "shrinkA": 0, "shrinkB": 0},
-        )
+        look = {"arrowstyle": "-|>", "color": color, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
+        self.axes.annotate("", xy=b, xytext=a, zorder=4, arrowprops=look)
         self.label(start + 1.25 * along, along, name, color)
 
     def mark(self, point: FloatArray, **style: Any) -> None:
         self.axes.plot(*(self.projection @ point)[:, None], zorder=5, **style)
 
     def label(self, point: FloatArray, along: FloatArray, text: str, color: str) -> None:
-        """Store a label for a point. `write_labels` draws the stored labels."""
+        """Store a label for a point; `draw_labels` draws the stored labels."""
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
-    def write_labels(self) -> None:
-        """Draw the labels without overlaps.
-
-        Two labels of the same colour at the same point become one label.
-        """
+    def draw_labels(self) -> None:
+        """Draw the labels without overlaps; two labels of the same colour at the same point become one."""
         merged: list[tuple[FloatArray, FloatArray, list[str], str]] = []
-        for place, along, text, color in self.labels:
+        for point, along, text, color in self.labels:
             for other, _, texts, other_color in merged:
-                if color == other_color and np.linalg.norm(place - other) < 0.025 * self.size:
+                if color == other_color and np.linalg.norm(point - other) < 0.025 * self.size:
                     texts.append(text)
                     break
             else:
-                merged.append((place, along, [text], color))
-        taken: list[FloatArray] = []
-        for place, along, texts, color in merged:
-            spot, side = place.copy(), np.array([-along[1], along[0]])
+                merged.append((point, along, [text], color))
+        occupied: list[FloatArray] = []
+        for point, along, texts, color in merged:
+            position, side = point.copy(), np.array([-along[1], along[0]])
             side *= 0.045 * self.size / max(float(np.linalg.norm(side)), 1e-12)
             for step in (1.0, -2.0, 3.0, -4.0):
-                if all(np.linalg.norm(spot - other) > 0.04 * self.size for other in taken):
+                if all(np.linalg.norm(position - other) > 0.04 * self.size for other in occupied):
                     break
-                spot = spot + step * side
-            taken.append(spot)
-            words = {"color": color, "ha": "center", "va": "center", "zorder": 6}
-            # These texts are urdfkin's own, so they need no escaping.
-            self.axes.text(*spot, ", ".join(texts), parse_math=color in (_X, _Z), **words)
+                position = position + step * side
+            occupied.append(position)
+            look = {"color": color, "ha": "center", "va": "center", "zorder": 6}
+            # Only the labels of x and z axes contain mathematics; names from a file are plain text.
+            self.axes.text(*position, ", ".join(texts), parse_math=color in (_X, _Z), **look)
 
 
 def row_corners(table: DHTable, frames: FloatArray) -> FloatArray:
-    """Return for each row of the table the point (n, 3) between the offset d and the length a."""
+    """Return for each row of the table the point (n, 3) where the offset d and the length a meet."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
         # In the standard convention, the offset d comes before the length a.

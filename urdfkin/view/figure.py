@@ -1,4 +1,4 @@
-"""Figures with matplotlib (the extra `urdfkin[plots]`), without a display, as files or inline SVG.
+"""Make figures with matplotlib (the extra `urdfkin[plots]`), without a display, as files or inline SVG.
 
 Inline SVG uses the colours of the page's style, so one drawing fits light pages, dark pages and print.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: The colours of the page's style replace placeholder colours in a drawing.
+#: Placeholder colours of a drawing, and the colours of the page's style that replace them
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",
@@ -37,19 +37,18 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours are distinguishable with every colour vision deficiency.
-#: Lines with different colours also differ in line style, sign or position.
+#: Okabe and Ito's colours, which are distinguishable with every colour vision deficiency
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: A number with this colour is wrong or outside its limits; a cross also marks such a number.
+#: Colour of a cross at a number that is wrong or outside its limits
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "urdfkin",
     "font.family": "DejaVu Sans",
-    # A name is plain text, without mathematics and TeX, for all settings of the user.
+    # A name is plain text, even if the user's settings allow mathematics and TeX.
     "text.parse_math": False,
     "text.usetex": False,
     "axes.spines.top": False,
@@ -58,10 +57,7 @@ _STYLE: dict[Any, Any] = {
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure (size in inches) without a window and without global state.
-
-    Raise InputError if matplotlib is not installed.
-    """
+    """Return an empty figure (size in inches) without a window; raise InputError without matplotlib."""
     _matplotlib()
     from matplotlib.figure import Figure
 
@@ -69,7 +65,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """Return a matplotlib context in which SVG has text as text, and equal drawings give equal files."""
+    """Return a context in which matplotlib writes text as text, and equal drawings as equal files."""
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 
@@ -92,49 +88,48 @@ def _matplotlib() -> Any:
 
 
 def save(figure: Figure, path: Path) -> bytes:
-    """Return the figure as the bytes of a file; the same input gives the same bytes.
+    """Return the figure as the bytes of a file, in the format of the suffix of `path`.
 
-    The suffix of `path` selects the format. Raise InputError for a suffix other than svg, png, pdf.
+    The same figure gives the same bytes. Raise InputError for a suffix other than svg, png or pdf.
     """
-    ending = path.suffix.removeprefix(".").lower()
-    if ending not in FORMATS:
+    format_ = path.suffix.removeprefix(".").lower()
+    if format_ not in FORMATS:
         raise InputError(
             "unknown picture format", where=str(path), remedy=f"use the suffix {', '.join(FORMATS)}"
         )
     stream = io.BytesIO()
-    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[format_]
     with style():
-        figure.savefig(stream, format=ending, metadata=metadata, dpi=160)
+        figure.savefig(stream, format=format_, metadata=metadata, dpi=160)
     return stream.getvalue()
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
     """Return the figure, drawn with `PAGE_COLOURS`, as an SVG element of a page.
 
-    The prefix makes ids unique on a page with several figures. The plain texts `title` and `description` are
-    for screen readers.
+    `prefix` makes ids unique on a page with several figures. Screen readers read `title` and `description`.
     """
     stream = io.StringIO()
-    nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    no_metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with style():
-        figure.savefig(stream, format="svg", metadata=nothing, transparent=True)
+        figure.savefig(stream, format="svg", metadata=no_metadata, transparent=True)
     text = stream.getvalue()
     # A style element would affect the whole page.
     text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = _with_ids(text, prefix)
-    for colour, page in PAGE_COLOURS.items():
-        text = text.replace(colour, page)
+    for placeholder, colour in PAGE_COLOURS.items():
+        text = text.replace(placeholder, colour)
     text = re.sub(r"font: (\d[\d.]*)px 'DejaVu Sans'[^;\"]*", r"font-size: \1px", text)
     text = re.sub(r"<!--.*?-->|\n\s*", lambda found: "\n" if found[0][0] == "\n" else "", text)
     head, _, body = text.partition(">")
     size = re.search(r'viewBox="[^"]*"', head)
-    words = (escape(printable(text), quote=False) for text in (title, description))
-    labels = "<title>{}</title><desc>{}</desc>".format(*words)
+    title, description = (escape(printable(words), quote=False) for words in (title, description))
+    labels = f"<title>{title}</title><desc>{description}</desc>"
     return f'<svg class="plot" {size[0] if size else ""} role="img">{labels}{body}'
 
 
 def _with_ids(text: str, prefix: str) -> str:
-    """Remove unused ids from an SVG text, and add the prefix to all other ids."""
+    """Remove unused ids from an SVG text, and add the prefix to each used id."""
     used = set(re.findall(r"url\(#([^)]+)\)", text)) | set(re.findall(r'href="#([^"]+)"', text))
     text = re.sub(
         r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", text

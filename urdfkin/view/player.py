@@ -1,7 +1,6 @@
-"""Play a trajectory in the viewer, and save pictures and motions.
+"""Play a trajectory in the viewer, and save pictures (PNG) and motions (GIF).
 
-The viewer interpolates nothing, so the screen only shows numbers that Pinocchio has checked. A saved motion
-is a GIF: it plays in browsers, slides and chats without a further program.
+The viewer does not interpolate between samples, so it only shows numbers that Pinocchio has checked.
 """
 
 from __future__ import annotations
@@ -21,12 +20,15 @@ from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-#: While playing, the viewer makes at most this number of updates per second.
-#: A saved motion has this frame rate (1/s), this largest number of frames, and this size in pixels.
-_RATE, _FRAME_RATE, _MOST_FRAMES, _SIZE = 20.0, 12.5, 250, (640, 480)
+#: Maximum number of updates per second while the viewer plays
+_UPDATE_RATE = 20.0
+#: Frames per second, maximum number of frames, and size in pixels of a saved motion
+_FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
 
 
 class Screen(Protocol):
+    """The part of a `Viewer` that a `Player` uses; importing `Viewer` would make an import cycle."""
+
     server: Any
     robot: Robot
     frame: Any
@@ -39,14 +41,11 @@ class Screen(Protocol):
 
 
 class Player:
-    """The controls of a trajectory: time, play and pause, speed, and the file of the motion.
-
-    The attribute `sample` is the index of the sample that the viewer shows.
-    """
+    """The controls of a trajectory; `sample` is the index of the sample that the viewer shows."""
 
     def __init__(self, viewer: Screen, trajectory: Trajectory) -> None:
         self._viewer, self.trajectory, self.sample = viewer, trajectory, 0
-        self._playing, self._setting = threading.Event(), False
+        self._playing, self._is_setting = threading.Event(), False
         gui, t = viewer.server.gui, trajectory.t
         with gui.add_folder("Trajectory"):
             self.time = gui.add_slider(
@@ -58,7 +57,7 @@ class Player:
             self.speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1")
             self.words = gui.add_markdown("")
             save = gui.add_button("save the motion (GIF)")
-        self.time.on_update(lambda _: self._moved())
+        self.time.on_update(lambda _: self._show_slider_time())
         self.button.on_click(lambda _: self.pause() if self._playing.is_set() else self.play())
         save.on_click(lambda event: self._save(event.client))
 
@@ -66,34 +65,34 @@ class Player:
         viewer, x = self._viewer, self.trajectory
         motion = frame_motion(viewer.robot, x, viewer.frame.value, viewer.reference.value)
         mark = "! " if motion.not_verified is not None else "✓ " if motion.agrees else "✗ "
-        self._whole = mark + foot(motion, x)
+        self._check_line = mark + foot(motion, x)
         self._write()
 
     def show(self, sample: int) -> None:
         self.sample, x = sample, self.trajectory
-        self._setting = True
+        self._is_setting = True
         try:
             self.time.value = float(x.t[sample])
         finally:
-            self._setting = False
+            self._is_setting = False
         self._viewer.set_state(x.q[sample], x.v[sample], x.a[sample])
         self._write()
 
     def _write(self) -> None:
         x = self.trajectory
-        now = f"sample {self.sample + 1} of {len(x.t)}, t = {x.t[self.sample]:.4g} s"
-        self.words.content = f"**{now}**\n\n{markdown_text(self._whole)}"
+        sample = f"sample {self.sample + 1} of {len(x.t)}, t = {x.t[self.sample]:.4g} s"
+        self.words.content = f"**{sample}**\n\n{markdown_text(self._check_line)}"
 
     def _nearest(self, seconds: float) -> int:
         return int(np.abs(self.trajectory.t - seconds).argmin())
 
-    def _moved(self) -> None:
-        if not self._setting:
+    def _show_slider_time(self) -> None:
+        if not self._is_setting:
             self.pause()
             self.show(self._nearest(float(self.time.value)))
 
     def play(self) -> None:
-        """Play from the current sample to the end, or from the start if the end is shown."""
+        """Play to the end, from the shown sample or, if this is the last one, from the first."""
         if not self._playing.is_set():
             self._playing.set()
             self.button.label = "pause"
@@ -112,15 +111,15 @@ class Player:
             if now >= t[-1]:
                 self.pause()
                 return
-            time.sleep(max(0.0, 1.0 / _RATE - (time.perf_counter() - last)))
-            this = time.perf_counter()
-            now, last = min(float(t[-1]), now + (this - last) * float(self.speed.value)), this
+            time.sleep(max(0.0, 1.0 / _UPDATE_RATE - (time.perf_counter() - last)))
+            before, last = last, time.perf_counter()
+            now = min(float(t[-1]), now + (last - before) * float(self.speed.value))
 
     def _save(self, client: Any) -> None:
         if client is None:
             return
         self.pause()
-        kept, t, speed = self.sample, self.trajectory.t, float(self.speed.value)
+        shown, t, speed = self.sample, self.trajectory.t, float(self.speed.value)
         seconds = float(t[-1] - t[0]) / speed
         count = int(np.clip(round(seconds * _FRAME_RATE), 1, _MOST_FRAMES)) + 1
         note = client.add_notification("Saving the motion", f"0 of {count} pictures", loading=True)
@@ -134,7 +133,7 @@ class Player:
             return
         finally:
             note.remove()
-            self.show(kept)
+            self.show(shown)
         name = f"{self._viewer.file_name}.gif"
         client.send_file_download(name, as_gif(frames, seconds / (count - 1)), save_immediately=True)
 
@@ -142,7 +141,8 @@ class Player:
 def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
     """Return the browser's picture of the robot.
 
-    A busy browser may draw the previous pose again. If the picture equals the last one, ask up to five times.
+    A busy browser may draw the previous pose again, so a picture that equals the last one is requested again,
+    up to four times.
     """
     for _ in range(5):
         picture: np.ndarray = client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0)
@@ -152,12 +152,12 @@ def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
 
 
 def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
-    """Return an endless animation of frames (height, width, 3 or 4), each shown for some seconds."""
+    """Return an endless animation of frames (height, width, 3 or 4), each shown for `seconds`."""
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
     # A GIF counts in hundredths of a second, and browsers slow down pictures of 1/100 s.
-    shown = max(20, 10 * round(100 * seconds))
-    images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=shown, loop=0)
+    milliseconds = max(20, 10 * round(100 * seconds))
+    images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=milliseconds, loop=0)
     return stream.getvalue()
 
 

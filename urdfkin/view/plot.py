@@ -1,7 +1,4 @@
-"""Plot a frame's motion along a trajectory (the extra `urdfkin[plots]`).
-
-The figure has the requested panels, each over time, and a footer with the result of the check.
-"""
+"""Plot a frame's motion along a trajectory, with the result of the check (the extra `urdfkin[plots]`)."""
 
 from __future__ import annotations
 
@@ -29,16 +26,18 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: A panel draws a motion over time, in seconds, into axes.
+#: Function that draws a motion over time, in seconds, into axes
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles distinguish lines without colours.
+#: Line styles, by which lines differ even without colours
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: A legend has at most this number of names. Lines without a name have one colour.
-_MOST_NAMES, _UNNAMED = 14, "#9AA7B5"
+#: Maximum number of names in a legend
+_MOST_NAMES = 14
+#: Colour of lines without a name
+_UNNAMED = "#9AA7B5"
 
 
 def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
@@ -47,7 +46,7 @@ def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) ->
 
 
 def _look(k: int) -> dict[str, Any]:
-    """Return the colour and the dashes of line k; the first 49 lines have different combinations."""
+    """Return the colour and the dashes of line k; they differ for the first 49 lines."""
     return {"color": COLOURS[k % 7], "linestyle": STYLES[(k + 2 * (k // 7)) % 7]}
 
 
@@ -60,13 +59,13 @@ def _xyz(vector: Callable[[FrameMotion], FloatArray], label: str) -> Panel:
 
 
 def _rotation(x: FrameMotion) -> FloatArray:
-    """Return the frame's rotation since the start as a rotation vector (n, 3) in world axes, in rad."""
+    """Return the frame's rotation since the first sample: rotation vectors (n, 3) in world axes, in rad."""
     R = x.placement[:, :3, :3]
     return log_rotation(R @ R[0].T)
 
 
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the magnitude of each part of the linear acceleration and of their sum, m/s^2."""
+    """Draw the magnitudes of the linear acceleration and of each of its parts, m/s^2."""
     sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
     used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
@@ -76,10 +75,7 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw the singular values of the Jacobian's linear rows or of its angular rows.
-
-    The two kinds of rows have different units, so they are not combined.
-    """
+    """Draw the singular values of the linear or the angular rows of the Jacobian, which differ in units."""
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
@@ -87,7 +83,7 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # fewer than two powers of ten
+    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # too narrow for ticks at powers of ten
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylabel(f"singular values\n[{unit}] at |v| = 1")
@@ -101,9 +97,9 @@ def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit:
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the difference from Pinocchio at the same q, v and a, in eps * scale.
+    """Draw the difference from Pinocchio at the same q, v and a, in eps * scale, and its bound (thin line).
 
-    Thin lines are the bounds. A cross marks a sample outside its bound.
+    A cross marks a sample outside its bound.
     """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.not_verified is not None:
@@ -115,14 +111,14 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         outside = check.share > 1.0
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
-    # Bounds are about a hundred times the usual disagreement, so the axis is logarithmic.
-    # Below 1, which is the size of one rounding error, the axis is linear.
+    # The axis is logarithmic, because bounds are about a hundred times the usual disagreement.
+    # Below 1, the size of one rounding error, the axis is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
 
 
-#: All panels by name, in the order of the figure.
+#: Panels of the frame by name, in the order of the figure
 PANELS: dict[str, Panel] = {
     "position": _xyz(lambda x: x.placement[:, :3, 3], "position [m]"),
     "orientation": _xyz(_rotation, "rotation [rad]"),
@@ -138,9 +134,9 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: The unit of q, v or a has this text after "rad" or "m".
+#: For q, v and a: the part of the unit after "rad" or "m"
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: Names of the panels of coordinates. Each panel has one plot for each unit.
+#: Names of the panels of coordinates; each panel has one plot for each unit
 COORDINATES = tuple(_PER)
 
 
@@ -164,10 +160,10 @@ def _coordinates(
     x: FrameMotion,
     t: FloatArray,
 ) -> None:
-    """Draw the coordinates that change. If no coordinate changes, draw all of them.
+    """Draw the coordinates that change, or all if none changes, and their limits (thin lines).
 
-    Thin lines are the limits. A cross marks a sample outside its limits. If there are too many lines for a
-    legend, only lines outside their limits are coloured and named.
+    A cross marks a sample outside its limits. If a legend has no space for all names, only coordinates that
+    leave their limits have a colour and a name.
     """
     del x
     values: FloatArray = getattr(trajectory, what)
@@ -199,7 +195,7 @@ def _coordinates(
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
     """Return whether each sample is outside the limits by more than one unit in the last place of a double.
 
-    A smaller deviation may come from the decimal notation of the limits.
+    One unit in the last place is the rounding error of a limit that is written in decimal notation.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -212,29 +208,29 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
     return -largest, largest
 
 
-#: A figure (inches) fits on a page of A4 or US Letter with a margin.
+#: Maximum size of a figure (inches), which fits on a page of A4 or US Letter with a margin
 _PAGE = (7.6, 10.4)
-#: A panel, and the title with the footer, have these heights in inches.
-_HEIGHT, _WORDS = 2.1, 0.9
-#: One inch has this number of letters in the footer and in a legend.
-#: The sample line in a legend is as wide as `_HANDLE` letters.
-_LETTERS, _LETTERS_OF_LEGEND, _HANDLE = 16, 22, 8
-#: The footer has this sentence if v and a may not be the exact derivatives of q.
+#: Height of a panel, and height of the title and the footer together, in inches
+_PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
+#: Number of letters in one inch of the footer, and in one inch of a legend
+_LETTERS, _LETTERS_OF_LEGEND = 16, 22
+#: Width of the sample line in a legend, in letters
+_HANDLE = 8
+#: Sentence of the footer if v and a may not be the exact derivatives of q
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )
 
 
 def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
-    """Return a figure with the panels in two columns.
+    """Return a figure with panels from `COORDINATES` and `PANELS`; without `panels`, with all of them.
 
-    The names `panels` are from `COORDINATES` and `PANELS`; empty means all. Raise UnknownNameError for an
-    unknown panel, and InputError without matplotlib.
+    Raise UnknownNameError for an unknown panel, and InputError without matplotlib.
     """
     drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)
-    height = max(2.0 * _HEIGHT, _HEIGHT * rows) + _WORDS
+    height = _PANEL_HEIGHT * max(2, rows) + _TEXT_HEIGHT
     width, small = _PAGE[0], 6 if columns == 3 else 7
     with style(font_size=small + 1, axes_ymargin=0.08, lines_linewidth=1.2):
         figure = new_figure(width, min(height, _PAGE[1]))
@@ -259,9 +255,8 @@ def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence
             axes.tick_params(labelbottom=True)
         for axes in grid[-1]:
             axes.set_xlabel("time [s]")
-        figure.suptitle(
-            f"{label(f'{robot.name}: {x.frame}, {x.reference.name}')}\n{way(x, trajectory)}", fontsize=10
-        )
+        title = label(f"{robot.name}: {x.frame}, {x.reference.name}")
+        figure.suptitle(f"{title}\n{_ends(x, trajectory)}", fontsize=10)
         words = textwrap.wrap(label(foot(x, trajectory)), width=int(_LETTERS * width))
         figure.supxlabel("\n".join(words), fontsize=7, color="#444444")
     return figure
@@ -279,22 +274,20 @@ def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[
     return found
 
 
-def way(x: FrameMotion, trajectory: Trajectory) -> str:
-    ends = [
-        "({})".format(", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0)) for k in (0, -1)
-    ]
-    return f"from {ends[0]} to {ends[1]} m in {trajectory.t[-1] - trajectory.t[0]:.4g} s"
+def _ends(x: FrameMotion, trajectory: Trajectory) -> str:
+    start, end = (", ".join(f"{p:.3g}" for p in x.placement[k, :3, 3].round(9) + 0.0) for k in (0, -1))
+    return f"from ({start}) to ({end}) m in {trajectory.t[-1] - trajectory.t[0]:.4g} s"
 
 
 def foot(x: FrameMotion, trajectory: Trajectory) -> str:
-    """Return a line of text with the result of the check and with the values that were not checked."""
+    """Return one line: the result of the check, and how v and a were computed."""
     rates = f"rates {trajectory.rates}" + (", exactly" if trajectory.exact else f"; {_RATES_UNCHECKED}")
     if x.not_verified is not None:
         return f"NOT VERIFIED by Pinocchio {version()}: {x.not_verified}; {rates}"
     worst = max(float(np.max(check.units, initial=0.0)) for check in x.checks.values())
     share = max(float(np.max(check.share, initial=0.0)) for check in x.checks.values())
-    word = "verified by" if x.agrees else "DISAGREES with"
+    verdict = "verified by" if x.agrees else "DISAGREES with"
     return (
-        f"{len(trajectory.t)} samples, {word} Pinocchio {version()}: worst disagreement {worst:.2g} eps*scale"
-        f" ({share:.1%} of the bound); {rates}"
+        f"{len(trajectory.t)} samples, {verdict} Pinocchio {version()}: worst disagreement {worst:.2g}"
+        f" eps*scale ({share:.1%} of the bound); {rates}"
     )

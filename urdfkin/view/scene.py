@@ -1,7 +1,4 @@
-"""Read the visual shapes of a URDF's links, and load mesh files with trimesh.
-
-Only the viewer uses this module; kinematics needs no shapes.
-"""
+"""Read the visual shapes of a URDF's links for the viewer, and load mesh files with trimesh."""
 
 from __future__ import annotations
 
@@ -25,7 +22,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: A mesh, material or texture file with more bytes is not shown.
+#: Maximum size (bytes) of a mesh, material or texture file; larger files are not shown
 LARGEST_FILE = 200_000_000
 
 
@@ -34,7 +31,7 @@ def _read(file: Path) -> Any:
     import trimesh
 
     class SameFolder(trimesh.resolvers.FilePathResolver):
-        """Find materials and textures: only regular files in the mesh's folder or below it."""
+        """Finds materials and textures: only regular files in the mesh's folder or below it."""
 
         def get(self, name: str) -> bytes:
             folder = Path(self.parent).resolve()
@@ -49,7 +46,7 @@ def _read(file: Path) -> Any:
 
 
 def mesh(shape: Shape) -> Any | None:
-    """Return a coloured trimesh.Trimesh in the link's axes; None if the file is unreadable."""
+    """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's axes; None if unreadable."""
     import trimesh
 
     if shape.file is None:
@@ -69,7 +66,7 @@ def mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return the corners (8, 3) of a box around a shape, in the link's frame; a mesh must be readable."""
+    """Return the corners (8, 3) of a box around a shape, in the link's frame. A mesh must be readable."""
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
         lower, upper = mesh(shape).bounds  # type: ignore[union-attr]
@@ -81,7 +78,7 @@ def corners(shape: Shape) -> FloatArray:
     return np.asarray(signs * half @ shape.T_link_shape[:3, :3].T + shape.T_link_shape[:3, 3])
 
 
-#: Default colour of a shape: a metallic grey.
+#: Default colour of a shape
 GREY = (0.72, 0.74, 0.78, 1.0)
 
 
@@ -112,11 +109,8 @@ class Shape:
 
 
 def shapes(robot: Robot) -> list[Shape]:
-    """Return all visuals of a robot, except malformed ones.
-
-    The URDF of a loaded robot is already checked, so the plain XML parser is safe.
-    """
-    root = plain_xml(robot.urdf)
+    """Return all visuals of a robot, except malformed ones."""
+    root = plain_xml(robot.urdf)  # the URDF of a loaded robot is already checked
     urdf_file = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
     found = []
@@ -129,7 +123,7 @@ def shapes(robot: Robot) -> list[Shape]:
 
 
 def _file_of(robot: Robot) -> Path | None:
-    """Return the file of a robot, in whose folder meshes are searched, or None."""
+    """Return the file of a robot, beside which meshes are searched; None for a robot without a file."""
     entry = catalogue().get(robot.source)
     path = entry.path if entry is not None else Path(robot.source)
     try:
@@ -193,7 +187,7 @@ def _rgba(material: Element) -> tuple[float, float, float, float] | None:
 
 
 def mesh_file(address: str, urdf_file: Path | None) -> Path | None:
-    """Return the file of a `package://` or `file://` address, or of a path relative to the URDF, or None."""
+    """Return the file of a mesh's address in a URDF, or None; a path is relative to the URDF."""
     candidates = list(_candidates(address, urdf_file))
     try:
         return next((path for path in candidates if path.is_file()), None)

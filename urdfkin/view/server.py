@@ -55,7 +55,7 @@ def has_screen() -> bool:
 
 @contextmanager
 def opened_page(address: str) -> Iterator[None]:
-    """Open the address in the user's browser, by a temporary file that redirects to it."""
+    """Open the address in the user's browser, by a temporary file that redirects to the address."""
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # only this user can read the folder
         page = Path(folder) / "view.html"
         page.write_text(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">', "utf-8")
@@ -65,7 +65,7 @@ def opened_page(address: str) -> Iterator[None]:
 
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
-#: The headers of every response forbid caching, type guessing, embedding, and referrers with the key.
+#: Headers of every response: they forbid caching, type guessing, embedding, and referrers with the key
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -78,7 +78,7 @@ HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class RequestFilter:
-    """Accepts or refuses requests, without viser or a network.
+    """Accepts or refuses requests.
 
     Attributes:
         host: The address that the server listens on, as given by the user.
@@ -91,8 +91,8 @@ class RequestFilter:
     def refusal(self, path: str, hosts: list[str], origins: list[str], *, connects: bool) -> str | None:
         """Return the reason why a request is refused, or None if the request is allowed.
 
-        `hosts` and `origins` are all such headers. A request that opens a WebSocket (`connects`) needs an
-        Origin; a page request has none.
+        `hosts` and `origins` are the values of all Host and Origin headers. `connects` means that the request
+        opens a WebSocket, which needs an Origin; a request for the page has no Origin.
 
         Example:
             >>> requests = RequestFilter("127.0.0.1", "key")
@@ -114,7 +114,7 @@ class RequestFilter:
         """Return whether the Host header of a request names this machine: an IP address or an allowed name.
 
         An attacker can make a host name resolve to this machine. An IP address needs no name server, so it is
-        safe. The port in the header is not checked, because it differs if the port is forwarded.
+        safe. The port in the header is not checked, because a forwarded port differs.
         """
         found = _HOST.fullmatch(host)
         if found is None:
@@ -164,17 +164,16 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message that the server itself accepts from a page reports that a control has changed.
-#: Each connection handles the messages about its camera.
+#: The only message that the server accepts from a page: a control has changed
 _ACCEPTED = ("GuiUpdateMessage",)
-#: The first script of viser's page, and the script that it creates, get the nonce by these replacements.
+#: Replacements in viser's page that give the nonce to its script, and to the script that this script creates
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-#: urdfkin's script is added after this start of the page's head.
+#: Start of the page's head, after which urdfkin's script is added
 _HEAD = '<meta charset="utf-8" />'
-_swapping = lock_over_forks()
+_serve_lock = lock_over_forks()
 
 
 class UnguardedError(UrdfkinError, RuntimeError):
@@ -191,8 +190,9 @@ class UnguardedError(UrdfkinError, RuntimeError):
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
     """Start viser's server with the request filter; `server.address` is the address to open.
 
-    Raise InputError if viser is not installed, or `host` is not an address of this machine, and
-    UnguardedError if this version of viser cannot be secured.
+    Raises:
+        InputError: viser is not installed, or `host` is not an address of this machine.
+        UnguardedError: This version of viser cannot be secured.
     """
     try:
         import viser
@@ -203,18 +203,17 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
         address: str
 
         def request_share_url(self, verbose: bool = True) -> str | None:
-            """Return None: sharing would open a tunnel to a third party."""
             del verbose
-            return None
+            return None  # sharing would open a tunnel to a third party
 
     _require_address(host)
     requests = RequestFilter(host, secrets.token_urlsafe(16))
     # Viser prints its address without the key.
-    with _responding_with(_answer(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
+    with _filtered(_process_request(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
         server = PrivateServer(host=host, port=port, label="urdfkin", verbose=False)
     try:
-        _silence(server)
-        _test_the_filter(requests, server.get_port())
+        _remove_handlers(server)
+        _test_filter(requests, server.get_port())
     except BaseException:
         server.stop()
         raise
@@ -223,7 +222,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
 
 def _require_address(host: str) -> None:
-    """Reject an address that cannot be listened on; viser would search for a free port forever."""
+    """Raise InputError for an address that cannot be listened on; viser would search a port forever."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):
@@ -237,8 +236,8 @@ def _require_address(host: str) -> None:
 # -- the response ------------------------------------------------------------------------------------
 
 
-def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
-    """Return the callback with which the library websockets answers requests.
+def _process_request(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
+    """Return the callback `process_request` of the library websockets.
 
     The callback returns a response, or None to accept a WebSocket connection.
     """
@@ -246,10 +245,10 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
     from websockets.http11 import Response
 
     def response(status: http.HTTPStatus, kind: str, body: bytes, **more: str) -> Response:
-        length = {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body))}
-        return Response(status, status.phrase, Headers(HEADERS | length | more), body)
+        content = {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body))}
+        return Response(status, status.phrase, Headers(HEADERS | content | more), body)
 
-    def answer(_: Any, request: Any) -> Response | None:
+    def process_request(_: Any, request: Any) -> Response | None:
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         connects = bool(request.headers.get_all("Upgrade"))
         refusal = requests.refusal(request.path, hosts, origins, connects=connects)
@@ -261,11 +260,11 @@ def _answer(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[
         rules = {"Content-Security-Policy": policy(nonce, hosts[0])}
         return response(http.HTTPStatus.OK, "text/html", page(nonce), **rules)
 
-    return answer
+    return process_request
 
 
 def _page() -> Callable[[str], bytes]:
-    """Return a function that creates viser's page for a nonce, which is a random key of the page."""
+    """Return a function that makes viser's page for a nonce, which is a random key of the page."""
     import viser
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
@@ -273,88 +272,85 @@ def _page() -> Callable[[str], bytes]:
         text = file.read_text(encoding="utf-8")
     except OSError as error:
         raise UnguardedError("the page of viser is not at the expected path") from error
-    if text.count("<script") != 1 or any(text.count(plain) != 1 for plain, _ in _SCRIPTS):
+    if text.count("<script") != 1 or any(text.count(old) != 1 for old, _ in _SCRIPTS):
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # urdfkin's script runs before viser's script. It names the controls and follows the browser's theme.
-    ours = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
+    # urdfkin's style and script, which run before viser's
+    own = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:
-        marked = text.replace(_HEAD, _HEAD + ours.replace("{nonce}", nonce))
-        for plain, guarded in _SCRIPTS:
-            marked = marked.replace(plain, guarded.format(nonce=nonce))
-        return marked.encode()
+        html_ = text.replace(_HEAD, _HEAD + own.replace("{nonce}", nonce))
+        for old, new in _SCRIPTS:
+            html_ = html_.replace(old, new.format(nonce=nonce))
+        return html_.encode()
 
     return page
 
 
 @contextlib.contextmanager
-def _responding_with(answer: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """While the context is open, new servers call `answer` for each request, and log no refused request."""
+def _filtered(process_request: Callable[[Any, Any], Any]) -> Iterator[None]:
+    """While the context is open, new servers call `process_request`, and log no refused request."""
     from websockets.asyncio import server as module
 
-    plain: Any = module.serve
+    original: Any = module.serve
     logger = logging.Logger("urdfkin.view")
     logger.addHandler(logging.NullHandler())
 
     def serve(*words: Any, **options: Any) -> Any:
-        return plain(*words, **(options | {"process_request": answer, "logger": logger}))
+        return original(*words, **(options | {"process_request": process_request, "logger": logger}))
 
-    with _swapping:
+    with _serve_lock:
         setattr(module, "serve", serve)  # noqa: B010  mypy rejects a plain assignment
         try:
             yield
         finally:
-            setattr(module, "serve", plain)  # noqa: B010  mypy rejects a plain assignment
+            setattr(module, "serve", original)  # noqa: B010  mypy rejects a plain assignment
 
 
 # -- checks of the server -----------------------------------------------------------------------------
 
 
-def _silence(server: Any) -> None:
-    """Remove viser's handlers of client messages that are not needed: sharing, uploads, commands."""
+def _remove_handlers(server: Any) -> None:
+    """Remove viser's handlers of messages from a page, such as sharing, uploads and commands."""
     try:
-        known = server._websock_server
-        for message in list(known._incoming_handlers):
+        websocket_server = server._websock_server
+        for message in list(websocket_server._incoming_handlers):
             if message.__name__ not in _ACCEPTED:
-                known.unregister_handler(message)
-        left = {message.__name__ for message in known._incoming_handlers}
+                websocket_server.unregister_handler(message)
+        accepted = {message.__name__ for message in websocket_server._incoming_handlers}
     except (AttributeError, AssertionError) as error:
         raise UnguardedError("the message handlers of viser cannot be listed") from error
-    if left != set(_ACCEPTED):
-        raise UnguardedError(f"viser accepts the unexpected messages {', '.join(sorted(left)) or '(none)'}")
+    if accepted != set(_ACCEPTED):
+        names = ", ".join(sorted(accepted)) or "(none)"
+        raise UnguardedError(f"viser accepts the unexpected messages {names}")
 
 
-def _test_the_filter(requests: RequestFilter, port: int) -> None:
-    """Test the running server, or raise UnguardedError.
-
-    The server must return its own page and refuse four kinds of foreign requests.
-    """
+def _test_filter(requests: RequestFilter, port: int) -> None:
+    """Test that the running server returns its page and refuses foreign requests, or raise UnguardedError."""
     host = requests.address(port).split("/")[2]
-    socket_ = {
+    here, there = {"Host": host}, {"Host": "rebound.invalid"}
+    websocket = here | {
         "Upgrade": "websocket",
         "Connection": "Upgrade",
         "Sec-WebSocket-Version": "13",
         "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
     }
-    here, there = {"Host": host}, {"Host": "rebound.invalid"}
-    foreign, keyless = (here | socket_ | {"Origin": x} for x in ("http://x.invalid", f"http://{host}"))
     cases: tuple[tuple[str, str, dict[str, str], int], ...] = (
         ("its own page", f"/{requests.key}/", here, 200),
         ("a page without the key", "/", here, 403),
         ("a page under another name", f"/{requests.key}/", there, 403),
-        ("another page's connection", f"/{requests.key}", foreign, 403),
-        ("a connection without the key", "/", keyless, 403),
+        ("another page's connection", f"/{requests.key}", websocket | {"Origin": "http://x.invalid"}, 403),
+        ("a connection without the key", "/", websocket | {"Origin": f"http://{host}"}, 403),
     )
     for what, path, headers, expected in cases:
         connection = http.client.HTTPConnection(host, timeout=30)
         try:
             connection.request("GET", path, headers=headers)
-            answer = connection.getresponse()
-            guarded = answer.getheader("X-Frame-Options") == HEADERS["X-Frame-Options"]
-            if answer.status != expected or not guarded:
-                raise UnguardedError(f"{what} was answered with {answer.status}")
+            response = connection.getresponse()
+            has_headers = response.getheader("X-Frame-Options") == HEADERS["X-Frame-Options"]
+            if response.status != expected or not has_headers:
+                raise UnguardedError(f"{what} was answered with {response.status}")
         except (OSError, http.client.HTTPException) as error:
             raise UnguardedError(f"{what} was not answered: {error}") from error
         finally:

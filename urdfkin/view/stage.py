@@ -1,9 +1,10 @@
 """Draw a robot in viser's scene, with arrows, the velocity ellipsoid and Denavit-Hartenberg frames.
 
-- The columns of the Jacobian are the frame's velocities for unit joint velocities (7.85).
-- If the vector of joint velocities has length one, the frame velocity ends on an ellipsoid. The axes of the
-  ellipsoid are the left singular vectors of the Jacobian, and its half-lengths are the singular values.
-- The acceleration is the sum of its transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
+- A column of the Jacobian is the frame's velocity if one joint velocity is 1 and all others are 0 (7.85).
+- If the vector of joint velocities has length 1, the tip of the frame's velocity is inside an ellipsoid or on
+  its surface. The axes of the ellipsoid are the left singular vectors of the Jacobian, and its half-lengths
+  are the singular values.
+- The acceleration is the sum of transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from urdfkin.robot.frame_motion import FrameMotion
 from urdfkin.view.dh_drawing import row_corners
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
-#: Each part of the acceleration has a colour: red, green and blue from 0 to 255.
+#: Colours of the parts of the acceleration: red, green and blue from 0 to 255
 PART_COLOURS = {
     "transverse": (0, 114, 178),
     "centripetal": (213, 94, 0),
@@ -33,7 +34,7 @@ PART_COLOURS = {
     "sum": (30, 30, 30),
 }
 LINEAR, ANGULAR = (0, 114, 178), (204, 121, 167)
-#: The longest arrow has this fraction of the robot's reach.
+#: Length of the longest arrow, as a fraction of the robot's size
 _SHARE = 0.3
 
 
@@ -58,8 +59,7 @@ class Ellipsoid:
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
     """Return arrows for the columns of the Jacobian, in world axes, starting at the frame's origin.
 
-    Each column is the frame's velocity when one joint moves with unit velocity. The motion x has one sample
-    in LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the arrows.
+    The motion x has one sample in LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the arrows.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
@@ -92,9 +92,9 @@ def _arrows(
 
 
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
-    """Return the ellipsoid of the frame's velocities for joint velocities of length one.
+    """Return the ellipsoid of the frame's velocities for joint velocities of length 1.
 
-    A direction without motion is drawn with the smallest visible thickness. The motion x has one sample in
+    The ellipsoid is visible even in directions without motion. The motion x has one sample in
     LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the ellipsoid.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
@@ -108,25 +108,30 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
 
 
 def scalar_first(R: FloatArray) -> FloatArray:
-    """Return (..., 4) quaternions (w, x, y, z) of rotations, in viser's order."""
+    """Return the quaternions (..., 4) of rotations in viser's order w, x, y, z."""
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: A page has its final layout at most this time (s) after its opening.
+#: Maximum time (s) from the opening of a page to its final layout
 _OPENING = 15.0
-#: `_FROM` is the direction from the robot to the camera. The robot fills this fraction of the view.
-#: `_FOV` is viser's vertical field of view (rad).
-_FROM, _FILLED, _FOV = np.array([1.1, -1.3, 0.6]), 0.85, np.deg2rad(75.0)
+#: Direction from the robot to the camera
+_TO_CAMERA = np.array([1.1, -1.3, 0.6])
+#: Fraction of the view that the robot fills
+_FILLED = 0.85
+#: Viser's vertical field of view (rad)
+_FOV = np.deg2rad(75.0)
 
 
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
-    """Return the position of the camera and the point it looks at, so that points (n, 3) fill the view.
+    """Return the camera's position and the centre of its picture, so that the points (n, 3) fill the picture.
 
-    The points are in metres, the vertical field of view is in rad, and the aspect is width divided by height.
+    Points are in metres. `fov` is the vertical field of view (rad), `aspect` is the width divided by the
+    height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
-    back = _FROM / np.linalg.norm(_FROM)
-    right = np.cross([0.0, 0.0, 1.0], back) / np.linalg.norm(np.cross([0.0, 0.0, 1.0], back))
+    back = _TO_CAMERA / np.linalg.norm(_TO_CAMERA)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
     up = np.cross(back, right)
     height = _FILLED * np.tan(0.5 * fov)
     x, y, z = np.abs((points - middle) @ right), np.abs((points - middle) @ up), (points - middle) @ back
@@ -135,17 +140,17 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
-#: The display modes of the shapes.
+#: Display modes of the shapes
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
-#: Opacity of transparent shapes.
+#: Opacity of transparent shapes
 _OPACITY = 0.3
 _NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene, with a frame for each link, and its shapes or a line to its parent.
+    """A robot in viser's scene: link frames, shapes, and a skeleton of joints and lines between them.
 
     Attributes:
         missing: Meshes that cannot be shown.
@@ -176,25 +181,25 @@ class Stage:
         self._shapes: list[tuple[Shape, Any]] = []
         self._transparent: list[Any] = []
         self._corners: list[tuple[int, FloatArray]] = []
-        bare = self._add_shapes(tree)
-        self._add_skeleton(tree, Ts)
-        self.show(shapes=SOLID, skeleton=bare, axes=False, names=NAMES[0])
+        needs_skeleton = self._add_shapes(tree)
+        self._add_skeleton(tree)
+        self.show(shapes=SOLID, skeleton=needs_skeleton, axes=False, names=NAMES[0])
         self._dh: list[Any] = []
         self.fill(Ts[np.newaxis])
         server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
-        """Store the points that the view must contain, for n placements (n, links, 4, 4) of the links."""
+        """Let the camera see the robot in n configurations; Ts (n, links, 4, 4) are the links' placements."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]
             points.append((box @ R.swapaxes(-1, -2) + p).reshape(-1, 3))
-        self._filling = np.concatenate(points)
+        self._points_in_view = np.concatenate(points)
         initial = self._server.initial_camera
-        initial.position, initial.look_at = camera(self._filling, aspect=1.2, fov=_FOV)
+        initial.position, initial.look_at = camera(self._points_in_view, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes; return whether any is missing or there are none: then the skeleton is shown."""
+        """Add the shapes; return whether the skeleton must replace missing shapes."""
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)
@@ -209,41 +214,31 @@ class Stage:
         if shape.kind == "mesh":
             whole = mesh(shape)
             return None if whole is None else self._scene.add_mesh_trimesh(name, whole)
-        place = {"wxyz": scalar_first(shape.T_link_shape[:3, :3]), "position": shape.T_link_shape[:3, 3]}
+        pose = {"wxyz": scalar_first(shape.T_link_shape[:3, :3]), "position": shape.T_link_shape[:3, 3]}
         *rgb, opacity = shape.colour or GREY
         look = {"color": tuple(round(255 * x) for x in rgb), "opacity": None if opacity == 1.0 else opacity}
         if shape.kind == "box":
-            return self._scene.add_box(name, dimensions=shape.size, **look, **place)
+            return self._scene.add_box(name, dimensions=shape.size, **look, **pose)
         if shape.kind == "sphere":
-            return self._scene.add_icosphere(name, radius=shape.size[0], **look, **place)
-        return self._scene.add_cylinder(name, radius=shape.size[0], height=shape.size[1], **look, **place)
+            return self._scene.add_icosphere(name, radius=shape.size[0], **look, **pose)
+        return self._scene.add_cylinder(name, radius=shape.size[0], height=shape.size[1], **look, **pose)
 
-    def _add_skeleton(self, tree: KinematicTree, Ts: FloatArray) -> None:
-        r = 0.014 * self.reach
+    def _add_skeleton(self, tree: KinematicTree) -> None:
+        r, p0 = 0.014 * self.reach, np.zeros(3)
+
+        def add(name: str, axis: FloatArray, radius: float, height: float, color: Any, p: FloatArray) -> None:
+            look = {"radius": radius, "height": height, "color": color}
+            pose = {"wxyz": scalar_first(_towards(axis)), "position": p}
+            self._skeleton.append(self._scene.add_cylinder(f"/robot/{name}", **look, **pose))
+
         for i, joint in enumerate(tree.joints):
             p = joint.T_parent_joint[:3, 3]
             if (length := float(np.linalg.norm(p))) > 1e-6 * self.reach:
-                R = _towards(p / length)
-                self._skeleton.append(
-                    self._scene.add_cylinder(
-                        f"/robot/{joint.parent}/bone{i}",
-                        radius=0.3 * r,
-                        height=length,
-                        color=_BONE,
-                        wxyz=scalar_first(R),
-                        position=p / 2,
-                    )
-                )
-            if joint.kind.has_axis:
-                self._skeleton.append(
-                    self._scene.add_cylinder(
-                        f"/robot/{i + 1}/joint{i}",
-                        radius=r if joint.kind.turns else 0.6 * r,
-                        height=2.2 * r if joint.kind.turns else 3.4 * r,
-                        color=_TURN if joint.kind.turns else _SLIDE,
-                        wxyz=scalar_first(_towards(joint.axis)),
-                    )
-                )
+                add(f"{joint.parent}/bone{i}", p / length, 0.3 * r, length, _BONE, p / 2)
+            if joint.kind.turns:
+                add(f"{i + 1}/joint{i}", joint.axis, r, 2.2 * r, _TURN, p0)
+            elif joint.kind.has_axis:
+                add(f"{i + 1}/joint{i}", joint.axis, 0.6 * r, 3.4 * r, _SLIDE, p0)
 
     def _add_names(self, kind: str, tree: KinematicTree) -> list[Any]:
         of_joints = [joint.name if joint.kind.nv else "" for joint in tree.joints]
@@ -271,25 +266,26 @@ class Stage:
                 copies.append(self._scene.add_mesh_simple(name, whole.vertices, whole.faces, **look))
         return copies
 
-    def look(self) -> None:
+    def reset_cameras(self) -> None:
         for client in self._server.get_clients().values():
-            self._look(client)
+            self._set_camera(client)
 
     def _welcome(self, client: Any) -> None:
-        """Set the camera of a new client, and again when the panel has reduced the width of the view."""
-        begin, aspects = time.monotonic(), [0.0]
+        """Set the camera of a new page, and again when the panel has reduced the width of the view."""
+        begin, last_aspect = time.monotonic(), 0.0
 
         def fit(_: Any) -> None:
+            nonlocal last_aspect
             aspect = client.camera.aspect
-            if aspect != aspects[0] and time.monotonic() - begin < _OPENING:
-                aspects[0] = aspect
-                self._look(client)
+            if aspect != last_aspect and time.monotonic() - begin < _OPENING:
+                last_aspect = aspect
+                self._set_camera(client)
 
         client.camera.on_update(fit)
         fit(None)
 
-    def _look(self, client: Any) -> None:
-        position, middle = camera(self._filling, aspect=client.camera.aspect, fov=client.camera.fov)
+    def _set_camera(self, client: Any) -> None:
+        position, middle = camera(self._points_in_view, aspect=client.camera.aspect, fov=client.camera.fov)
         with client.atomic():
             client.camera.up_direction = (0.0, 0.0, 1.0)
             client.camera.position, client.camera.look_at = position, middle
@@ -321,17 +317,17 @@ class Stage:
     # -- overlays ------------------------------------------------------------------------------------
 
     def arrows(self, name: str, arrows: Arrows | None) -> None:
-        """Replace the group of arrows with a given name; None removes the group."""
+        """Replace the group of arrows called `name`; None hides the group."""
         size = 0.008 * self.reach
-        none = arrows is None or not len(arrows.points)
+        visible = arrows is not None and len(arrows.points) > 0
         self._scene.add_arrows(
             f"/{name}",
-            points=np.zeros((1, 2, 3)) if arrows is None or none else arrows.points,
-            colors=(0, 0, 0) if arrows is None or none else arrows.colours,
+            points=arrows.points if arrows is not None and visible else np.zeros((1, 2, 3)),
+            colors=arrows.colours if arrows is not None and visible else (0, 0, 0),
             shaft_radius=0.4 * size,
             head_radius=size,
             head_length=2.4 * size,
-            visible=not none,
+            visible=visible,
         )
 
     def ellipsoid(self, shape: Ellipsoid | None) -> None:
@@ -347,7 +343,7 @@ class Stage:
         )
 
     def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
-        """Draw the frames, offsets d and lengths a of a table at its coordinates q; None removes them."""
+        """Draw the frames, offsets d and lengths a of a table in the configuration q; None removes them."""
         for handle in self._dh:
             handle.remove()
         self._dh = []
@@ -357,27 +353,23 @@ class Stage:
         starts, middles, ends = frames[:-1, :3, 3], row_corners(table, frames), frames[1:, :3, 3]
         standard = table.convention is DHConvention.STANDARD
         first, second = (_OFFSET, _NORMAL) if standard else (_NORMAL, _OFFSET)
-        self._dh.append(
-            self._scene.add_batched_axes(
-                "/dh/frames",
-                batched_wxyzs=scalar_first(frames[:, :3, :3]),
-                batched_positions=frames[:, :3, 3],
-                axes_length=0.1 * self.reach,
-                axes_radius=0.0035 * self.reach,
-            )
+        axes = self._scene.add_batched_axes(
+            "/dh/frames",
+            batched_wxyzs=scalar_first(frames[:, :3, :3]),
+            batched_positions=frames[:, :3, 3],
+            axes_length=0.1 * self.reach,
+            axes_radius=0.0035 * self.reach,
         )
+        self._dh.append(axes)
         for k, (start, end, colour) in enumerate(((starts, middles, first), (middles, ends, second))):
             if len(start):
-                points, thickness = np.stack([start, end], axis=1), 0.006 * self.reach
-                self._dh.append(
-                    self._scene.add_line_segments(
-                        f"/dh/lines{k}", points=points, colors=colour, thickness=thickness
-                    )
-                )
+                look = {"colors": colour, "thickness": 0.006 * self.reach}
+                points = np.stack([start, end], axis=1)
+                self._dh.append(self._scene.add_line_segments(f"/dh/lines{k}", points=points, **look))
 
 
 def _towards(axis: FloatArray) -> FloatArray:
-    """Return a (3, 3) rotation that turns the z axis into the direction `axis`."""
+    """Return a rotation (3, 3) that turns the z axis into the direction `axis`."""
     side = np.eye(3)[int(np.abs(axis).argmin())]
     x = np.cross(side, axis)
     x = x / np.linalg.norm(x)

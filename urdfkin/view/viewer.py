@@ -1,7 +1,4 @@
-"""The viewer: a panel with sliders and checked numbers beside the robot's picture.
-
-A slider that the user moves reports only its own number. A slider that the program sets reports no change.
-"""
+"""Define the viewer: a robot in a browser tab, beside a panel with sliders and checked numbers."""
 
 from __future__ import annotations
 
@@ -41,15 +38,16 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: A joint with a larger range than this counts as unlimited, like a wheel.
-_FAR = 100.0
-#: An arrow key changes an angle by this number of degrees or radians.
-#: Other sliders have at least `_STEPS` steps of 1, 2 or 5 times a power of ten.
-_DEGREES, _RADIANS, _STEPS = 1.0, 0.01, 50.0
+#: Range (rad or m) from which a joint counts as unlimited, like a wheel
+_UNLIMITED = 100.0
+#: Change of an angle by an arrow key, in degrees or in radians
+_DEGREES, _RADIANS = 1.0, 0.01
+#: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten
+_STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: By default, joint velocities (rad/s, m/s) and accelerations (rad/s^2, m/s^2) have these ranges.
-_RATE, _SECOND_RATE = 3.0, 5.0
-#: A message names at most this number of missing meshes.
+#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) of a slider without a limit
+_VELOCITY, _ACCELERATION = 3.0, 5.0
+#: Maximum number of missing meshes that a message names
 _MOST_MISSING = 5
 
 
@@ -58,7 +56,7 @@ class SliderRow:
     """Description of one slider, which sets one number of q, v or a.
 
     Attributes:
-        at: Index in the vector.
+        at: Index of the number in q, v or a.
         turns: Whether the number is an angle or a derivative of an angle.
     """
 
@@ -72,15 +70,15 @@ class SliderRow:
 class Sliders:
     """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    The unit of a slider ends with `rate`: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
-    `moved` is called with the index and the new number.
+    The unit of a slider ends with `per`: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
+    `report` is called with the index and the new number. It is not called when the program sets a slider.
     """
 
     def __init__(
-        self, gui: Any, folder: Any, rows: Iterable[SliderRow], rate: str, moved: Callable[[int, float], None]
+        self, gui: Any, folder: Any, rows: Iterable[SliderRow], per: str, report: Callable[[int, float], None]
     ) -> None:
-        self._gui, self._folder, self.rows, self._rate, self._moved = gui, folder, list(rows), rate, moved
-        self._setting = False
+        self._gui, self._folder, self.rows, self._per, self._report = gui, folder, list(rows), per, report
+        self._is_setting = False
         self.handles: list[Any] = []
 
     def build(self, values: FloatArray, *, degrees: bool) -> None:
@@ -99,7 +97,7 @@ class Sliders:
         lower, upper = self._range(row, value)
         unit = ("deg" if self._degrees else "rad") if row.turns else "m"
         handle = self._gui.add_slider(
-            f"{row.name} [{unit}{self._rate}]",
+            f"{row.name} [{unit}{self._per}]",
             min=scale * lower,
             max=scale * upper,
             step=self._step(row, upper - lower),
@@ -108,16 +106,16 @@ class Sliders:
             order=order,
         )
         handle.precision = _DIGITS_OF_DEGREES if row.turns and self._degrees else _DIGITS
-        handle.on_update(lambda _: self._report(row, handle))
+        handle.on_update(lambda _: self._on_update(row, handle))
         return handle
 
-    def _report(self, row: SliderRow, handle: Any) -> None:
-        if not self._setting:
-            self._moved(row.at, float(handle.value) / self._scale(row))
+    def _on_update(self, row: SliderRow, handle: Any) -> None:
+        if not self._is_setting:
+            self._report(row.at, float(handle.value) / self._scale(row))
 
     def show(self, values: FloatArray) -> None:
-        """Set all sliders to their numbers; a number beyond the range extends the range."""
-        self._setting = True
+        """Set each slider to its number of `values`; a number beyond the range extends the range."""
+        self._is_setting = True
         try:
             for row, handle in zip(self.rows, self.handles, strict=True):
                 value, scale = float(values[row.at]), self._scale(row)
@@ -132,7 +130,7 @@ class Sliders:
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
-            self._setting = False
+            self._is_setting = False
 
     def _scale(self, row: SliderRow) -> float:
         return math.degrees(1.0) if row.turns and self._degrees else 1.0
@@ -155,7 +153,7 @@ def _marks(lower: float, upper: float) -> tuple[tuple[float, str], tuple[float, 
 
 
 def coordinate_rows(robot: Robot) -> list[SliderRow]:
-    """Describe a slider within the joint's limits for each coordinate that can change, but no quaternion."""
+    """Describe a slider for each coordinate that can change, within its limits; quaternions have none."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -176,8 +174,8 @@ def rate_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
-            most = _SECOND_RATE if second else _RATE
-            if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _FAR:
+            most = _ACCELERATION if second else _VELOCITY
+            if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _UNLIMITED:
                 most = joint.limit.velocity
             turns = k >= 3 if joint.nv == 6 else _turns(joint, k)
             rows.append(SliderRow(at + k, robot.rate_names[at + k], turns, -most, most))
@@ -190,7 +188,7 @@ def _turns(joint: Joint, k: int) -> bool:
 
 def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
     limit = joint.limit
-    if limit is None or joint.kind.value == "continuous" or not limit.upper - limit.lower < _FAR:
+    if limit is None or joint.kind.value == "continuous" or not limit.upper - limit.lower < _UNLIMITED:
         return -otherwise, otherwise
     return limit.lower, limit.upper
 
@@ -280,9 +278,8 @@ class Viewer:
         server: The server from `urdfkin.view.server.new_server`.
         robot: The robot to show.
         q: (nq,) start configuration. None means the configuration within the limits nearest to zero.
-        trajectory: A trajectory to play; it starts at its first sample.
-        conversion: The convention of q in the text field, where q can be copied or typed. None means
-            urdfkin's convention.
+        trajectory: A trajectory to play; the viewer then starts at the first sample.
+        conversion: The convention of the text field of q. None means urdfkin's convention.
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
@@ -316,7 +313,7 @@ class Viewer:
             self.player.show(0)
 
     def _fill(self) -> None:
-        """Let the robot fill the view: at its configuration, or along the whole trajectory."""
+        """Let the robot fill the view in the configuration q, and along the whole trajectory."""
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
@@ -326,11 +323,11 @@ class Viewer:
     def _reset_camera(self) -> None:
         with self._lock:
             self._fill()
-            self.stage.look()
+            self.stage.reset_cameras()
 
     @property
     def file_name(self) -> str:
-        """The robot's name in letters that every system allows in a file name, without a suffix."""
+        """The robot's name in characters that every system allows in a file name."""
         return re.sub(r"[^A-Za-z0-9_-]+", "-", self.robot.name).strip("-") or "robot"
 
     # -- controls ------------------------------------------------------------------------------------
@@ -385,8 +382,8 @@ class Viewer:
             self.shapes, self.skeleton, self.axes, self.names, self.columns, self.ellipsoid, self.parts
         ):  # fmt: skip
             handle.on_update(lambda _: self.update())
-        self.units.on_update(lambda _: self._in_units())
-        self.words_of_q.on_update(self._typed)
+        self.units.on_update(lambda _: self._change_units())
+        self.words_of_q.on_update(self._read_q)
         neutral.on_click(lambda _: self.set_q(self._start))
         random.on_click(lambda _: self.set_q(robot.sample(1, int(self._rng.integers(2**31)))[0]))
         camera.on_click(lambda _: self._reset_camera())
@@ -422,25 +419,7 @@ class Viewer:
 
     def set_q(self, q: Given) -> None:
         """Move the robot and all sliders to a configuration, or raise InputError."""
-        with self._lock:
-            self.q = checked(self.robot.tree, q, "q").copy()
-            self.sliders.show(self.q)
-            self._write_q()
-            self.update()
-
-    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
-        with self._lock:
-            self.q, self.v, self.a = q.copy(), v.copy(), a.copy()
-            for sliders, values in ((self.sliders, q), (self.rates, v), (self.second_rates, a)):
-                sliders.show(values)
-            self._write_q()
-            self.update()
-
-    def _save(self, client: Any) -> None:
-        if client is not None:
-            height, width = client.camera.image_height, client.camera.image_width
-            picture = as_png(client.get_render(height=height, width=width, timeout=60.0))
-            client.send_file_download(f"{self.file_name}.png", picture, save_immediately=True)
+        self.set_state(checked(self.robot.tree, q, "q"), self.v, self.a)
 
     def set_rates(self, v: FloatArray, a: FloatArray) -> None:
         with self._lock:
@@ -449,12 +428,29 @@ class Viewer:
             self.second_rates.show(a)
             self.update()
 
+    def set_state(self, q: FloatArray, v: FloatArray, a: FloatArray) -> None:
+        with self._lock:
+            self.q, self.v, self.a = q.copy(), v.copy(), a.copy()
+            for sliders, values in self._sliders_and_values():
+                sliders.show(values)
+            self._write_q()
+            self.update()
+
+    def _sliders_and_values(self) -> list[tuple[Sliders, FloatArray]]:
+        return [(self.sliders, self.q), (self.rates, self.v), (self.second_rates, self.a)]
+
+    def _save(self, client: Any) -> None:
+        if client is not None:
+            height, width = client.camera.image_height, client.camera.image_width
+            picture = as_png(client.get_render(height=height, width=width, timeout=60.0))
+            client.send_file_download(f"{self.file_name}.png", picture, save_immediately=True)
+
     def _write_q(self) -> None:
         self.words_of_q.value = written(self.q if self._conversion is None else self._conversion.to(self.q))
         self.wrong.content = ""
 
-    def _typed(self, event: Any) -> None:
-        """Read a configuration that the user typed; its text stays unchanged."""
+    def _read_q(self, event: Any) -> None:
+        """Read a configuration that the user typed, without a change of the typed text."""
         if event.client is None:
             return
         with self._lock:
@@ -472,15 +468,13 @@ class Viewer:
             self.sliders.show(self.q)
             self.update()
 
-    def _in_units(self) -> None:
+    def _change_units(self) -> None:
         with self._lock:
-            degrees = self.units.value == "degrees"
-            self.sliders.build(self.q, degrees=degrees)
-            self.rates.build(self.v, degrees=degrees)
-            self.second_rates.build(self.a, degrees=degrees)
+            for sliders, values in self._sliders_and_values():
+                sliders.build(values, degrees=self.units.value == "degrees")
 
     def _choose_convention(self) -> None:
-        """Make the shapes transparent while a table is shown, because its frames lie inside them."""
+        """Make the shapes transparent while a table is shown, because frames of the table are inside them."""
         with self._lock:
             shown = self.dh.value != "none"
             if self.shapes.value == (SOLID if shown else SEE_THROUGH):
@@ -488,18 +482,17 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Apply a new frame, reference or convention. Derive and check the DH table once, then draw again."""
+        """Apply a new frame, reference or convention; derive and check the DH table only here."""
         with self._lock:
-            self._table = None
-            self.dh_words.content = ""
+            self._table, words = None, ""
             if self.dh.value != "none":
                 try:
                     self._table = self.robot.dh(self.frame.value, convention=self.dh.value)
-                    table = self._table
-                    # Code formatting would be unsafe: viser reads images even inside code.
-                    self.dh_words.content = markdown_text(f"{table.base_frame} to {table.tip_frame}")
+                    words = f"{self._table.base_frame} to {self._table.tip_frame}"
                 except UrdfkinError as error:
-                    self.dh_words.content = markdown_text(str(error))
+                    words = str(error)
+            # Viser would read images even in Markdown's code, so all characters are escaped.
+            self.dh_words.content = markdown_text(words)
             self.update()
             if self.player is not None:
                 self.player.check()

@@ -5,23 +5,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.high_precision import angular_acceleration, angular_velocity, array, column, mp, rate, second_rate
+from tests.high_precision import angular_acceleration, angular_velocity, array, mp, rate, second_rate
 from tests.kinematics.rotation.strategies import ROUNDING
-from tests.moving import ORIENTATIONS, ORIGINS, T, frame, point
+from tests.moving import ORIENTATIONS, ORIGINS, T, frame
 from urdfkin.errors import InputError, RepresentationSingularityError, UnknownNameError
 from urdfkin.kinematics.bodies import (
     MovingFrame,
     analytical_jacobian,
     compose_all,
     frame_velocity,
-    link_endpoint,
-    link_endpoint_velocity,
     orientation_of,
     planar_rotation,
     planar_rotation_derivative,
     point_acceleration,
-    point_position,
-    point_velocity,
     pose_rates,
     representation_inverse,
     representation_matrix,
@@ -31,28 +27,6 @@ from urdfkin.kinematics.bodies import (
 )
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import SEQUENCES, exp_rotation, rotation_from_euler, rotation_of
-
-
-def test_a_moving_point_in_a_moving_frame_has_the_derivatives_of_its_position() -> None:
-    def p_0(t: Any) -> Any:
-        return ORIGINS[0](t) + ORIENTATIONS[0](t) * point(t)
-
-    p_1, v_1, a_1 = array(point(mp.mpf(T))), array(rate(point, T)), array(second_rate(point, T))
-    assert np.abs(point_position(frame(0), p_1) - array(p_0(mp.mpf(T)))).max() <= ROUNDING
-    assert np.abs(point_velocity(frame(0), p_1, v_1).total - array(rate(p_0, T))).max() <= 8 * ROUNDING
-    acceleration = point_acceleration(frame(0), p_1, v_1, a_1)
-    assert np.abs(acceleration.total - array(second_rate(p_0, T))).max() <= 64 * ROUNDING
-
-
-def test_the_parts_lie_as_the_text_says() -> None:
-    v_1 = np.array([0.2, -1.0, 0.4])
-    moving = frame(0)
-    parts = point_acceleration(moving, [1.0, 2.0, 3.0], v_1)
-    assert abs(parts.coriolis @ moving.w_0_1) <= 64 * ROUNDING
-    assert abs(parts.coriolis @ (moving.R_0_1 @ v_1)) <= 64 * ROUNDING
-    assert abs(parts.centripetal @ moving.w_0_1) <= 64 * ROUNDING
-    assert parts.centripetal @ (moving.R_0_1 @ [1.0, 2.0, 3.0]) < 0.0
-    assert abs(parts.transverse @ moving.alpha_0_1) <= 256 * ROUNDING
 
 
 def test_a_row_of_frames_moves_as_the_product_of_its_transformations() -> None:
@@ -100,19 +74,6 @@ def test_a_frame_refuses_what_is_no_rotation_and_keeps_its_arrays_to_itself() ->
     assert moving.d_0_1[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         moving.d_0_1[0] = 1.0
-
-
-def test_one_link_in_the_plane_moves_along_its_tangent() -> None:
-    theta, speed, length = 0.6, 1.5, 0.8
-
-    def end(t: Any) -> Any:
-        angle = mp.mpf(theta) + t * mp.mpf(speed)
-        return mp.mpf(length) * column(mp.cos(angle), mp.sin(angle))
-
-    assert np.abs(link_endpoint(theta, length) - array(end(mp.mpf(0)))).max() <= ROUNDING
-    velocity = link_endpoint_velocity(theta, speed, length)
-    assert np.abs(velocity - array(rate(end, 0.0))).max() <= ROUNDING
-    assert abs(velocity @ link_endpoint(theta, length)) <= ROUNDING
 
 
 def test_the_planar_derivative_is_the_rotation_a_right_angle_on() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -9,6 +11,11 @@ from urdfkin.kinematics.inputs import FloatArray
 
 #: A few units in the last place of numbers of size one, which is what rounding gives.
 ROUNDING = 16 * np.finfo(np.float64).eps
+
+
+def close(found: Any, expected: Any, room: float = 4.0) -> bool:
+    return bool(np.abs(np.asarray(found) - expected).max() <= room * ROUNDING)
+
 
 _components = st.one_of(st.sampled_from([0.0, 1.0, -1.0, 1e-9, -1e-17]), st.floats(-1.0, 1.0))
 

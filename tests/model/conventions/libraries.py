@@ -36,7 +36,7 @@ from scipy.spatial.transform import Rotation
 
 from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS
 from urdfkin.model.conventions.convention import transcoded
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.system.plain_xml import plain_xml
 
@@ -93,8 +93,13 @@ def bare(text: str) -> str:
     return tostring(root, encoding="unicode")
 
 
+def _bare_file(robot: Robot, folder: Path) -> Path:
+    file = folder / "robot.urdf"
+    file.write_text(bare(robot.urdf))
+    return file
+
+
 def _root(robot: Robot) -> str:
-    """Return the name of the root link in the bare text."""
     name = robot.link_names[int(robot.root_joint is not None)]
     return "root" if name == "world" else name
 
@@ -114,8 +119,8 @@ def mujoco(robot: Robot, folder: Path) -> Library:
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         data.qpos[:], data.qvel[:] = q, v
         mj.mj_fwdPosition(model, data)
-        body, T = model.body(link).id, np.eye(4)
-        T[:3, :3], T[:3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
+        body = model.body(link).id
+        T = pose(data.xmat[body].reshape(3, 3), data.xpos[body])
         linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
         mj.mj_jac(model, data, linear, angular, data.xpos[body], body)
         J = np.vstack((linear, angular))
@@ -188,9 +193,7 @@ def rtb(robot: Robot, folder: Path) -> Library:
     pytest.importorskip("roboticstoolbox")
     from roboticstoolbox import Robot as Toolbox
 
-    file = folder / "robot.urdf"
-    file.write_text(bare(robot.urdf))
-    model = Toolbox.URDF(str(file.resolve()))
+    model = Toolbox.URDF(str(_bare_file(robot, folder).resolve()))
     links = sorted((link for link in model.links if link.isjoint), key=lambda link: link.jindex)
 
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -208,10 +211,8 @@ def rtb(robot: Robot, folder: Path) -> Library:
 
 def newton(robot: Robot, folder: Path) -> Library:
     sim = pytest.importorskip("newton")
-    file = folder / "robot.urdf"
-    file.write_text(bare(robot.urdf))
     builder = sim.ModelBuilder()
-    builder.add_urdf(str(file), floating=robot.root_joint is not None)
+    builder.add_urdf(str(_bare_file(robot, folder)), floating=robot.root_joint is not None)
     return _of_newton(robot, builder)
 
 
@@ -246,9 +247,8 @@ def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) 
             six[:3] -= np.cross(six[3:], R @ com[body])
             return six
 
-        found, T = twist(v), np.eye(4)
-        pose = state.body_q.numpy()[body].astype(float)
-        T[:3, :3], T[:3, 3] = Rotation.from_quat(pose[3:]).as_matrix(), pose[:3]
+        found, placed = twist(v), state.body_q.numpy()[body].astype(float)
+        T = pose(Rotation.from_quat(placed[3:]).as_matrix(), placed[:3])
         return T, found, np.stack([twist(e) for e in np.eye(len(v))], axis=-1)
 
     return Library(names, evaluate, SINGLE, SINGLE_EPS, more=2, at_mass=True)
@@ -259,10 +259,8 @@ def _stage(robot: Robot, folder: Path) -> Any:
     converter = pytest.importorskip("urdf_usd_converter")
     from pxr import Usd
 
-    file = folder / "robot.urdf"
-    file.write_text(bare(robot.urdf))
-    made = converter.Converter(layer_structure=False, scene=False).convert(str(file), str(folder / "usd"))
-    stage = Usd.Stage.Open(made.path)
+    converter = converter.Converter(layer_structure=False, scene=False)
+    stage = Usd.Stage.Open(converter.convert(str(_bare_file(robot, folder)), str(folder / "usd")).path)
     if robot.root_joint is not None:
         stage.RemovePrim(stage.GetDefaultPrim().GetPath().AppendPath("Physics/root_joint"))
     return stage

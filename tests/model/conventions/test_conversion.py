@@ -89,7 +89,6 @@ def test_from_undoes_to(dog: Robot, cart: Robot, convention: Convention) -> None
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
 def test_converted_accelerations_are_derivatives(dog: Robot, cart: Robot, convention: Convention) -> None:
-    """Of the converted velocities, along the motion."""
     h = 1e-4
     for robot in (dog, cart):
         conversion = robot.convention(convention)

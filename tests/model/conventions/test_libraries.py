@@ -76,7 +76,6 @@ def _farthest_mass(robot: Robot, q: FloatArray) -> float:
 
 
 def _worst(robot: Robot, library: Library, conversion: Conversion) -> float:
-    """Return the largest difference, as a fraction of the largest number of its bound."""
     return max(float(found.max()) for found, _ in _differences(robot, library, conversion))
 
 
@@ -108,7 +107,6 @@ STATED = {
 
 
 def mistaken(right: Convention, field: str) -> dict[str, Any]:
-    """The change of a convention that is a mistake."""
     return {field: next(value for value in STATED[field] if value != getattr(right, field))}
 
 

@@ -1,8 +1,8 @@
-"""The examples of the pages, as whole documents."""
+"""Whole documents from the examples of pages."""
 
 
 def document(example: str) -> str:
-    """An example as a URDF; see `urdfkin.urdf.lint.pages.Page`."""
+    """Return an example as a URDF; see `urdfkin.urdf.lint.pages.Page`."""
     text = example.strip("\n")
     if not text.startswith(("<joint", "<link", "<material", "<!--")):
         return example

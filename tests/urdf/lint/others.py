@@ -1,7 +1,7 @@
-"""What Pinocchio and yourdfpy do with a document, asked in processes that may die.
+"""Find out whether Pinocchio and yourdfpy read a document, in processes that may die.
 
-Run as a script it reads a JSON list of documents from standard input and prints a list of verdicts: each is
-asked in a fork of its own, so that a reader that kills its process says so and no more.
+As a script, this module reads a JSON list of documents from standard input and prints a list of verdicts.
+Each document is read in a forked process, because a document may end the process.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 
-#: What a fork's exit status means.
+#: Verdict for each exit status of a forked process.
 _VERDICTS = {0: "reads", 1: "refuses"}
 
 
 def ask(documents: Sequence[str]) -> list[dict[str, str]]:
-    """For each document: `{"pinocchio": ..., "yourdfpy": ...}`, each `reads`, `refuses` or `dies`."""
+    """Return `{"pinocchio": ..., "yourdfpy": ...}` for each document: `reads`, `refuses` or `dies`."""
     data, command = json.dumps(list(documents)).encode(), [sys.executable, __file__]
     done = subprocess.run(command, input=data, capture_output=True, check=True, timeout=300)
     verdicts: list[dict[str, str]] = json.loads(done.stdout.splitlines()[-1])

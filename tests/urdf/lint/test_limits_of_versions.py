@@ -1,4 +1,4 @@
-"""What urdfdom refuses in a limit, version by version and joint by joint, `check` tells: nothing is blind."""
+"""`check` reports each limit that urdfdom refuses, for each URDF version and each joint type."""
 
 from collections.abc import Iterator
 
@@ -12,12 +12,12 @@ from urdfkin.urdf.records import FURTHER_LIMITS
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 VERSIONS = ("1.0", "1.1", "1.2")
 USUAL = {"lower": "-1", "upper": "1", "effort": "10", "velocity": "5"}
-#: Negative, of no size, no number, and some that are fine.
+#: Values of an attribute: negative, infinite, no number, and valid.
 ODD = ("-1", "inf", "-inf", "nan", "", "fast", "1e400", "0x10", "1 ", "0", "-0", "+1", "1e-400")
 
 
 def limits() -> Iterator[dict[str, str]]:
-    """One thing odd, one or more missing, or the range upside down."""
+    """Yield limits with an odd attribute, with missing attributes, or with a lower limit above the upper."""
     for name in (*USUAL, *FURTHER_LIMITS):
         yield from ({**USUAL, name: value} for value in ODD)
     for subset in range(16):
@@ -45,7 +45,7 @@ def pinocchio_reads(text: str) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_pinocchio_refuses_is_found_and_what_is_marked_it_refuses(kind: str, version: str) -> None:
+def test_a_limit_has_an_error_or_a_mark_exactly_if_pinocchio_refuses_it(kind: str, version: str) -> None:
     for limit in limits():
         text = joint_with(limit, kind, version)
         findings = check(text.encode())
@@ -61,7 +61,7 @@ def test_what_pinocchio_refuses_is_found_and_what_is_marked_it_refuses(kind: str
 @pytest.mark.parametrize("name", FURTHER_LIMITS)
 @pytest.mark.parametrize("value", ["-1", "inf", "nan", "", "fast"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_limits_that_are_new_in_1_2_count_on_every_joint_and_only_there(
+def test_limits_of_urdf_1_2_are_checked_on_every_joint_and_only_in_version_1_2(
     kind: str, value: str, name: str
 ) -> None:
     codes = {
@@ -73,7 +73,7 @@ def test_the_limits_that_are_new_in_1_2_count_on_every_joint_and_only_there(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_range_upside_down_is_an_error_on_every_joint_from_1_2_on(kind: str) -> None:
+def test_a_lower_limit_above_the_upper_is_an_error_on_every_joint_in_version_1_2(kind: str) -> None:
     text = joint_with({**USUAL, "lower": "2"}, kind, "1.2")
     assert "URDF507" in [finding.code for finding in check(text.encode())]
     assert not pinocchio_reads(text)

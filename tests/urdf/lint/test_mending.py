@@ -1,4 +1,4 @@
-"""A fix cures its finding, leaves every other byte alone, and proves that the robot is the same."""
+"""A fix removes its finding, changes no other byte, and does not change the robot."""
 
 from __future__ import annotations
 
@@ -65,20 +65,19 @@ TIDY = (
 )  # fmt: skip
 
 
-def test_nothing_but_what_is_cured_changes_a_byte() -> None:
+def test_a_fix_changes_only_the_bytes_of_its_finding() -> None:
     done = mended(SLOPPY)
     assert done.text.data.decode() == TIDY
     assert sorted(f.code for f in done.fixed) == ["URDF208", "URDF503", "URDF510", "URDF510", "URDF601"]
     assert codes(done.text.data) == []
-
-
-def test_a_byte_order_mark_stays_where_it_is() -> None:
     assert mended(codecs.BOM_UTF8 + SLOPPY.encode()).text.data == codecs.BOM_UTF8 + TIDY.encode()
+    lines = difflib.ndiff(SLOPPY.splitlines(), TIDY.splitlines())
+    assert sum(line.startswith("- ") for line in lines) == 5
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_of_every_odd_document_what_is_fixed_is_gone_and_nothing_new_is_found(case: Case) -> None:
+def test_the_fixed_findings_of_an_odd_document_disappear_and_no_new_ones_appear(case: Case) -> None:
     before, done = examine(Text(case.data, "<bytes>", "<bytes>")), mended(case.data)
     after = examine(done.text)
     assert len(after.findings) == len(before.findings) - len(done.fixed)
@@ -94,15 +93,15 @@ def test_of_every_odd_document_what_is_fixed_is_gone_and_nothing_new_is_found(ca
 @pytest.mark.parametrize(
     "text",
     [
-        arm(origin='<origin xyz="0 0 1" xzy="0 0 2"/>'),  # a slip of the pen, not a value that nobody misses
+        arm(origin='<origin xyz="0 0 1" xzy="0 0 2"/>'),  # a misspelt attribute
         arm(origin='<origin xyz="0 0 1" pose="0 0 2 0 0 0"/>'),
         arm(axis='<axis xyz="0 0 1" rpy="1 0 0"/>'),
-        arm(axis='<axis xyz="1e-13 0 2"/>'),  # of unit length, Pinocchio would take another axis
+        arm(axis='<axis xyz="1e-13 0 2"/>'),  # Pinocchio would replace the unit vector by 0 0 1
         limit('lower="2" upper="-2" effort="1" velocity="1"'),
         axis("0 0 0"),
     ],
 )
-def test_what_takes_judgement_is_left(text: str) -> None:
+def test_a_finding_whose_remedy_needs_a_decision_is_not_fixed(text: str) -> None:
     assert codes(text.encode())
     assert mended(text).text.data == text.encode()
 
@@ -118,7 +117,7 @@ def test_what_takes_judgement_is_left(text: str) -> None:
         (b"</robot>", "the fix would cause URDF105"),
     ],
 )
-def test_a_fix_that_does_more_than_it_says_is_not_made(damage: bytes, objection: str) -> None:
+def test_a_fix_that_would_change_the_robot_is_not_applied(damage: bytes, objection: str) -> None:
     text = arm(axis='<axis xyz="0 0 2"/>')
 
     def look(asked: Text) -> Examined:
@@ -147,7 +146,7 @@ numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0.0 or abs(x) > 1e-6)
 
 @pytest.mark.slow
 @given(st.tuples(numbers, numbers, numbers).filter(lambda v: math.hypot(*v) > 1e-3))
-def test_a_unit_vector_tilts_by_less_than_a_rounding(vector: tuple[float, float, float]) -> None:
+def test_rounding_rotates_a_unit_vector_by_at_most_half_of_tilt(vector: tuple[float, float, float]) -> None:
     a, b = [list(map(Fraction, v)) for v in (vector, unit_vector(vector))]
     cross = sum((a[i] * b[j] - a[j] * b[i]) ** 2 for i, j in ((0, 1), (1, 2), (2, 0)))
     lengths = sum(x * x for x in a) * sum(x * x for x in b)
@@ -164,7 +163,7 @@ SPOILT = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "panda", "talos_reduced", "kinova"])
-def test_a_mended_robot_is_proven_to_be_the_same(name: str) -> None:
+def test_same_proves_that_a_fixed_robot_is_the_same(name: str) -> None:
     text = catalogue()[name].path.read_text("utf-8")
     for old, new in SPOILT.values():
         text = text.replace(old, new)
@@ -175,12 +174,12 @@ def test_a_mended_robot_is_proven_to_be_the_same(name: str) -> None:
     if not pi:
         assert found
         return
-    # Turned by what was said of all joints together, nowhere more; lengths together are metres.
+    # The sum of all rotations bounds the rotation of each link, and each robot is smaller than 10 m.
     assert found.exit_code(within=sum(pi) * 10.0) == 0
     assert sum(pi) < 1e-2
 
 
-def test_a_rounded_pi_turns_no_frame_by_more_than_its_fix_says() -> None:
+def test_the_fix_of_a_rounded_pi_rotates_no_frame_by_more_than_its_bound() -> None:
     rough = arm(origin='<origin xyz="0 0 0.3" rpy="1.5708 0 -3.1416"/>')
     done = mended(rough)
     (finding,) = done.fixed
@@ -189,8 +188,7 @@ def test_a_rounded_pi_turns_no_frame_by_more_than_its_fix_says() -> None:
     assert 0.0 < math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0) <= present(finding.fix).turns < 1.2e-5
 
 
-def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
-    """Every field of a joint's record is held against the other, or says where it stands in the file."""
+def test_a_change_of_any_field_of_a_joint_is_a_difference_except_for_positions_in_the_file() -> None:
     record = present(examine(read_source(arm())).robot)
     first, *others = record.joints
     places = {"element", "axis_element", "origin_element", "mimic"}
@@ -205,20 +203,15 @@ def test_the_differences_that_are_looked_for_are_all_there_are() -> None:
     assert list(differences(record, record, {})) == []
 
 
-def test_a_file_with_an_error_has_no_meaning_to_keep() -> None:
+def test_a_file_with_an_error_is_not_fixed() -> None:
     done = mended(limit('lower="1" upper="-1" effort="1" velocity="1"').replace("<axis ", '<axis shade="3" '))
     assert done.kept == {"URDF208": "the file has an error (URDF507); correct this error first"}
 
 
 @pytest.mark.slow
-def test_more_than_are_written_out_are_cured_too() -> None:
+def test_findings_beyond_the_number_of_stored_ones_are_also_fixed() -> None:
     many = WRITTEN_OUT + 5
     text = robot(*(joint(f"j{i}", "fixed", "l0", f"l{i}", axis="") for i in range(1, many)))
     done = mended(text.replace("<link ", '<link shade="3" '))
     assert (len(done.fixed), done.kept) == (many, {})
     assert b"shade" not in done.text.data
-
-
-def test_the_patch_has_the_changed_lines_only() -> None:
-    lines = difflib.ndiff(SLOPPY.splitlines(), mended(SLOPPY).text.data.decode().splitlines())
-    assert sum(line.startswith("- ") for line in lines) == 5

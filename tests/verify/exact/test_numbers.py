@@ -1,4 +1,4 @@
-"""A ball holds the true value; fractions of whole numbers, and mpmath, check it."""
+"""An interval contains the true value, which fractions and mpmath compute."""
 
 import math
 from decimal import Decimal, localcontext
@@ -25,14 +25,12 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
 def true_ends(x: Any) -> tuple[Fraction, Fraction]:
-    """The ends of a ball, without rounding."""
     numbers = (each.man_exp() for each in (x.mid(), x.rad()))
     middle, radius = (Fraction(int(man)) * Fraction(2) ** int(exp) for man, exp in numbers)
     return middle - radius, middle + radius
 
 
 def fraction(x: Any) -> Fraction:
-    """A number of mpmath's, without rounding."""
     sign, man, exp, _ = x._mpf_
     return Fraction(-int(man) if sign else int(man)) * Fraction(2) ** int(exp)
 
@@ -85,11 +83,12 @@ def test_cosine_and_sine_of_every_double_lie_in_their_intervals(digits: int, ang
 @pytest.mark.parametrize("digits", DIGITS)
 @pytest.mark.parametrize("exponent", [-20, -60, -100, -200, -1000])
 def test_what_taylors_series_leaves_out_is_in_the_intervals(exponent: int, digits: int) -> None:
-    # Of so small an angle, a double, the first terms are exact: without the others they have no width.
+    # For such a small angle, the first terms are exact doubles; only the omitted terms give the interval a
+    # width.
     x = Fraction(2) ** exponent
     with precision(digits):
         sine, cosine = map(true_ends, exact(2.0**exponent).sin_cos())
-    # Both lie between two sums of their alternating series.
+    # Sine and cosine lie between two partial sums of their alternating series.
     assert sine[0] < x - x**3 / 6 + x**5 / 120
     assert sine[1] > x - x**3 / 6
     assert cosine[0] < 1 - x**2 / 2 + x**4 / 24
@@ -126,7 +125,7 @@ def test_the_nearest_rotation_lies_in_its_intervals(digits: int, R: FloatArray, 
 
 
 def test_what_newtons_steps_leave_is_in_the_intervals_of_the_nearest_rotation() -> None:
-    # Six steps give some 550 digits: without the bound of the residual, more digits are wrong.
+    # Six steps give about 550 digits, so 1000 digits need the bound of the residual.
     M = np.array([[0.28, -0.96, 0.0], [0.96, 0.28, 0.0], [0.0, 0.0, 1.0]])
     M += np.random.default_rng(1).uniform(-5e-10, 5e-10, (3, 3))
     found = nearest(M, 1000)

@@ -1,4 +1,4 @@
-"""The sheet draws the numbers, says what was checked, and the same motion gives the same file."""
+"""A plot draws the numbers and states what was checked; the same motion gives the same file."""
 
 from pathlib import Path
 from typing import Any
@@ -70,7 +70,7 @@ def test_q_and_v_are_drawn_with_their_limits_one_unit_an_axis(case: Case) -> Non
 
 
 def _of(bounds: Any) -> tuple[set[float], set[float]]:
-    """Those of the panda's seven angles, and of its finger."""
+    """Return the bounds of the panda's seven angles, and of its finger."""
     return {float(x) for row in bounds for x in row[:7]}, {float(x) for row in bounds for x in row[7:]}
 
 

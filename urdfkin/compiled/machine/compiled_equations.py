@@ -7,7 +7,7 @@ from typing import Any
 from urdfkin.compiled.machine.compiling import compiled
 from urdfkin.kinematics.arithmetic import bound
 
-globals().update(vars(bound(made=compiled)))
+globals().update(vars(bound(decorate=compiled)))
 
 
 def __getattr__(name: str) -> Any:

@@ -6,10 +6,10 @@ cache files have no digest: a truncated file makes every later run fail, and a c
 this module each cache file has a digest. If a cache file is damaged, its kernel is compiled again. If no
 folder is writable, nothing is cached.
 
-Parts. A *part* is a function that only kernels call, never Python. The compiler inlines a part into each
-kernel that calls it. A part therefore needs no machine code of its own, and no optimization before it is
-inlined. Parts use no closures and no array expressions. The compiler passes for such unused features of
-Python are therefore skipped. Skipping all these steps halves the compile time.
+Inlined functions. Only kernels call an inlined function, never Python, and the compiler inlines it into each
+kernel. An inlined function therefore needs no machine code of its own, and no separate optimization. It has
+no closures and no array expressions, so the compiler passes for these features are skipped too. Skipping
+these steps halves the compile time.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from numba.core.compiler import CompilerBase, CompileResult
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.serialize import dumps
 
-from urdfkin.compiled.kept import cache_folder, compile_event, compiling
+from urdfkin.compiled.kernel_cache import cache_folder, compile_event, compiling
 from urdfkin.system.cache import get, put, report_damaged
 from urdfkin.system.files import read_bytes
 
@@ -49,11 +49,11 @@ class KernelCache(_Null):  # type: ignore[misc]
 
     The folder's name contains a digest of the source files that all kernels share. A file's name depends on
     the function, its source file, its argument types and the processor. The source file may be in another
-    package. The function `missed` is called if the cache has no usable file.
+    package. The function `begin` is called if the cache has no usable file, before the compilation.
     """
 
-    def __init__(self, function: Callable[..., int], folder: Path, missed: Callable[[], None]) -> None:
-        self._folder, self._name, self._missed = folder, function_name(function), missed
+    def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
+        self._folder, self._name, self._begin = folder, function_name(function), begin
         self._source = read_bytes(Path(function.__code__.co_filename))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -63,10 +63,10 @@ class KernelCache(_Null):  # type: ignore[misc]
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # A file that another version wrote can cause any error, even if it is not damaged.
+            # An undamaged file can cause any error too, if another version wrote the file.
             except Exception as error:
                 report_damaged(place, f"{type(error).__name__}: {error}")
-        self._missed()
+        self._begin()
         return None
 
     def save_overload(self, sig: Any, cres: Any) -> None:
@@ -91,8 +91,8 @@ _Passes: Any = PassManager
 _register: Any = register_pass
 
 
-class _Part(_Library):  # type: ignore[misc]
-    """The LLVM code of a part, that is, of a function that only kernels call."""
+class _InlinedLibrary(_Library):  # type: ignore[misc]
+    """LLVM code of an inlined function."""
 
     def finalize(self) -> None:
         """Mark the library as finished without generating machine code."""
@@ -101,21 +101,20 @@ class _Part(_Library):  # type: ignore[misc]
 
     @property
     def all(self) -> list[Any]:
-        """The LLVM libraries of this part and of all functions that the part calls."""
+        """The LLVM libraries of this function and of all functions that it calls."""
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
 @_register(mutates_CFG=True, analysis_only=False)
-class _PartLowering(_Lowering):  # type: ignore[misc]
-    _name = "part_lowering"
+class _InlinedLowering(_Lowering):  # type: ignore[misc]
+    _name = "inlined_lowering"
 
     def run_pass(self, state: Any) -> bool:
         """Translate the function to LLVM code, but not to machine code."""
-        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba identifies a compiled function by the C pointer through which Python calls it.
-        # A part has no such pointer.
+        # Numba identifies a compiled function by the C pointer for Python, which an inlined function lacks.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -123,11 +122,11 @@ class _PartLowering(_Lowering):  # type: ignore[misc]
         return True
 
 
-class PartCompiler(_Compiler):  # type: ignore[misc]
-    """A compiler that runs only the passes of Numba that the parts of kernels need."""
+class InlinedCompiler(_Compiler):  # type: ignore[misc]
+    """A compiler that runs only the passes of Numba that inlined functions need."""
 
     def define_pipelines(self) -> list[Any]:
-        passes = _Passes("part")
+        passes = _Passes("inlined")
         for each in (
             untyped_passes.TranslateByteCode,
             untyped_passes.FixupArgs,
@@ -139,7 +138,7 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
             typed_passes.PreLowerStripPhis,
             typed_passes.IRLegalization,
             typed_passes.AnnotateTypes,
-            _PartLowering,
+            _InlinedLowering,
             typed_passes.NoPythonBackend,
         ):
             passes.add_pass(each, each.__name__)
@@ -150,18 +149,17 @@ class PartCompiler(_Compiler):  # type: ignore[misc]
 _config: Any = numba.config  # Numba defines these settings at run time.
 
 #: Options of every compiled function.
-#: The compiler must not reorder operations.
-#: The compiler fuses a product and a sum only where the module `numbers` requests it.
+#: Without fast math, the compiler neither reorders nor fuses operations; the module `numbers` fuses some.
 #: Results therefore do not depend on the compiler.
 #: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
 #: The functions allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-#: Options of a part: it is only inlined into kernels, so it has no entry point for Python or C.
-_PART: dict[str, Any] = {
+#: Options of an inlined function, which has no entry point for Python or C.
+_INLINED: dict[str, Any] = {
     "forceinline": True,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
-    "pipeline_class": PartCompiler,
+    "pipeline_class": InlinedCompiler,
 }
 
 
@@ -178,7 +176,7 @@ def compiling_allowed() -> Iterator[None]:
 def _skip_blas_check() -> None:
     """Prevent Numba from importing SciPy's linear algebra for a check.
 
-    The import takes a fifth of the running time of a command. No kernel calls linear algebra. For other
+    The import takes a fifth of the running time of a command, and no kernel calls linear algebra. For other
     compiled functions that call linear algebra, Numba still imports and checks SciPy. If a version of Numba
     makes this check in a different function, `_skip_blas_check` has no effect.
     """
@@ -203,10 +201,10 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-#: It decorates a part of kernels.
-compiled = jitted(**_PART)
+#: Decorator of an inlined function.
+compiled = jitted(**_INLINED)
 
-# An input array may be read-only; Numba also accepts a writable array for this signature, without a copy.
+# A read-only argument type also accepts a writable array, without a copy.
 NUMBERS = types.Array(types.float64, 1, "C", readonly=True)
 ROWS = types.Array(types.float64, 2, "C", readonly=True)
 PLACES = types.Array(types.int64, 1, "C", readonly=True)
@@ -219,7 +217,7 @@ STATES = types.Array(types.float64, 3, "C")
 class Kernel:
     """A function that is compiled, or read from disk, when it is first called.
 
-    Calling the attribute `compiled` directly, without `Kernel`, costs a tenth of a microsecond.
+    Calling the attribute `compiled` directly, without `Kernel`, saves a tenth of a microsecond.
     """
 
     compiled: Any
@@ -229,8 +227,7 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # Python calls this for attributes that do not exist yet; `compiled` is not a cached property.
-        # Before Python 3.12, a cached property has a lock, which could stay locked forever in a forked child.
+        # `compiled` is not a cached property, whose lock (before Python 3.12) could stay locked after a fork.
         if name != "compiled":
             raise AttributeError(name)
         with compiling:
@@ -244,15 +241,15 @@ class Kernel:
         dispatcher.disable_compile()
         return dispatcher
 
-    def _compile_or_load(self, made: Any, make: Callable[[], object]) -> None:
+    def _compile_or_load(self, function: Any, compile_: Callable[[], object]) -> None:
         """Read the function from disk, or compile it and inform the listeners."""
-        with compile_event(self.__name__.strip("_").replace("_", " ")) as missed, compiling_allowed():
+        with compile_event(self.__name__.strip("_").replace("_", " ")) as begin, compiling_allowed():
             _skip_blas_check()
             if (folder := cache_folder()) is None:
-                missed()
+                begin()
             else:
-                made._cache = KernelCache(self._function, folder, missed)
-            make()
+                function._cache = KernelCache(self._function, folder, begin)
+            compile_()
 
     def __call__(self, *arguments: Any) -> int:
         return int(self.compiled(*arguments))
@@ -282,14 +279,14 @@ class Core(Kernel):
 
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator for a function that is a part of kernels, with additional options for Numba."""
-    return jitted(**_PART, **options)
+    """Return a decorator for an inlined function, with additional options for Numba."""
+    return jitted(**_INLINED, **options)
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
     """Return a decorator for a kernel with these argument types (Numba's).
 
     The kernel is compiled at the first call and cached on disk. `nogil` says whether a call releases Python's
-    global interpreter lock. For a call that takes a microsecond, this would cost more time than it saves.
+    global interpreter lock. Releasing the lock costs more time than a call of a microsecond takes.
     """
     return lambda function: Kernel(function, arguments, nogil)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from urdfkin.compiled import axes, outputs, recursion, recursions
+from urdfkin.compiled import outputs, recursion, recursions
 from urdfkin.compiled.machine import compiled_equations, memory, numbers, sine
 from urdfkin.compiled.machine.compiling import Core, compiled
 from urdfkin.kinematics.arithmetic import rebound
@@ -18,12 +18,12 @@ from urdfkin.kinematics.arithmetic import rebound
 _OTHERS = {
     name: x for part in (numbers, memory, sine) for name, x in vars(part).items() if not name.startswith("_")
 } | {"eq": compiled_equations}
-_PARTS: dict[str, Any] = rebound(axes, recursion, outputs, made=compiled, others=_OTHERS)
-_MADE: dict[str, Core] = rebound(recursions, made=Core, others=_PARTS)
+_INLINED: dict[str, Any] = rebound(recursion, outputs, decorate=compiled, others=_OTHERS)
+_KERNELS: dict[str, Core] = rebound(recursions, decorate=Core, others=_INLINED)
 
 placements, velocities, accelerations = (
-    _MADE[name] for name in ("placements", "velocities", "accelerations")
+    _KERNELS[name] for name in ("placements", "velocities", "accelerations")
 )
-local_velocities, local_accelerations = _MADE["local_velocities"], _MADE["local_accelerations"]
-jacobians, jacobian_rates = _MADE["jacobians"], _MADE["jacobian_rates"]
-hessians, imus = _MADE["hessians"], _MADE["imus"]
+local_velocities, local_accelerations = _KERNELS["local_velocities"], _KERNELS["local_accelerations"]
+jacobians, jacobian_rates = _KERNELS["jacobians"], _KERNELS["jacobian_rates"]
+hessians, imus = _KERNELS["hessians"], _KERNELS["imus"]

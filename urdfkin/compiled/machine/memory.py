@@ -25,19 +25,21 @@ from urdfkin.compiled.plan import LANES
 from urdfkin.compiled.python_numbers import LARGE
 
 NUMBER = Lanes(LANES)
-_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 NUMBERS, WHOLE_NUMBERS = types.CPointer(types.float64), types.CPointer(types.int64)
 
 
+def _vector_at(builder: Any, numbers: Any, at: Any, width: int) -> Any:
+    """Return the address of `width` numbers that begin at `numbers[at]`."""
+    return builder.bitcast(builder.gep(numbers, [at]), ir.VectorType(ir.DoubleType(), width).as_pointer())
+
+
 def _in_row(builder: Any, s: Any, row: Any) -> Any:
-    begin = builder.mul(row, ir.Constant(row.type, LANES))
-    return builder.bitcast(builder.gep(s, [begin]), _VECTOR.as_pointer())
+    """Return the address of the eight doubles of a row of scratch memory."""
+    return _vector_at(builder, s, builder.mul(row, ir.Constant(row.type, LANES)), LANES)
 
 
 @intrinsic
 def number(context: Any, s: Any, row: Any) -> Any:
-    """Return the eight doubles of a row of scratch memory as one vector."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.load(_in_row(builder, *arguments), align=64)
 
@@ -46,8 +48,6 @@ def number(context: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
-    """Return the eight doubles of a row of scratch memory, or `nothing()` if `wanted` is `nothing()`."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if isinstance(wanted, Known):
             return context.get_dummy_value()
@@ -58,8 +58,6 @@ def number_if(context: Any, wanted: Any, s: Any, row: Any) -> Any:
 
 @intrinsic
 def put(context: Any, s: Any, row: Any, x: Any) -> Any:
-    """Write the eight doubles of x to a row of scratch memory; `nothing()` does not change the row."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         s, row, value = arguments
         if x != NOTHING:
@@ -72,8 +70,6 @@ def put(context: Any, s: Any, row: Any, x: Any) -> Any:
 
 @intrinsic
 def constant(context: Any, g: Any, i: Any) -> Any:
-    """Return element i of the constants g as a number with the same value for all configurations."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, builder.load(builder.gep(arguments[0], [arguments[1]])), LANES)
 
@@ -82,8 +78,6 @@ def constant(context: Any, g: Any, i: Any) -> Any:
 
 @intrinsic
 def same(context: Any, x: Any) -> Any:
-    """Return a vector in which the double x is repeated for all eight configurations."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return in_all_lanes(builder, arguments[0], LANES)
 
@@ -114,13 +108,12 @@ def _at_address(kind: Any) -> Any:
     return at_address
 
 
-#: These functions convert an address to a pointer to doubles, and to a pointer to integers.
+#: Functions that convert an address to a pointer to doubles, and to a pointer to integers.
 numbers_at, whole_numbers_at = map(_at_address, (NUMBERS, WHOLE_NUMBERS))
 
 
-#: At most this number of doubles are prefetched; they fill half of the first-level cache.
+#: Maximum number of doubles that are prefetched; they fill half of the first-level cache.
 _MOST_FETCHED = 3072
-_NUMBERS = types.CPointer(types.float64)
 
 
 def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
@@ -157,11 +150,6 @@ def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
     return x
 
 
-def _vector_at(builder: Any, numbers: Any, at: Any, width: int) -> Any:
-    """Return the address of `width` numbers that begin at `numbers[at]`."""
-    return builder.bitcast(builder.gep(numbers, [at]), ir.VectorType(ir.DoubleType(), width).as_pointer())
-
-
 def _plus(builder: Any, number: Any, constant: int) -> Any:
     return builder.add(number, ir.Constant(number.type, constant))
 
@@ -178,13 +166,11 @@ def _make_reader(width: int) -> Any:
                 pieces.append(builder.load(_vector_at(builder, x, at, width), align=8))
                 at = builder.add(at, stride)
             rows = _transpose_blocks(builder, [_concatenate(builder, pieces[i::width]) for i in range(width)])
-            to = builder.mul(row, ir.Constant(row.type, LANES))
             for i, vector in enumerate(rows):
-                place = _vector_at(builder, s, _plus(builder, to, LANES * i), LANES)
-                builder.store(vector, place, align=64)
+                builder.store(vector, _in_row(builder, s, _plus(builder, row, i)), align=64)
             return context.get_dummy_value()
 
-        return types.void(_NUMBERS, *[types.intp] * 2, _NUMBERS, types.intp), generate
+        return types.void(NUMBERS, *[types.intp] * 2, NUMBERS, types.intp), generate
 
     return read
 
@@ -199,8 +185,7 @@ def _make_writer(width: int) -> Any:
             vectors = []
             for i in range(width):
                 row = builder.load(builder.gep(rows, [_plus(builder, first, i)]))
-                begin = builder.mul(row, ir.Constant(row.type, LANES))
-                vectors.append(builder.load(_vector_at(builder, s, begin, LANES), align=64))
+                vectors.append(builder.load(_in_row(builder, s, row), align=64))
             blocks = _transpose_blocks(builder, vectors)
             for k in range(LANES):
                 numbers = _piece(builder, blocks[k % width], k // width * width, width)
@@ -208,8 +193,7 @@ def _make_writer(width: int) -> Any:
                 at = builder.add(at, stride)
             return context.get_dummy_value()
 
-        whole = types.CPointer(types.int64)
-        return types.void(_NUMBERS, whole, types.intp, _NUMBERS, *[types.intp] * 2), generate
+        return types.void(NUMBERS, WHOLE_NUMBERS, types.intp, NUMBERS, *[types.intp] * 2), generate
 
     return write
 
@@ -281,7 +265,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
         builder.call(function, [address, to_read, near, data])
         return context.get_dummy_value()
 
-    return types.void(_NUMBERS, types.intp), generate
+    return types.void(NUMBERS, types.intp), generate
 
 
 @compiled
@@ -292,7 +276,7 @@ def fetch(x, at, count):
             _fetch(x, number)
 
 
-#: When the number with index i is read, the number with index i + _AHEAD is loaded into the cache.
+#: Distance (in doubles) from the number that is read to the number that is loaded into the cache.
 _AHEAD = 512
 
 
@@ -302,7 +286,7 @@ def _eight(context: Any, x: Any, at: Any) -> Any:
         x, at = arguments
         return builder.load(_vector_at(builder, x, at, LANES), align=8)
 
-    return NUMBER(_NUMBERS, types.intp), generate
+    return NUMBER(NUMBERS, types.intp), generate
 
 
 @compiled
@@ -345,7 +329,6 @@ def _sum(context: Any, x: Any) -> Any:
 
 @compiled
 def ordinary(total):
-    """Return whether a sum of squares is below the square of `LARGE`; it is not if a number was nan."""
     return _sum(total) < LARGE * LARGE
 
 
@@ -360,15 +343,15 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
         store.set_metadata("nontemporal", builder.module.add_metadata([ir.IntType(32)(1)]))
         return context.get_dummy_value()
 
-    return types.void(_NUMBERS, types.intp, _NUMBERS, types.intp), generate
+    return types.void(NUMBERS, types.intp, NUMBERS, types.intp), generate
 
 
 @compiled
 def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
-    Before it writes a part of a cache line, a processor reads this line. If all bytes of a cache line are
-    written at once, the processor does not read the line first. `address` is the address of `to[0]`.
+    A processor reads a cache line before it writes a part of the line, but not before it writes the whole
+    line. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

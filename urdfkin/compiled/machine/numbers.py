@@ -1,11 +1,10 @@
 """Number types for compiled code: a value of such a type is one double or a vector of doubles.
 
-A value of type `Lanes(8)` is eight doubles in one vector register. A value of type `Lanes(1)` is one double.
-`Lanes(8)` and `Lanes(1)` are Numba types that use LLVM's vectors, so a value stays in a register from one
-equation to the next. A product x y is not computed at once. In the sum x y + z, the product and the sum are
-one fused multiply-add, which is rounded only once. This module, and not the compiler, decides which
-operations are fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every
-machine.
+A value of type `Lanes(8)` is eight doubles in one vector register, and a value of type `Lanes(1)` is one
+double. Both are Numba types that use LLVM's vectors, so a value stays in a register from one equation to the
+next. A product x y is not computed at once. In the sum x y + z, the product and the sum are one fused
+multiply-add, which is rounded only once. This module, and not the compiler, decides which operations are
+fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
 sum with zero, costs no time. If the axis is `(zero(), zero(), one())`, the compiler therefore simplifies the
@@ -141,7 +140,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether each type is one of this module's number types or an integer type.
+    """Return whether each type is a number type of this module or an integer type, but not all are integers.
 
     Equations contain integers as factors, for example the 2 in 2 (w x u).
     """
@@ -231,22 +230,6 @@ def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> 
     return _Value(context, builder, kind, value).number(width)
 
 
-def _lower_add(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    x, y = _values(context, builder, signature, arguments)
-    if _known(signature.return_type, None):
-        return context.get_dummy_value()
-    if _known(y.type, 0):
-        return x.value
-    if _known(x.type, 0):
-        return y.value
-    width = signature.return_type.width
-    if y.is_product:
-        return fused(builder, *y.factors(), x.number(width))
-    if x.is_product:
-        return fused(builder, *x.factors(), y.number(width))
-    return builder.fadd(x.number(width), y.number(width))
-
-
 def _negate(context: Any, builder: Any, x: _Value) -> Any:
     if isinstance(x.type, Known):
         return context.get_dummy_value()
@@ -256,21 +239,29 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
     return builder.fneg(x.value)
 
 
-def _lower_sub(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    x, y = _values(context, builder, signature, arguments)
-    if _known(signature.return_type, None):
-        return context.get_dummy_value()
-    if _known(y.type, 0):
-        return x.value
-    if _known(x.type, 0):
-        return _negate(context, builder, y)
-    width = signature.return_type.width
-    if y.is_product:
-        first, second = y.factors()
-        return fused(builder, builder.fneg(first), second, x.number(width))
-    if x.is_product:
-        return fused(builder, *x.factors(), builder.fneg(y.number(width)))
-    return builder.fsub(x.number(width), y.number(width))
+def _lower_sum(*, negative: bool) -> Callable[..., Any]:
+    """Return the code generator of x + y, or of x - y if `negative` is true."""
+
+    def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        def signed(value: Any) -> Any:
+            return builder.fneg(value) if negative else value
+
+        x, y = _values(context, builder, signature, arguments)
+        if _known(signature.return_type, None):
+            return context.get_dummy_value()
+        if _known(y.type, 0):
+            return x.value
+        if _known(x.type, 0):
+            return _negate(context, builder, y) if negative else y.value
+        width = signature.return_type.width
+        if y.is_product:
+            first, second = y.factors()
+            return fused(builder, signed(first), second, x.number(width))
+        if x.is_product:
+            return fused(builder, *x.factors(), signed(y.number(width)))
+        return builder.fadd(x.number(width), signed(y.number(width)))
+
+    return lower
 
 
 def _lower_neg(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -284,14 +275,14 @@ for _x in _KINDS:
         if _x is _y is types.Integer:
             continue
         lower_builtin(operator.mul, _x, _y)(_lower_mul)
-        lower_builtin(operator.add, _x, _y)(_lower_add)
-        lower_builtin(operator.sub, _x, _y)(_lower_sub)
+        lower_builtin(operator.add, _x, _y)(_lower_sum(negative=False))
+        lower_builtin(operator.sub, _x, _y)(_lower_sum(negative=True))
 for _x in (Lanes, Product, Known):
     lower_builtin(operator.neg, _x)(_lower_neg)
 
 
 def _multiply(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _Value(context, builder, fromty, value).number(toty.width)
+    return as_number(context, builder, fromty, value, toty.width)
 
 
 lower_cast(Product, Lanes)(_multiply)
@@ -313,10 +304,8 @@ def rounded(context: Any, x: Any) -> Any:
     """Multiply the factors of a product and round the result; return other numbers unchanged."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        kind = signature.args[0]
-        return (
-            _Value(context, builder, kind, arguments[0]).number(kind.width) if kind != given else arguments[0]
-        )
+        if not isinstance(x, Product):
+            return arguments[0]
+        return as_number(context, builder, x, arguments[0], x.width)
 
-    given = Lanes(x.width) if isinstance(x, Product) else x
-    return given(x), generate
+    return (Lanes(x.width) if isinstance(x, Product) else x)(x), generate

@@ -64,7 +64,7 @@ def _of_small(context: Any, x: Any) -> Any:
         shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
-        # This difference is exact, because the two terms are multiples of 2^-53 and differ by less than 1.
+        # x - n pi/2 is exact, because the two terms are multiples of 2^-53 and differ by less than 1.
         # The variable `lost` is the rounding error of r, and `z_lost` is the rounding error of z = r^2.
         near = fused(builder, n, all_lanes(-PI_2), x)
         r = fused(builder, n, all_lanes(-PI_2_REST), near)
@@ -88,8 +88,7 @@ def _of_small(context: Any, x: Any) -> Any:
             return builder.bitcast(builder.xor(builder.bitcast(value, whole), sign), x.type)
 
         # An odd number of quarter turns exchanges sine and cosine.
-        # If the remainder of the quarter turns modulo 4 is 2 or 3, the sine changes its sign.
-        # If this remainder is 1 or 2, the cosine changes its sign.
+        # The sine changes its sign if the quarter turns modulo 4 are 2 or 3, and the cosine if 1 or 2.
         odd = builder.icmp_signed("!=", builder.and_(quarters, bits(1)), bits(0))
         pair = (
             signed(builder.select(odd, cosine, sine), quarters),

@@ -37,17 +37,17 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
     int, (KernelArgs.ORDERS, KernelArgs.AXES, KernelArgs.ROWS, KernelArgs.COLUMNS)
 )
 
-#: The header of a Python object has this number of 8-byte words.
+#: Number of 8-byte words in the header of a Python object.
 _OWN = object.__basicsize__ // 8
-#: `_TYPE` is the 8-byte word with an object's type, `_ITEMS` that with the first item of a tuple.
+#: Indices of the 8-byte words with an object's type, and with the first item of a tuple.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
-#: These 8-byte words of a NumPy array follow the C structure PyArrayObject_fields.
+#: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
 #: The number of axes and the flags are numbers of four bytes.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
-#: In the C structure PyArray_Descr (an element type), one word has the byte order and the type number.
+#: Index of the word with byte order and type number in the C structure PyArray_Descr, and their values.
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
-#: NumPy's flags: an input array is C-contiguous and aligned, and an output array is also writable.
+#: NumPy's flags of a C-contiguous and aligned input array, and of an output array, which is also writable.
 _READABLE, _WRITABLE = 0x101, 0x501
 
 _incref = types.ExternalFunction("Py_IncRef", types.void(types.int64))
@@ -89,9 +89,9 @@ def _release(context: Any, numbers: Any, place: Any) -> Any:
 
 
 @compiled
-def _doubles_address(given, ndarray, flags, axes, rows, columns):
+def _doubles_address(array, ndarray, flags, axes, rows, columns):
     """Return the address of an array's doubles; 0 if the object has another type, shape or flags."""
-    x = whole_numbers_at(given)
+    x = whole_numbers_at(array)
     if x[_TYPE] != ndarray or x[_NDIM] & _HALF != axes or x[_FLAGS] & flags != flags:
         return 0
     kind, shape = whole_numbers_at(x[_KIND])[_KIND_AND_ORDER], whole_numbers_at(x[_SHAPE])
@@ -118,16 +118,16 @@ def one_configuration(bound, arguments, count):
         arguments: Address of the Python call's arguments.
         count: Number of these arguments.
     """
-    items, given = whole_numbers_at(bound), whole_numbers_at(arguments)
+    items, inputs = whole_numbers_at(bound), whole_numbers_at(arguments)
     address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
     orders = whole_numbers_at(address)[_ORDERS]
     if count == orders + 1:
-        out = given[orders]
+        out = inputs[orders]
         if out == none:
             out = _call_one_arg(items[_ITEMS + 3], items[_ITEMS + 4])
         else:
             _incref(out)
-        if out == 0 or _compute_into(address, given, out, ndarray):
+        if out == 0 or _compute_into(address, inputs, out, ndarray):
             return out
         _decref(out)
     _incref(none)
@@ -135,7 +135,7 @@ def one_configuration(bound, arguments, count):
 
 
 @compiled
-def _compute_into(address, given, to, ndarray):
+def _compute_into(address, inputs, to, ndarray):
     """Write the kernel's result into the array `to`; return whether the type and the shape of `to` fit."""
     task = whole_numbers_at(address)
     orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
@@ -145,13 +145,13 @@ def _compute_into(address, given, to, ndarray):
     for _ in range(1, task[_AXES]):
         size *= columns
     for i in range(orders):
-        x = _doubles_address(given[i], ndarray, _READABLE, 1, width, 1) if good else 0
+        x = _doubles_address(inputs[i], ndarray, _READABLE, 1, width, 1) if good else 0
         apart = x + 8 * width <= out or out + size <= x
         good, width = x != 0 and apart, task[_NV]
     if not good or _test_and_set(task, _BUSY):
         return False
     for i in range(orders):
-        task[_Q + i] = whole_numbers_at(given[i])[_DATA]
+        task[_Q + i] = whole_numbers_at(inputs[i])[_DATA]
     task[_OUT] = out
     good = _call(task[_CORE], address) == 0
     task[_COUNT] += good
@@ -198,8 +198,7 @@ def arrays_are_known() -> bool:
     )
 
 
-#: A quantity has a kernel, a kernel for LOCAL, a number of inputs, and a number of axes of length nv.
-#: The inputs are q, or q and v, or q, v and a.
+#: For each quantity: kernel, kernel for LOCAL, number of inputs, number of axes of length nv.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -212,11 +211,11 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 def single(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that computes a quantity for one configuration, and its kernel arguments.
+    """Return a function that computes a quantity for one configuration, and the kernel's arguments.
 
     The compiled tree must have only one frame, and the base must be fixed. The arguments of the function are
     q, then v and a if the quantity needs them, and then the output array or None. The function returns None
-    for arguments that it does not support. The kernel arguments also contain a counter of the results that
+    for arguments that it does not support. The kernel's arguments also contain a counter of the results that
     the function has computed.
     """
     core, local_core, orders, columns = _HOW[quantity]
@@ -235,7 +234,7 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that computes one configuration with a C function instead of a kernel.
+    """Return a function that calls a C function instead of a kernel, and the arguments of the C function.
 
     `orders` is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a. `shape` is that of the result.
     """
@@ -248,7 +247,7 @@ def _called(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     task = np.zeros(len(KernelArgs), dtype=np.int64)
     task[KernelArgs.CORE], task[KernelArgs.ORDERS], task[KernelArgs.N] = address, orders, 1
-    # All strides are 0, because there is only one configuration.
+    # With one configuration, all strides are 0.
     task[KernelArgs.NQ], task[KernelArgs.NV] = plan.nq, plan.nv
     task[KernelArgs.AXES], task[KernelArgs.ROWS], task[KernelArgs.COLUMNS] = len(shape), *(*shape, 1)[:2]
     bound = task, np.ndarray, None, np.empty, shape, *alive

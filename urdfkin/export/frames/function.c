@@ -9,10 +9,10 @@ INLINE void line_@name@(const real *in, real *out, const size_t L)
 @lines@
 }
 
-void @title@_@name@@given@
+void @title@_@name@(@parameters@)
 {
-    real in[@room@] = {@inputs@};
-@unasked@
+    real in[@size@] = {@inputs@};
+@unused@
 @sines@
     line_@name@(in, out, 1);
 }
@@ -25,19 +25,19 @@ static void all_lanes_@name@(real *restrict in, real *restrict results)
         line_@name@(in + k, results + k, (size_t)LANES);
 }
 
-static void lanes_@name@@given@
+static void lanes_@name@(@parameters@)
 {
-    ALIGNED real in[@room@ * LANES];
+    ALIGNED real in[@size@ * LANES];
     ALIGNED real results[@count@ * LANES];
 @reads@
     all_lanes_@name@(in, results);
     write_rows(results, @count@, out);
 }
 
-void @title@_@name@_batch(size_t n, @given_rest@
+void @title@_@name@_batch(size_t n, @parameters@)
 {
     /* The last rows are computed in copies, so that no memory beyond an array's end is read or written. */
-    for (; n > LANES + @spare@; n -= LANES, @advance@, out += LANES * @count@)
+    for (; n > LANES + @reserve@; n -= LANES, @advance@, out += LANES * @count@)
         lanes_@name@(@passed@, out);
     while (n) {
         const size_t m = n < LANES ? n : LANES;

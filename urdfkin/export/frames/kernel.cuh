@@ -1,5 +1,5 @@
 
-template <class T> __global__ void __launch_bounds__(THREADS) @name@_kernel(size_t n, @given@)
+template <class T> __global__ void __launch_bounds__(THREADS) @name@_kernel(size_t n, @parameters@)
 {
     __shared__ Tile<T> tiles[THREADS / WARP];
     Tile<T> &tile = tiles[threadIdx.x / WARP];
@@ -14,7 +14,7 @@ template <class T> __global__ void __launch_bounds__(THREADS) @name@_kernel(size
 }
 
 /* Start the kernel for n configurations in the memory of the device. */
-template <class T> cudaError_t @name@_batch(size_t n, @given@, cudaStream_t stream = 0)
+template <class T> cudaError_t @name@_batch(size_t n, @parameters@, cudaStream_t stream = 0)
 {
     if (n == 0) return cudaSuccess;
     void *arguments[] = {&n, @addresses@, &out};

@@ -55,9 +55,9 @@ INLINE void stream(const double *x, size_t count, double *out)
 }
 
 /* One configuration in every lane, with the machine code of a batch, so that the bits are equal. */
-static void one(@given@, double *out)
+static void one(@inputs_of_one@, double *out)
 {
-    ALIGNED double in[@room@ * LANES];
+    ALIGNED double in[@size@ * LANES];
     ALIGNED double results[@count@ * LANES];
 @spread@
     all_lanes_@name@(in, results);
@@ -70,7 +70,7 @@ int64_t task(const int64_t *places)
     double *out = (double *)(uintptr_t)places[@OUT@], *stage = (double *)(uintptr_t)places[@STAGE@];
 @inputs@
     numbers bad[SUMS] = {{0.0}};
-    for (; n > LANES + @spare@; n -= LANES, @advance@, out += LANES * @count@) {
+    for (; n > LANES + @reserve@; n -= LANES, @advance@, out += LANES * @count@) {
 @look@
         lanes_@name@(@passed@, stage ? stage : out);
         if (stage) stream(stage, LANES * @count@, out);

@@ -1,7 +1,6 @@
 """The textbook's equations as data: each has its statement, its meaning, its functions and its tests.
 
-The TOML files in `data` are the only source of `docs/equations.md` and of `urdfkin explain 7.130`. A test
-checks that every function and every test that these files name exists.
+The TOML files in `data` are the only source of `docs/equations.md` and of `urdfkin explain 7.130`.
 """
 
 from __future__ import annotations
@@ -20,8 +19,7 @@ from urdfkin.kinematics.latex import latex
 
 #: The last equation number of the textbook's chapter 7.
 LAST = 130
-#: Numbers of the unknown equations: page 2 of the chapter is lost.
-#: Equation 7.7 is on that page too, but section 7.2 repeats it.
+#: Numbers of the unknown equations: page 2 of the chapter is lost, and only 7.7 is repeated in section 7.2.
 LOST = ("7.6", "7.8", "7.9", "7.10")
 
 _FILES = (
@@ -48,8 +46,8 @@ class Equation:
         latex: The statement in LaTeX.
         meaning: One or two sentences.
         written: Names of the functions of `urdfkin.kinematics.equations` that state the equation.
-        functions: Functions that compute the equation, "module:name".
-        tests: Tests that fail if the equation is computed wrongly, "file::name".
+        functions: Functions that compute the equation, as "module:name".
+        tests: Tests that fail if the equation is computed wrongly, as "file::name".
         against: The independent source with which the tests compare the result.
     """
 
@@ -65,7 +63,7 @@ class Equation:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A section of the chapter; for several sections, `number` is a list such as "7.2.4, 7.2.5"."""
+    """One or more sections of the chapter; `number` is, for example, "7.3" or "7.2.4, 7.2.5"."""
 
     number: str
     title: str
@@ -79,7 +77,7 @@ class Misprint:
     Attributes:
         where: The place of the misprint in the chapter.
         proof: The reason why the printed statement is wrong, in one sentence.
-        test: The test that proves it, "file::name".
+        test: The test that proves the misprint, as "file::name".
     """
 
     where: str
@@ -99,7 +97,6 @@ def sections() -> tuple[Section, ...]:
 
 @cache
 def equations() -> dict[str, Equation]:
-    """Return the equations by number, in the order of the chapter."""
     return {equation.number: equation for section in sections() for equation in section.equations}
 
 
@@ -130,17 +127,11 @@ def table() -> str:
     """Return the text of the page docs/equations.md."""
     parts = [_head()]
     for section in sections():
-        parts += [
-            f"## {section.number} {section.title}",
-            "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
-            + "\n".join(_row(equation) for equation in section.equations),
-        ]
-    parts += [
-        "## Misprints",
-        "Wrong or incomplete statements in the chapter. A test proves each one.",
-        *map(_misprint, misprints()),
-    ]
-    return "\n\n".join(parts) + "\n"
+        head = "| | equation | computed by; a test that fails without it; checked with |\n|---|---|---|\n"
+        rows = "\n".join(map(_row, section.equations))
+        parts += [f"## {section.number} {section.title}", head + rows]
+    introduction = "Wrong or incomplete statements in the chapter. A test proves each one."
+    return "\n\n".join([*parts, "## Misprints", introduction, *map(_misprint, misprints())]) + "\n"
 
 
 def _head() -> str:
@@ -201,15 +192,11 @@ def explain(number: str) -> str | None:
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST:
         return None
     if match[1] in LOST:
-        return _lost(match[1])
+        return (
+            f"Equation {match[1]}\n\nThe chapter's page 2, with equations {', '.join(LOST)}, is lost."
+            "\nEvery other equation up to 7.130 is known."
+        )
     return _page(equations()[match[1]])
-
-
-def _lost(number: str) -> str:
-    return (
-        f"Equation {number}\n\nIt is on page 2 of the chapter, and this page is lost: "
-        f"{', '.join(LOST)} are not known.\nEvery other equation up to 7.130 is here."
-    )
 
 
 def _page(equation: Equation) -> str:
@@ -226,10 +213,7 @@ def _page(equation: Equation) -> str:
         f"checked with  {equation.against}",
     ]
     for name in equation.written:
-        lines += ["", *_source(name), "", f"    {latex(name)}"]
+        source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
+        head = "code in urdfkin/kinematics/equations.py, and LaTeX"
+        lines += ["", head, "", source, "", f"    {latex(name)}"]
     return "\n".join(lines)
-
-
-def _source(name: str) -> list[str]:
-    source = textwrap.indent(inspect.getsource(getattr(chapter, name)).rstrip(), "    ")
-    return ["code in urdfkin/kinematics/equations.py, and LaTeX", "", source]

@@ -24,7 +24,7 @@ import math
 import re
 import string
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -39,15 +39,8 @@ _UNITS = {"rad": 1.0, "deg": 180.0 / math.pi, "turn": 0.5 / math.pi, "m": 1.0, "
 _ANGLES, _LENGTHS = ("rad", "deg", "turn"), ("m", "mm")
 _CHOICES: dict[str, tuple[Any, ...]] = {
     "order": (
-        "depth first, by name",
-        "depth first, by file",
-        "depth first, by link",
-        "breadth first, by name",
-        "breadth first, by file",
-        "breadth first, with fixed joints",
-        "file",
-        "name",
-        "given",
+        "depth first, by name", "depth first, by file", "depth first, by link", "breadth first, by name",
+        "breadth first, by file", "breadth first, with fixed joints", "file", "name", "given",
     ),
     "continuous": (1, 2),
     "mimic": ("none", "own"),
@@ -61,12 +54,12 @@ _CHOICES: dict[str, tuple[Any, ...]] = {
     "six": ("linear first", "angular first"),
     "names": ("urdf", "usd", "identifier", "isaacsim"),
     "angle": _ANGLES,
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class JointRule:
-    """The rule that converts a joint's value to another program's: `factor * value + zero`, in its unit.
+    """The rule that converts a joint's value to another program's value: `factor * value + zero`.
 
     Attributes:
         name: The joint's name in the target program. None means the name in the URDF.
@@ -83,14 +76,14 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """The number of units in one rad or m, multiplied by `sign`; None if `unit` is None."""
+        """Number of units in one rad or m, multiplied by `sign`; None if `unit` is None."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
 
     @property
     def of(self) -> str:
-        """The kind of unit: "angle" or "length"; "" if the joint uses the convention's unit."""
+        """Kind of unit: "angle" or "length"; "" if the joint uses the convention's unit."""
         if self.unit is None:
             return ""
         return "length" if self.unit in _LENGTHS else "angle"
@@ -144,7 +137,7 @@ def _built_in() -> dict[str, Convention]:
     }
 
 
-#: Tables list the built-in conventions in this order; a test compares the names with conventions.toml.
+#: Names of the built-in conventions in the order of tables; a test compares them with conventions.toml.
 BUILT_IN = (
     "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
     "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",
@@ -172,7 +165,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 
 
 def read_convention(text: str, where: str, name: str) -> Convention:
-    """Return the convention of a TOML text; `name` is its name if the text has none.
+    """Return the convention of a TOML text; `name` replaces a missing name.
 
     Invalid TOML, an invalid value or a repeated name raises InputError; an unknown key or an unknown `like`
     raises UnknownNameError.
@@ -194,15 +187,14 @@ def read_convention(text: str, where: str, name: str) -> Convention:
         if not isinstance(joints, list) or not all(isinstance(joint, str) for joint in joints):
             raise InputError("`joints` must be a list of names", where=where, found=safe_repr(joints))
         changes |= {"order": "given", "joints": tuple(joints)}
-        _demand_once(joints, where)
+        demand_unique(joints, where)
     rules = found.pop("joint", {})
     if not isinstance(rules, dict) or not all(isinstance(rule, dict) for rule in rules.values()):
         raise InputError(
             "`joint` must contain tables, such as [joint.elbow]", where=where, found=safe_repr(rules)
         )
     changes["rules"] = {joint: _rule(rule, f"{where}: joint {joint}") for joint, rule in rules.items()}
-    columns = [rule.name for rule in changes["rules"].values() if rule.name is not None]
-    _demand_once(columns, where)
+    demand_unique([rule.name for rule in changes["rules"].values() if rule.name is not None], where)
     for key, value in found.items():
         if key not in _CHOICES:
             raise UnknownNameError("key", key, (*_CHOICES, "like", "joints", "joint", "title"), where=where)
@@ -213,7 +205,7 @@ def read_convention(text: str, where: str, name: str) -> Convention:
     return replace(base, **changes)
 
 
-def _demand_once(names: list[str], where: str) -> None:
+def demand_unique(names: Sequence[str], where: str) -> None:
     if len(set(names)) != len(names):
         double = next(name for i, name in enumerate(names) if name in names[:i])
         raise InputError("two joints have the same name in the convention", where=where, found=repr(double))
@@ -280,7 +272,7 @@ def as_toml(how: Convention) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Return a text as a quoted string of TOML: with the escapes of JSON, and also an escaped DEL."""
+    """Return a text as a quoted string of TOML: JSON's escapes, and an escape of DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -288,7 +280,7 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: `transcoded` appends numbers in base 62 to a name; a digit below 31 is the last digit of its number.
+#: Smallest base-62 digit after which a number in a transcoded name continues.
 _CONTINUES = 31
 
 
@@ -331,12 +323,10 @@ def identifier(name: str) -> str:
 def transcoded(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    Different names give different results.
-
-    The result begins with "tn__". Then come the allowed characters of the name and "_". Last come numbers in
-    base 62, one for each other character, sorted by code point. As in Punycode, a number d n + p encodes a
-    character and its position p in the name. Here d is the character's code point minus that of the previous
-    number, and n is the number of possible positions. Source:
+    Different names give different results. The result consists of "tn__", the allowed characters of the name,
+    "_", and a number in base 62 for each other character, sorted by code point. As in Punycode, the number is
+    d n + p for a character at position p in the name. Here d is the character's code point minus that of the
+    previous character, and n is the number of possible positions. Source:
     github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")

@@ -18,24 +18,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.kinematics.inputs import scalars
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import CoordinateLayout, Given
-from urdfkin.model.conventions.convention import Convention, JointRule, spelled
+from urdfkin.model.conventions.convention import Convention, JointRule, demand_unique, spelled
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import plain_xml
 
-#: A mimic joint's given value may differ from its mimic rule by this number (rad or m).
+#: Largest difference (rad or m) between the value of a mimic joint and its mimic rule.
 _MIMIC_TOLERANCE = 1e-9
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 @dataclass(frozen=True, slots=True)
 class _TargetNumber:
-    """One number of the target program's q: `factor * value + zero`, where `value` is urdfkin's `q[at]`.
+    """One number of the target program's q or v: `factor * x[at] + zero`, where x is urdfkin's q or v.
 
-    `part` is "cos" or "sin" for a continuous joint that the target program stores as two numbers. `copy` is
-    True if the target program's q also contains mimic joints, and this number belongs to one.
+    Attributes:
+        part: "cos" or "sin" for a continuous joint that the target program stores as two numbers.
+        copy: Whether the number belongs to a mimic joint, which has no number in urdfkin.
     """
 
     name: str
@@ -49,7 +50,14 @@ class _TargetNumber:
 
 @dataclass(frozen=True, slots=True)
 class _FreeJoint:
-    """A planar or floating joint whose velocity has other axes or another point in the target program."""
+    """A planar or floating joint whose velocity has other axes or another point in the target program.
+
+    Attributes:
+        q: Index of the joint's first number in urdfkin's q.
+        v: Index of the joint's first number in urdfkin's v.
+        rows: Indices of the joint's numbers in the target program's v.
+        point: (3,) point of the linear velocity, in the joint's frame.
+    """
 
     joint: Joint
     q: int
@@ -63,16 +71,11 @@ class Conversion:
 
     Args:
         tree: The robot.
-        urdf: The URDF text of the robot. Some conventions need the order of the joints in the text, or the
-            centres of mass.
+        urdf: The URDF text, from which some conventions take the order of the joints or the centres of mass.
         convention: The convention.
-        joints: Order of the joints. This order replaces the order of the convention. It is required if the
-            convention has no order.
+        joints: Order of the joints, instead of the convention's order; required if the convention has none.
 
-    Raises:
-        InputError: a joint is missing or appears twice, two columns have the same name, or no order of joints
-            is given for a convention without an order.
-        UnknownNameError: the robot has no such joint.
+    A wrong order, or two columns with the same name, raises InputError; an unknown joint UnknownNameError.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -93,18 +96,10 @@ class Conversion:
         for name in convention.rules:
             self._index(name)
         self._order = self._ordered()
-        self._columns, self._units = list[_TargetNumber](), list[str]()
-        self._v_names, self._v_units = list[str](), list[str]()
-        self._v_index, self._v_factor = list[int](), list[float]()
-        self._v_copies, self._blocks, names = set[int](), list[_FreeJoint](), list[str]()
-        for i in self._order:
-            names.append(self._add(i))
-        self.joint_names = tuple(names)
-        if len(set(names)) != len(names):
-            double = next(name for k, name in enumerate(names) if name in names[:k])
-            raise InputError(
-                "two joints have the same name in the convention", where=convention.name, found=repr(double)
-            )
+        self._columns, self._rates = list[_TargetNumber](), list[_TargetNumber]()
+        self._blocks = list[_FreeJoint]()
+        self.joint_names = tuple(self._add(i) for i in self._order)
+        demand_unique(self.joint_names, convention.name)
         self._prepare()
 
     def __repr__(self) -> str:
@@ -117,12 +112,12 @@ class Conversion:
         tree, how = self.tree, self.convention
         moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
         if how.order == "given":
-            return self._given(moving)
+            return self._listed_order(moving)
         if how.mimic == "none":
             moving -= {i for i in moving if tree.joints[i].mimic}
         return [i for i in self._all_in_order() if i in moving]
 
-    def _given(self, moving: set[int]) -> list[int]:
+    def _listed_order(self, moving: set[int]) -> list[int]:
         how = self.convention
         if not how.joints:
             raise InputError(
@@ -138,10 +133,7 @@ class Conversion:
         for name, i in named:
             if i not in moving:
                 raise InputError("the order of joints contains a fixed joint", where=how.name, found=name)
-        if len(set(order)) != len(order):
-            raise InputError(
-                "two joints have the same name in the convention", where=how.name, found=", ".join(how.joints)
-            )
+        demand_unique([self.tree.joints[i].name for i in order], how.name)
         joints, covered = self.tree.joints, {self.tree.q_index[i] for i in order if self._follows(i)}
         missing = [joints[i].name for i in sorted(moving - set(order)) if self.tree.q_index[i] not in covered]
         if missing:
@@ -168,7 +160,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # The root joint has no place in the file; -1 puts it first.
+        # A root joint that urdfkin added is not in the file; -1 puts it first.
         place = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
@@ -196,14 +188,14 @@ class Conversion:
         """
 
         def below(link: int) -> list[int]:
-            found, fixed = list[int](), [link]
-            for one in fixed:  # The loop extends this list.
-                for i in children.get(one, []):
-                    # Locking a joint of this robot does not weld its links in the target program.
+            found, links = list[int](), [link]
+            for parent in links:  # The loop extends this list by links of fixed joints.
+                for i in children.get(parent, []):
+                    # A locked joint is still a moving joint in the target program.
                     if self.tree.joints[i].unlocked.kind.nv or not merged:
                         found.append(i)
                     else:
-                        fixed.append(i + 1)
+                        links.append(i + 1)
             return sorted(found, key=keys.__getitem__)
 
         order = below(0)
@@ -253,21 +245,12 @@ class Conversion:
         unit = ("rad" if turns else "m") if abs(factor) == 1.0 else ""
         copy, zero, factor = bool(joint.mimic), factor * offset + rule.zero, factor * multiplier
         if joint.kind is JointKind.CONTINUOUS and how.continuous == 2:
-            both = [
+            self._columns += [
                 _TargetNumber(f"{name}.{part}", q, factor, zero, part, copy=copy) for part in ("cos", "sin")
             ]
-            self._columns += both
         else:
             self._columns.append(_TargetNumber(name, q, factor, zero, "", unit, copy))
-        if joint.mimic:
-            self._v_copies.add(len(self._v_index))
-        self._add_rates([name], [unit], [v], [factor])
-
-    def _add_rates(self, names: list[str], units: list[str], at: list[int], factors: list[float]) -> None:
-        self._v_names += names
-        self._v_units += units
-        self._v_index += at
-        self._v_factor += factors
+        self._rates.append(_TargetNumber(name, v, factor, unit=unit, copy=copy))
 
     def _add_floating(self, i: int, name: str, q: int, v: int) -> None:
         how, joint = self.convention, self.tree.joints[i]
@@ -275,16 +258,13 @@ class Conversion:
         turn = [_TargetNumber(f"{name}.q{x}", q + 3 + "xyzw".index(x)) for x in how.quaternion]
         self._columns += position + turn if how.base_q == "position first" else turn + position
         point = np.zeros(3) if how.point == "origin" else self._centre_of_mass(self.tree.links[i + 1])
-        rates = [*range(6)] if how.base_v == "linear first" else _SWAPPED
-        names = [f"{name}.{x}" for x in ("vx", "vy", "vz", "wx", "wy", "wz")]
-        units, factors = ["m"] * 3 + ["rad"] * 3, [1.0] * 3 + [how.angle_factor] * 3
-        first = len(self._v_index)
-        self._add_rates(
-            [names[k] for k in rates],
-            [units[k] for k in rates],
-            [v + k for k in rates],
-            [factors[k] for k in rates],
-        )
+        linear = [_TargetNumber(f"{name}.v{x}", v + k, unit="m") for k, x in enumerate("xyz")]
+        angular = [
+            _TargetNumber(f"{name}.w{x}", v + 3 + k, how.angle_factor, unit="rad")
+            for k, x in enumerate("xyz")
+        ]
+        first = len(self._rates)
+        self._rates += linear + angular if how.base_v == "linear first" else angular + linear
         if "parent" in (how.linear, how.angular) or point.any():
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 6), point))
 
@@ -295,9 +275,9 @@ class Conversion:
             self._columns += [_TargetNumber(f"{name}.{part}", q + 2, part=part) for part in ("cos", "sin")]
         else:
             self._columns.append(_TargetNumber(f"{name}.angle", q + 2, how.angle_factor, unit="rad"))
-        first = len(self._v_index)
-        names = [f"{name}.{x}" for x in ("vx", "vy", "wz")]
-        self._add_rates(names, ["m", "m", "rad"], [v, v + 1, v + 2], [1.0, 1.0, how.angle_factor])
+        first = len(self._rates)
+        self._rates += [_TargetNumber(f"{name}.v{x}", v + k, unit="m") for k, x in enumerate("xy")]
+        self._rates.append(_TargetNumber(f"{name}.wz", v + 2, how.angle_factor, unit="rad"))
         if how.planar == "parent":
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
@@ -309,33 +289,21 @@ class Conversion:
         return np.zeros(3)
 
     def _prepare(self) -> None:
-        columns, how = self._columns, self.convention
-        self.nq, self.nv = len(columns), len(self._v_index)
+        columns, rates = self._columns, self._rates
+        self.nq, self.nv = len(columns), len(rates)
         self._q_index = np.array([c.at for c in columns], dtype=np.intp)
         self._q_factor = np.array([1.0 if c.part else c.factor for c in columns])
         self._q_zero = np.array([0.0 if c.part else c.zero for c in columns])
         self._plain_q = bool((self._q_factor == 1.0).all() and not self._q_zero.any())
         self._plain_q &= not any(c.part for c in columns)
         self._same_q = self._plain_q and np.array_equal(self._q_index, np.arange(self.tree.nq))
-        # Each number of urdfkin's q is in some column of the target program's q.
-        # A mimic joint's column is used only if no other column contains the number.
-        self._q_source = [
-            min((k for k, c in enumerate(columns) if c.at == at and c.factor), key=lambda k: columns[k].copy)
-            for at in range(self.tree.nq)
-        ]
-        self._v_at = np.array(self._v_index, dtype=np.intp)
-        self._v_scale = np.array(self._v_factor)
-        self._plain_v = bool((self._v_scale == 1.0).all()) and not self._blocks
-        self._same_v = self._plain_v and np.array_equal(self._v_at, np.arange(self.tree.nv))
-        self._v_source = [
-            min(
-                (k for k, x in enumerate(self._v_index) if x == at and self._v_factor[k]),
-                key=self._v_copies.__contains__,
-            )
-            for at in range(self.tree.nv)
-        ]
-        self._v_copies -= set(self._v_source)
-        self.angular_first = how.six == "angular first"
+        self._q_source = _sources(columns, self.tree.nq)
+        self._v_index = np.array([rate.at for rate in rates], dtype=np.intp)
+        self._v_factor = np.array([rate.factor for rate in rates])
+        self._plain_v = bool((self._v_factor == 1.0).all()) and not self._blocks
+        self._same_v = self._plain_v and np.array_equal(self._v_index, np.arange(self.tree.nv))
+        self._v_source = _sources(rates, self.tree.nv)
+        self.angular_first = self.convention.six == "angular first"
 
     @property
     def has_pairs(self) -> bool:
@@ -344,19 +312,20 @@ class Conversion:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """The name of each number of q in the target program."""
+        """Name of each number of q in the target program."""
         return tuple(column.name for column in self._columns)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """The name of each number of v in the target program, and of each column of its Jacobian."""
-        return tuple(self._v_names)
+        """Name of each number of v in the target program, and of each column of its Jacobian."""
+        return tuple(rate.name for rate in self._rates)
 
     def layout(self, what: str) -> CoordinateLayout:
         """Return names and units of the target program's "q", "v" or "a", to parse values by name."""
         if what != "q":
             rest = {"neutral": np.zeros(self.nv)}
-            return CoordinateLayout(what, self.rate_names, tuple(self._v_units), poses=lambda: rest)
+            units = tuple(rate.unit for rate in self._rates)
+            return CoordinateLayout(what, self.rate_names, units, poses=lambda: rest)
 
         def named() -> dict[str, FloatArray]:
             return {name: self.to(q) for name, q in configuration.poses(self.tree).items()}
@@ -366,12 +335,7 @@ class Conversion:
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `q_tool = q[..., permutation]`; None if the conversion also changes numbers.
-
-        >>> import urdfkin
-        >>> urdfkin.load("a1").convention("mujoco").permutation.tolist()
-        [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
-        """
+        """Indices with `q_tool = q[..., permutation]`; None if the conversion also changes numbers."""
         return self._q_index.copy() if self._plain_q else None
 
     @property
@@ -382,11 +346,11 @@ class Conversion:
     @property
     def rate_permutation(self) -> NDArray[np.intp] | None:
         """Indices with `v_tool = v[..., rate_permutation]`; None if the conversion also changes numbers."""
-        return self._v_at.copy() if self._plain_v else None
+        return self._v_index.copy() if self._plain_v else None
 
     @cached_property
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
-        """The indices of each joint in the target program's q and v, by its name in the URDF."""
+        """Indices of each joint in the target program's q and v, by its name in the URDF."""
         names = [self.tree.joints[i].name for i in self._order]
         found, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
@@ -451,10 +415,10 @@ class Conversion:
             ours.append(self._from_rates(ours[0], self._theirs(a, "a"), ours[1]))
         return ours[0] if len(ours) == 1 else tuple(ours)
 
-    def _ours(self, *given: Given | None) -> list[FloatArray]:
-        if given[1] is None and given[2] is not None:
+    def _ours(self, *values: Given | None) -> list[FloatArray]:
+        if values[1] is None and values[2] is not None:
             raise InputError("`a` can only be converted together with `v`")
-        letters = zip("qva", given, strict=True)
+        letters = zip("qva", values, strict=True)
         return [configuration.checked(self.tree, x, letter) for letter, x in letters if x is not None]
 
     def _theirs(self, value: ArrayLike, what: str) -> FloatArray:
@@ -501,14 +465,9 @@ class Conversion:
                     )
                 angle = np.arctan2(pair[..., 1], pair[..., 0])
                 found[..., at] = (angle - column.zero) / column.factor
-        if any(column.copy for column in self._columns):
-            self._check_copies(theirs, self._to_q(found))
-        return found
-
-    def _check_copies(self, theirs: FloatArray, expected: FloatArray) -> None:
-        for k, column in enumerate(self._columns):
-            if not column.copy:
-                continue
+        copies = [(k, column) for k, column in enumerate(self._columns) if column.copy]
+        expected = self._to_q(found) if copies else theirs
+        for k, column in copies:
             apart = float(np.abs(theirs[..., k] - expected[..., k]).max(initial=0.0))
             if apart > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
                 raise InputError(
@@ -518,21 +477,22 @@ class Conversion:
                     remedy="correct the value, or load with mimic=False (--no-mimic)",
                     question=QuestionsSection.MIMIC_JOINTS,
                 )
+        return found
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return M x, or M x + M' v if v is given, with the matrix M of the module docstring."""
         if self._same_v:
             return x
-        found: FloatArray = x[..., self._v_at]
+        found: FloatArray = x[..., self._v_index]
         if self._plain_v:
             return found
-        found = found * self._v_scale
+        found = found * self._v_factor
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
             B = self._block(block, q)
             part = _times(B, x[..., own])
             if v is not None:
-                part = part + _times(self._block_rate(block, q, v[..., own]), v[..., own])
+                part = part + _times(self._block(block, q, v[..., own]), v[..., own])
             found = _with(found, block.rows, part)
         return found
 
@@ -543,28 +503,21 @@ class Conversion:
         found: FloatArray = x[..., self._v_source]
         if self._plain_v:
             return found
-        found = found / self._v_scale[self._v_source]
+        found = found / self._v_factor[self._v_source]
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
             part = x[..., block.rows]
             if v is not None:
-                part = part - _times(self._block_rate(block, q, v[..., own]), v[..., own])
+                part = part - _times(self._block(block, q, v[..., own]), v[..., own])
             found = _with(found, own, _times(_inverse(self._block(block, q)), part))
         return found
 
     # -- matrices ------------------------------------------------------------------------------------
 
     def matrix(self, q: Given | None = None) -> FloatArray:
-        """Return the matrix M (program's nv, nv) with v_tool = M v, or (..., program's nv, nv).
-
-        M may depend on q; if q is then missing, InputError is raised.
-
-        >>> import urdfkin
-        >>> urdfkin.load("planar_two_link").convention("alphabetical").matrix().tolist()
-        [[1.0, 0.0], [0.0, 1.0]]
-        """
+        """Return the matrix M (..., program's nv, nv) with v_tool = M v, which may depend on q."""
         M = np.zeros((self.nv, self.tree.nv))
-        M[np.arange(self.nv), self._v_at] = self._v_scale
+        M[np.arange(self.nv), self._v_index] = self._v_factor
         if not self._blocks:
             return M
         if q is None:
@@ -584,50 +537,43 @@ class Conversion:
         found = np.zeros((*shape, self.nv, self.tree.nv))
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
-            found[..., block.rows, own] = self._block_rate(block, ours, rates[..., own])
+            found[..., block.rows, own] = self._block(block, ours, rates[..., own])
         return found
 
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
         """Return the matrix M^-1 with v = M^-1 v_tool; the column of a mimic joint is 0."""
         if not self._blocks:
             found = np.zeros((self.tree.nv, self.nv))
-            found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_scale[self._v_source]
+            found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
             return found
         M = self.matrix(q)
         found = np.zeros((*M.shape[:-2], self.tree.nv, self.nv))
         found[..., self._v_source] = _inverse(M[..., self._v_source, :])
         return found
 
-    def _block(self, block: _FreeJoint, q: FloatArray) -> FloatArray:
-        """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6)."""
+    def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
+        """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6).
+
+        If the joint's velocity v is given, return the time derivative of the block.
+        """
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle = q[..., block.q + 2]
-            B = np.zeros((*angle.shape, 3, 3))
-            B[..., 0, 0] = B[..., 1, 1] = np.cos(angle)
-            B[..., 1, 0], B[..., 0, 1] = np.sin(angle), -np.sin(angle)
-            B[..., 2, 2] = unit
+            cosine, sine = np.cos(angle), np.sin(angle)
+            if v is not None:
+                cosine, sine, unit = -sine * v[..., 2], cosine * v[..., 2], 0.0
+            B = np.zeros((*cosine.shape, 3, 3))
+            B[..., 0, 0] = B[..., 1, 1] = cosine
+            B[..., 1, 0], B[..., 0, 1], B[..., 2, 2] = sine, -sine, unit
             return B
         assert block.joint.kind is JointKind.FLOATING
-        R = rotation_of(q[..., block.q + 3 : block.q + 7])
-        A = R if how.linear == "parent" else np.broadcast_to(np.eye(3), R.shape)
-        turn = R if how.angular == "parent" else np.eye(3)
-        return self._rows(A, -A @ _cross(block.point), unit * turn)
-
-    def _block_rate(self, block: _FreeJoint, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the time derivative of `_block` for the joint's velocity v."""
-        how, unit = self.convention, self.convention.angle_factor
-        if block.joint.kind is JointKind.PLANAR:
-            angle, w = np.broadcast_arrays(q[..., block.q + 2], v[..., 2])
-            B = np.zeros((*angle.shape, 3, 3))
-            B[..., 0, 0] = B[..., 1, 1] = -np.sin(angle) * w
-            B[..., 1, 0], B[..., 0, 1] = np.cos(angle) * w, -np.cos(angle) * w
-            return B
-        assert block.joint.kind is JointKind.FLOATING
-        R = rotation_of(q[..., block.q + 3 : block.q + 7]) @ _cross(v[..., 3:])
-        A = R if how.linear == "parent" else np.zeros_like(R)
-        turn = R if how.angular == "parent" else np.zeros_like(R)
-        return self._rows(A, -A @ _cross(block.point), unit * turn)
+        R, own_axes = rotation_of(q[..., block.q + 3 : block.q + 7]), np.eye(3)
+        if v is not None:
+            R, own_axes = R @ skew(v[..., 3:]), np.zeros((3, 3))
+        own_axes = np.broadcast_to(own_axes, R.shape)
+        A = R if how.linear == "parent" else own_axes
+        turn = R if how.angular == "parent" else own_axes
+        return self._rows(A, -A @ skew(block.point), unit * turn)
 
     def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
         """Return the matrix [[A, arm], [0, turn]], with its rows in the target program's order."""
@@ -652,10 +598,7 @@ class Conversion:
         return np.take(array, _SWAPPED, axis) if self.angular_first else array
 
     def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1.
-
-        The module's docstring defines S and M; `columns` explains the error.
-        """
+        """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1."""
         return self.columns(q, self.six(J, -2))
 
     def columns(self, q: Given, J: ArrayLike) -> FloatArray:
@@ -664,16 +607,11 @@ class Conversion:
         The rows of J are derivatives of quantities that are the same in both conventions, such as Euler
         angles. If a column of J belongs to several joints of the target program, because one mimics the
         other, InputError is raised.
-
-        >>> import urdfkin
-        >>> a1 = urdfkin.load("a1", verify=False)
-        >>> a1.convention("mujoco").columns(a1.neutral(), [range(12)])[0, :4].tolist()
-        [3.0, 4.0, 5.0, 0.0]
         """
         self._demand_own_columns()
         array = np.asarray(J, dtype=np.float64)
         if self._plain_v:
-            return array if self._same_v else array[..., self._v_at]
+            return array if self._same_v else array[..., self._v_index]
         return array @ _for_frames(self.inverse_matrix(q), array.ndim)
 
     def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
@@ -718,9 +656,9 @@ class Conversion:
     ) -> FloatArray:
         """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
 
-        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. A placement is returned unchanged.
-        The function `jacobian` is called only for a time derivative of the Jacobian or a Hessian. A quantity
-        whose conversion the conventions do not define raises InputError.
+        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. The function `jacobian` is called
+        only for a time derivative of the Jacobian or a Hessian. A placement is returned unchanged, and an
+        undefined conversion raises InputError.
         """
         if quantity == "placement":
             return result
@@ -739,12 +677,11 @@ class Conversion:
         )
 
     def _demand_own_columns(self) -> None:
-        if self._v_copies:
-            name = self._v_names[min(self._v_copies)]
+        copies = (rate.name for k, rate in enumerate(self._rates) if rate.copy and k not in self._v_source)
+        if (name := next(copies, None)) is not None:
             raise InputError(
                 f"{self.convention.title or self.convention.name} has a Jacobian column for each mimic"
-                " joint, but urdfkin"
-                " adds it to that of the mimicked joint",
+                " joint, but urdfkin adds it to that of the mimicked joint",
                 where=f"joint {name}",
                 remedy="load with mimic=False (--no-mimic)",
                 question=QuestionsSection.MIMIC_JOINTS,
@@ -777,8 +714,8 @@ class Reordering:
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the formula that converts "q" or "v" from convention `start` to convention `end`, or None.
 
-    There is no formula if one convention stores the cosine and the sine of an angle. There is also none if
-    the two conventions express a base velocity in different frames.
+    There is no formula if one convention stores the cosine and the sine of an angle, or if the two
+    conventions express a base velocity in different frames.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -808,9 +745,21 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
         start._blocks or end._blocks
     ):
         return None
-    index = tuple(start._v_source[at] for at in end._v_index)
-    pairs = zip(end._v_factor, index, strict=True)
-    return Reordering(index, tuple(f / start._v_factor[k] for f, k in pairs), (0.0,) * len(index))
+    index = tuple(start._v_source[rate.at] for rate in end._rates)
+    pairs = zip(end._rates, index, strict=True)
+    factors = tuple(rate.factor / start._rates[k].factor for rate, k in pairs)
+    return Reordering(index, factors, (0.0,) * len(index))
+
+
+def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
+    """Return the index in `numbers` from which each of urdfkin's numbers is computed.
+
+    A mimic joint's number is used only if no other number is available.
+    """
+    return [
+        min((k for k, x in enumerate(numbers) if x.at == at and x.factor), key=lambda k: numbers[k].copy)
+        for at in range(count)
+    ]
 
 
 def _times(B: FloatArray, x: FloatArray) -> FloatArray:
@@ -833,11 +782,3 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
     """Return M (..., k, l), with one more axis before k if the Jacobian contains several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M
-
-
-def _cross(x: FloatArray) -> FloatArray:
-    """Return the matrix [x] (..., 3, 3) for which [x] y is the cross product of x and y."""
-    found = np.zeros((*x.shape, 3))
-    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
-    found -= np.swapaxes(found.copy(), -1, -2)
-    return found

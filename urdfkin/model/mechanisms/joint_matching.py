@@ -4,10 +4,9 @@ Joints at two matched bodies are paired by the names that the user gives, by equ
 `MechanismMatcher` tries each proposed pose and zero offset.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other. Each subtree begins after a joint. The angle of this joint does not matter, because it can be added
-to the joint's zero offset. Therefore, the result depends only on the two joints and their axes. The search
-stores the result for each pair of joints and never computes it twice. It is therefore fast, even for long
-chains.
+the other subtree. The angle of the joint before a subtree does not matter, because the joint's zero offset
+can contain any angle. Whether two subtrees match therefore depends only on the joints before the subtrees.
+The search stores the result for each pair of joints, so it is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -30,11 +29,11 @@ from urdfkin.model.mechanisms.mechanism import (
     Mechanism,
     Screw,
     Tolerance,
-    along,
     angle_from_to,
-    apart,
-    between,
     between_lines,
+    pose_difference,
+    screw_motion,
+    smallest_motion,
 )
 from urdfkin.model.tree import FloatArray, JointKind, inverse
 
@@ -43,18 +42,8 @@ Via = tuple[Edge | None, Edge | None]
 
 
 def family(kind: JointKind) -> str:
-    """Return a joint's kind of motion; joints of different kinds are never paired."""
-    return _FAMILIES[kind]
-
-
-_FAMILIES = {
-    JointKind.REVOLUTE: "turns",
-    JointKind.CONTINUOUS: "turns",
-    JointKind.PRISMATIC: "prismatic",
-    JointKind.FIXED: "fixed",
-    JointKind.PLANAR: "planar",
-    JointKind.FLOATING: "floating",
-}
+    """Return a joint's kind of motion; joints of different kinds of motion are never paired."""
+    return "turns" if kind.turns else str(kind.value)
 
 
 class Pairing:
@@ -67,14 +56,13 @@ class Pairing:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
         self._named = {name for pair in given.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
-        #: Pairs of links with the same name. They are stored because thousands of poses need them.
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
             tuple[tuple[int, int], Via], tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]
         ]()
 
     def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
-        """Return pairs of links that have the same name, one on a body of A and one on a body of B."""
+        """Return the pairs of links with equal labels, one on a body of A and one on a body of B."""
         if (known := self._links.get((body_a, body_b))) is None:
             there = {self.b.labels[link]: link for link in self.b.bodies[body_b]}
             known = self._links[body_a, body_b] = tuple(
@@ -117,11 +105,19 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Return the joint pairs found by name, and the joints of A and of B that geometry must pair."""
         if (known := self._by_names.get((bodies, via))) is None:
-            known = self._by_names[bodies, via] = self._named_alike(bodies, via)
+            left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not via[0]]
+            left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not via[1]]
+            pairs = list[Pair]()
+            for e, f in self._pairs_by_name(bodies, list(left_a), list(left_b)):
+                if e in left_a and f in left_b:
+                    pairs.append((e, f))
+                    left_a.remove(e)
+                    left_b.remove(f)
+            known = self._by_names[bodies, via] = pairs, left_a, left_b
         return known
 
     def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
-        """Return whether the subtrees below two bodies have equal branches with equal kinds of joints."""
+        """Return whether the subtrees of two bodies have equal branches with equal kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -155,36 +151,23 @@ class Pairing:
         ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
         return [edges[j] for _, j in ranked]
 
-    def _named_alike(self, bodies: tuple[int, int], via: Via) -> tuple[list[Pair], list[Edge], list[Edge]]:
-        left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not via[0]]
-        left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not via[1]]
-        pairs: list[Pair] = []
-        for e, f in self._by_name(bodies, list(left_a), list(left_b)):
-            if e in left_a and f in left_b:
-                pairs.append((e, f))
-                left_a.remove(e)
-                left_b.remove(f)
-        return pairs, left_a, left_b
-
-    def _by_name(self, bodies: tuple[int, int], ours: list[Edge], theirs: list[Edge]) -> Iterator[Pair]:
+    def _pairs_by_name(self, bodies: tuple[int, int], ours: list[Edge], theirs: list[Edge]) -> Iterator[Pair]:
+        """Yield pairs of joints by joint names, then by the labels of the links after the joints."""
         by_name = {self.b.joint(f).name: f for f in theirs}
         for e in ours:
             name = self.a.joint(e).name
             if (f := by_name.get(self.given.get(name, name))) is not None:
                 yield e, f
         for e in ours:
-            links = {self.a.labels[k] for k in self.a.bodies[e.beyond(bodies[0])]}
+            links = {self.a.labels[k] for k in self.a.bodies[e.other_body(bodies[0])]}
             for f in theirs:
-                if links & {self.b.labels[k] for k in self.b.bodies[f.beyond(bodies[1])]}:
+                if links & {self.b.labels[k] for k in self.b.bodies[f.other_body(bodies[1])]}:
                     yield e, f
 
     def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
-        """Return the index and the geometry of each joint whose partner the user did not name.
-
-        The mechanism is first moved by the rigid motion T.
-        """
+        """Return the index of each joint that the user did not match, and its geometry after the motion T."""
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
             for i, edge in enumerate(edges)
@@ -192,22 +175,22 @@ class Pairing:
         ]
 
     def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
-        """Return a sort key, which is smaller for more similar joints.
+        """Return a sort key that is smaller for more similar joints.
 
         Three differences decide, in this order: the branches of the subtrees, the distance of the axes, and
         the directions and origins of the joint frames.
         """
-        angle, way = one.mismatch(other)
-        off = 0.0 if self._tolerance.holds(angle, way) else angle * max(self.a.size, LEAST_SIZE) + way
-        place = math.dist(one.place, other.place)
-        points_back = bool(one.screw.direction @ other.screw.direction < 0.0)
-        return one.shape != other.shape, off, place + self.a.size * points_back
+        angle, shift = one.mismatch(other)
+        axes = 0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, LEAST_SIZE) + shift
+        origins = math.dist(one.origin, other.origin)
+        is_opposite = bool(one.screw.direction @ other.screw.direction < 0.0)
+        return one.shape != other.shape, axes, origins + self.a.size * is_opposite
 
     def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
-        """Return a text that lists the kinds of the joints in the subtree after a joint."""
+        """Return a text with the kind of each joint in the subtree that a joint begins."""
         key = mechanism is self.a, body, edge.joint
         if (known := self._signatures.get(key)) is None:
-            beyond = edge.beyond(body)
+            beyond = edge.other_body(body)
             below = sorted(
                 self._signature(mechanism, beyond, other)
                 for other in mechanism.edges_of[beyond]
@@ -218,10 +201,7 @@ class Pairing:
         return known
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
-        """Return the angle (rad) and the distance (m) between the axes of two joints.
-
-        Axes of opposite directions count as equal.
-        """
+        """Return the angle (rad) and the distance (m) between two axes; opposite axes count as equal."""
         kind = family(self.a.joint(e).kind)
         if kind != family(self.b.joint(f).kind):
             return 0.0, 0.0
@@ -237,12 +217,12 @@ class _JointGeometry:
     kind: str
     shape: str
     screw: Screw
-    place: list[float]
+    origin: list[float]
     normal: FloatArray
 
     @classmethod
     def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
-        """Return the geometry of a joint that is moved from its zero configuration by the rigid motion T."""
+        """Return the geometry of a joint that the motion T moves from the zero configuration."""
         pose = T @ mechanism.homes[edge.joint + 1]
         screw = mechanism.screw(edge).moved(T)
         return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
@@ -257,13 +237,13 @@ class _JointGeometry:
 
 def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between the axes of two joints of the same kind."""
-    if kind == "floating":  # A floating joint reaches every pose, so any two agree.
+    if kind == "floating":  # any two floating joints agree, because a floating joint reaches every pose
         return 0.0, 0.0
     return between_lines(s, t, placed=kind == "turns")
 
 
 _Some = TypeVar("_Some")
-#: One object belongs to mechanism A, the other to mechanism B.
+#: Pair of an object of mechanism A and an object of mechanism B.
 Both = tuple[_Some, _Some]
 
 
@@ -274,32 +254,32 @@ class Axis:
     Attributes:
         screw: The axis as a directed line; only its direction has a meaning for a prismatic joint.
         turns: Whether the joint is revolute.
-        seen: A reference line, usually the axis of the joint before this joint.
+        reference: A reference line, usually the axis of the joint before this joint.
     """
 
     screw: Screw
     turns: bool
-    seen: Screw
+    reference: Screw
 
     def moved(self, T: FloatArray) -> Axis:
-        return Axis(self.screw.moved(T), self.turns, self.seen.moved(T))
+        return Axis(self.screw.moved(T), self.turns, self.reference.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the coordinate (m) along u of the point of the line `seen` nearest to the joint's axis.
+        """Return the coordinate (m) along u of the point of the reference line nearest to the joint's axis.
 
         If the two lines are parallel, or if the joint is prismatic, the result is None.
         """
-        s, start = self.screw, self.seen
+        s, start = self.screw, self.reference
         along_s = float(start.direction @ s.direction)
         if not self.turns or 1.0 - along_s**2 < ALONG**2:
             return None
-        way = s.point - start.point
-        foot = float(way @ start.direction - along_s * (way @ s.direction)) / (1.0 - along_s**2)
+        offset = s.point - start.point
+        foot = float(offset @ start.direction - along_s * (offset @ s.direction)) / (1.0 - along_s**2)
         return float(u @ (start.point + foot * start.direction))
 
 
-def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield values of a joint with the axis u: angles or distances that move the axis `theirs` to `ours`."""
+def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
+    """Yield joint values (rad or m) for which a joint with the axis u moves the axis `theirs` to `ours`."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -317,48 +297,47 @@ def zeros(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
             yield guess
 
 
-def behind(
-    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], seen: Both[Screw]
+def later_axes(
+    mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If a joint's axis is parallel to the line `seen`, `behind` also yields the axes after this joint.
+    If a joint's axis is parallel to the line `reference`, the axes after this joint follow.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
-        axes = _axis(mechanisms[0], e, seen[0]), _axis(mechanisms[1], f, seen[1])
+        axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
         yield axes
         screws = axes[0].screw, axes[1].screw
-        if np.linalg.norm(np.cross(screws[0].direction, seen[0].direction)) < ALONG:
-            beyond = e.beyond(bodies[0]), f.beyond(bodies[1])
-            yield from behind(mechanisms, (e, f), beyond, screws if axes[0].turns else seen)
+        if np.linalg.norm(np.cross(screws[0].direction, reference[0].direction)) < ALONG:
+            beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
+            yield from later_axes(mechanisms, (e, f), beyond, screws if axes[0].turns else reference)
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
     """Yield poses of B's root that align a first joint axis of B with one of A, and also some later axes.
 
-    After this alignment, B may still rotate about the first axis and translate along it. The function chooses
-    this rotation and this translation so that later axes coincide too. If no axes follow the first axis, it
-    uses other axes of the same body, for example the rotor axes of a drone.
+    After this alignment, B may still rotate about the first axis and translate along the axis. The function
+    chooses the rotation and the translation so that later axes coincide too. If no axes follow the first
+    axis, other axes of the body are used, for example the rotor axes of a drone.
     """
-    firsts = _firsts((a, b), (None, None), bodies, ())
-    for (ours, theirs), near, far in firsts:
-        seen = far or [
-            (replace(one, seen=ours.screw), replace(other, seen=theirs.screw)) for (one, other), *_ in firsts
-        ]
+    firsts = _first_axes((a, b), (None, None), bodies, ())
+    for (ours, theirs), before, after in firsts:
+        lines = ours.screw, theirs.screw
+        others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (theirs.screw, theirs.screw.reversed()):
-            K = between(start, ours.screw, turns=True)[0]
-            for turn in _guesses(ours.screw, [*near, *seen], K, turns=True):
-                X = along(ours.screw, turn, turns=True) @ K
-                for way in _guesses(ours.screw, seen, X, turns=False):
-                    yield along(ours.screw, way, turns=False) @ X
+            K = smallest_motion(start, ours.screw, turns=True)[0]
+            for angle in _guesses(ours.screw, [*before, *others], K, turns=True):
+                X = screw_motion(ours.screw, angle, turns=True) @ K
+                for shift in _guesses(ours.screw, others, X, turns=False):
+                    yield screw_motion(ours.screw, shift, turns=False) @ X
 
 
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root. Each pose aligns up to three joint axes of two matching bodies.
+    """Yield poses of B's root that align up to three joint axes of two bodies with several joints.
 
-    Both bodies have several joints. `alike` says whether a joint of A may be paired with a joint of B.
+    The function `alike` returns whether a joint of A may be paired with a joint of B.
     """
     edges = _with_axes(a, bodies[0])
     ours = [_axis(a, edge) for edge in edges]
@@ -373,9 +352,9 @@ def root_poses_by_siblings(
     theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
     for f, axis in theirs[first]:
         lines = u, axis.screw
-        pair_of = partial(_seen_from, lines)
-        beyond = edges[first].beyond(bodies[0]), f.beyond(bodies[1])
-        far = list(behind((a, b), (edges[first], f), beyond, lines))
+        pair_of = partial(_with_reference, lines)
+        beyond = edges[first].other_body(bodies[0]), f.other_body(bodies[1])
+        far = list(later_axes((a, b), (edges[first], f), beyond, lines))
         for start, (g, other) in product((axis.screw, axis.screw.reversed()), theirs[second]):
             if g is f:
                 continue
@@ -383,20 +362,20 @@ def root_poses_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            if not ours[second].turns:  # A prismatic joint has no `height`.
-                carried = edges[second].beyond(bodies[0]), g.beyond(bodies[1])
+            if not ours[second].turns:  # a prismatic joint has no `height`
+                carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
-            K = between(start, u, turns=True)[0]
-            for turn in zeros(u, pair[0], pair[1].moved(K), turns=True):
-                X = along(u, turn, turns=True) @ K
-                ways = list(zeros(u, pair[0], pair[1].moved(X), turns=False))
-                for way in ways or _guesses(u, [*more, *far], X, turns=False):
-                    yield along(u, way, turns=False) @ X
+            K = smallest_motion(start, u, turns=True)[0]
+            for angle in zero_candidates(u, pair[0], pair[1].moved(K), turns=True):
+                X = screw_motion(u, angle, turns=True) @ K
+                shifts = list(zero_candidates(u, pair[0], pair[1].moved(X), turns=False))
+                for shift in shifts or _guesses(u, [*more, *far], X, turns=False):
+                    yield screw_motion(u, shift, turns=False) @ X
 
 
-def _seen_from(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
-    return replace(ours, seen=lines[0]), replace(theirs, seen=lines[1])
+def _with_reference(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
+    return replace(ours, reference=lines[0]), replace(theirs, reference=lines[1])
 
 
 def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
@@ -404,33 +383,32 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
 
 
 def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
-    return [x for ours, theirs in pairs for x in zeros(u, ours, theirs.moved(X), turns)] or [0.0]
+    return [x for ours, theirs in pairs for x in zero_candidates(u, ours, theirs.moved(X), turns)] or [0.0]
 
 
-def _firsts(
+def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Find the first revolute axes below two bodies; if there is none, the prismatic axes.
+    """Return the pairs of first revolute axes after two bodies, or of prismatic axes if there are none.
 
-    Each result is a triple: an axis pair (one axis of A and one of B), the axis pairs before it, and the axis
-    pairs after it.
+    Each result is a pair of axes with the pairs of axes before it and after it.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
         pair, beyond = (
             (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
-            (e.beyond(bodies[0]), f.beyond(bodies[1])),
+            (e.other_body(bodies[0]), f.other_body(bodies[1])),
         )
         lines = pair[0].screw, pair[1].screw
-        deeper = [] if pair[0].turns else _firsts(mechanisms, (e, f), beyond, (*near, pair))
-        found += deeper or [(pair, near, list(behind(mechanisms, (e, f), beyond, lines)))]
+        deeper = [] if pair[0].turns else _first_axes(mechanisms, (e, f), beyond, (*near, pair))
+        found += deeper or [(pair, near, list(later_axes(mechanisms, (e, f), beyond, lines)))]
     return found
 
 
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    """Yield all pairs of joints with axes and of the same kind at two bodies, one of A and one of B."""
+    """Yield all pairs of two revolute or two prismatic joints, one at a body of A and one at a body of B."""
     ours, theirs = (
         [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
         for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
@@ -440,29 +418,25 @@ def _next_joints(
             yield e, f
 
 
-def _axis(mechanism: Mechanism, edge: Edge, seen: Screw | None = None) -> Axis:
+def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> Axis:
     screw = mechanism.screw(edge)
-    return Axis(screw, mechanism.joint(edge).kind.turns, seen or screw)
+    return Axis(screw, mechanism.joint(edge).kind.turns, reference or screw)
 
 
-#: Proposes poses of the child body of B's joint, for a pair of matched joints.
-#: The arguments are the two child bodies, the two joints, and the pose of the parent body in B.
+#: Function that proposes poses of the child body of B's joint, for a pair of matched joints.
+#: Its arguments are the two child bodies, the two joints, and the pose of the parent body in B.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: The recursive search for exact matches allows this number of joints on a path.
-#: A mechanism with a longer path is matched without this search.
-DEEPEST = 200
-#: The search for exact matches tries at most this number of joint pairs at two bodies.
+#: Maximum number of joint pairs at two bodies that the search for exact matches tries.
 MOST_ASSIGNMENTS = 5000
 
-#: Each coordinate of A has the name of B's corresponding coordinate, and the ratio of their velocities.
-#: The ratio is B's velocity divided by A's; a negative ratio means opposite directions.
+#: Name of B's coordinate for each coordinate of A, and B's velocity divided by A's velocity.
 Rates = Mapping[str, tuple[str, float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """The matched subtrees below two joints: the pose X (4, 4) of B's body, and the subtrees' coordinates."""
+    """Matched subtrees after two joints: the pose X (4, 4) of B's body, and the subtrees' coordinates."""
 
     X: FloatArray
     rates: Rates
@@ -476,7 +450,6 @@ class Congruence:
     ) -> None:
         self.a, self.b, self.pairing, self.tolerance, self.poses = a, b, pairing, tolerance, poses
         self._known = dict[tuple[int, int, int], list[tuple[FloatArray, _Match | None]]]()
-        self._off = max(*a.depths, *b.depths) > DEEPEST
         self._rules = True
 
     def ignore_rules(self) -> None:
@@ -484,28 +457,25 @@ class Congruence:
         self._rules = False
         self._known.clear()
 
-    def at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        """Return the joint pairs at two bodies if the subtrees after these bodies match exactly, else None.
+    def joint_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
+        """Return the joint pairs at two bodies if the subtrees of the bodies match exactly, else None.
 
-        `via` contains the joints before these bodies; None at the first bodies. The motion X (4, 4) moves B's
+        `via` contains the joints before the bodies; None at the first bodies. The motion X (4, 4) moves B's
         body from B's zero configuration to the pose of A's body.
         """
-        found = None if self._off else self._at(bodies, via, X)
+        found = self._at(bodies, via, X)
         return None if found is None else found[0]
 
-    def behind(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body after two joints if the subtrees match exactly, else None.
-
-        X is the pose of the parent body of B's joint, as in the method `at`.
-        """
-        found = None if self._off else self._behind(e, f, bodies, X)
+    def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
+        """Return the pose (4, 4) of B's body after two joints if the subtrees match exactly, else None."""
+        found = self._behind(e, f, bodies, X)
         return None if found is None else found.X
 
     def _at(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> tuple[Sequence[Pair], Rates] | None:
         if not self.pairing.same_shape(bodies, via):
             return None
         for i, j in self.pairing.links(*bodies):
-            if not self.tolerance.holds(*apart(self.a.homes[i], X @ self.b.homes[j])):
+            if not self.tolerance.holds(*pose_difference(self.a.homes[i], X @ self.b.homes[j])):
                 return None
         named, left_a, left_b = self.pairing.by_names(bodies, via)
         if len(left_a) != len(left_b) or not all(self._lie_alike(e, f, X) for e, f in named):
@@ -550,7 +520,7 @@ class Congruence:
         for other, match in known:
             if self._same_case(e, other, X):
                 return match
-        beyond = e.beyond(bodies[0]), f.beyond(bodies[1])
+        beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
         found, own = None, self._rate(e, f, bodies, X)
         if self.pairing.same_shape(beyond, (e, f)):
             for there in _distinct(self.poses(beyond, (e, f), X)):
@@ -563,7 +533,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return the corresponding coordinates of two matched joints; empty if one has no coordinate."""
+        """Return the corresponding coordinates of two joints; empty if a joint has no coordinate."""
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
             return {}
@@ -579,12 +549,10 @@ class Congruence:
 
     def _together(self, some: Rates, others: Rates) -> Rates | None:
         """Merge two sets of corresponding coordinates; return None if the sets contradict each other."""
-        for x, (y, rate) in others.items():
-            there = some.get(x)
-            if there is None:
-                continue
-            near = self.tolerance.angle * max(1.0, abs(rate))
-            if there[0] != y or abs(there[1] - rate) > near:
+        for x in some.keys() & others.keys():
+            (y, rate), (other, other_rate) = some[x], others[x]
+            tolerance = self.tolerance.angle * max(1.0, abs(other_rate))
+            if y != other or abs(rate - other_rate) > tolerance:
                 return None
         both = {**some, **others}
         return both if len({y for y, _ in both.values()}) == len(both) else None
@@ -596,10 +564,10 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of the joint leads from one of two poses of B's body to the other."""
+        """Return whether a motion of the joint leads from the pose X of B's body to the pose `other`."""
         kind = self.a.joint(e).kind
         if kind.nq > 1:
-            return family(kind) == "floating" or self.tolerance.holds(*apart(X, other))
+            return family(kind) == "floating" or self.tolerance.holds(*pose_difference(X, other))
         screw, D = self.a.screw(e), other @ inverse(X)
         if kind.turns:
             moved = screw.moved(D)
@@ -608,7 +576,7 @@ class Congruence:
                 float(np.linalg.norm(moved.point - screw.point)),
             )
         across = D[:3, 3] - screw.direction * (screw.direction @ D[:3, 3])
-        return self.tolerance.holds(apart(IDENTITY, D)[0], float(np.linalg.norm(across)))
+        return self.tolerance.holds(pose_difference(IDENTITY, D)[0], float(np.linalg.norm(across)))
 
 
 def _distinct(poses: Iterable[FloatArray]) -> Iterator[FloatArray]:

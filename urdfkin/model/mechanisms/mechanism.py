@@ -6,37 +6,34 @@ between the joints, so links that are fixed to each other may be merged or split
 the path from the root leads through a joint from its child link to its parent link, the joint's screw is
 reversed.
 
-The coordinates of a planar or floating joint describe a pose P. A and B may define the joint's frame
-differently, and also the frame of the body after the joint. With constant rigid motions M and N for these two
-differences, A and B move in the same way if
+**Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define the
+joint's frame differently, and also the frame of the body after the joint. With constant rigid motions M and N
+for these two differences, A and B move in the same way if
 
-    P_b = M P_a N,      or M P_a^-1 N if the joint is reversed in one model.
+    P_b = M P_a N,      or P_b = M P_a^-1 N if the joint is reversed in one model.
 
-For a floating joint, M and N may be any rigid motions. A planar joint reaches only planar poses: translations
-and rotations in its plane. Therefore, M P N must be a planar pose for every planar pose P. If M raises the
-plane by some distance, N must lower it by the same distance. If M turns the plane over, N must turn it over
-too.
+For a floating joint, M and N may be any rigid motions. A planar joint reaches only translations and rotations
+in its plane (planar poses), so M P N must be a planar pose for every planar pose P. If M raises the plane by
+some distance, N must lower the plane by the same distance. If M turns the plane over, N must do so too.
 
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
 body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
-the value t moves the bodies after it by exp(S t). The matched joint of B moves them by exp(S' t'). B's joint
-may have the opposite positive direction and another zero, so S' and t' are first converted to the direction
-and the zero of A's joint. If the axis of a joint and the body after it have the same poses in A and B, then G
-is the same before and after this joint. If their poses differ, a constant rigid motion L describes the change
-of G. Therefore, B's link poses are those of A with two changes. Some joints have another axis, and a motion L
-comes before some joints:
+the value t moves the bodies after it by exp(S t). The matched joint of B moves the corresponding bodies by
+exp(S' t'). S' and t' are first converted to the positive direction and the zero of A's joint. If the axis of
+a joint and the body after it have the same poses in A and B, G is the same before and after the joint. If the
+poses differ, a constant rigid motion L describes the change of G. The link poses of A and B are then
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
 If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree
-everywhere, the two models have the same motion. If they differ somewhere, their motions differ, with one
+everywhere, the two models have the same motion. If A and B differ somewhere, their motions differ, with one
 exception: two revolute joints may have the same line as axis. Only the sum of their two angles matters for
 the links after them.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
-is a variable. A coordinate of B is a linear function of a variable; the sign and the zero offset of the joint
-determine it. If a joint can move independently only in B, its coordinate is one more variable. For example,
-the joint may be a mimic joint or a fixed joint in A.
+is a variable. A coordinate of B is a linear function of a variable, given by the sign and the zero offset of
+the joint. If a joint can move independently only in B, its coordinate is one more variable. In A, such a
+joint is a mimic joint or a fixed joint, for example.
 """
 
 from __future__ import annotations
@@ -46,7 +43,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -57,58 +54,57 @@ from urdfkin.kinematics.rotation import (
     rotation_about,
     rotation_of,
 )
-from urdfkin.kinematics.roundings import EPS, of_two_texts
+from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, WRITTEN
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: A vector counts as parallel to an axis if its component perpendicular to the axis is smaller than this.
+#: Largest perpendicular component of a unit vector that counts as parallel to an axis.
 ALONG = 1e-12
 
 
-def along(screw: Screw, value: float, *, turns: bool) -> FloatArray:
-    """Return exp(S t) (4, 4): a rotation about a screw in radians, or a translation along it in metres."""
+def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
+    """Return exp(S t) (4, 4): a rotation (rad) about the screw S, or a translation (m) along S."""
     if not turns:
         return pose(p=screw.direction * value)
     R = rotation_about(screw.direction, value)
     return pose(R, screw.point - R @ screw.point)
 
 
-def between(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
+def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
-    The motion first rotates the axis about the first joint's origin to the direction of the second axis. Then
-    it shifts the axis sideways. A rotation about the axis or a shift along it would only change the joint's
-    zero, or have no effect, so the motion contains neither. The axis of a prismatic joint has only a
-    direction, so its shift is 0.
+    The motion first rotates the axis about the first joint's origin to the direction of the second axis, and
+    then shifts the axis sideways. A rotation about the axis or a shift along the axis would only change the
+    joint's zero. The axis of a prismatic joint has only a direction, so its shift is 0.
     """
-    R, tilt = shortest_turn(start.direction, end.direction)
+    R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
     if turns:
-        way = end.point - start.point
-        across = way - end.direction * (end.direction @ way)
+        offset = end.point - start.point
+        across = offset - end.direction * (end.direction @ offset)
     return pose(R, start.point - R @ start.point + across), tilt, float(np.linalg.norm(across))
 
 
-def shortest_turn(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
+def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
     """Return the rotation by the smallest angle from one unit vector to another, and the angle."""
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
-    if sine == 0.0:  # For opposite vectors, any perpendicular axis is correct.
+    if sine == 0.0:  # for opposite vectors, any perpendicular axis is correct
         axis = np.zeros(3) if cosine > 0.0 else axis_aligning(u)[:, 0] * math.pi
         return exp_rotation(axis), angle
     return exp_rotation(cross * (angle / sine)), angle
 
 
-def apart(T: FloatArray, other: FloatArray) -> tuple[float, float]:
+def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between two poses."""
-    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # Thousands of calls are faster with plain floats.
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # thousands of calls are faster with plain floats
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
 
 
-def turn_about(u: FloatArray, R: FloatArray) -> float:
+def angle_about(u: FloatArray, R: FloatArray) -> float:
     """Return the angle (rad) for which a rotation about u is nearest to the rotation R."""
     vector = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return math.atan2(float(u @ vector), float(np.trace(R) - u @ R @ u))
@@ -123,8 +119,8 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 
 #: Relative tolerance for the entries of a computed pose.
-NEARLY = 1e-9
-#: Tests use this pose (x, y, angle) of a planar joint, in which no coordinate (m, m, rad) is 0.
+_POSE_TOLERANCE = 1e-9
+#: Coordinates (m, m, rad) of a planar joint, none of which is 0.
 _AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
@@ -147,9 +143,9 @@ class JointTransform:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid motions, and M P N is a possible pose of the joint.
+        """Return whether M and N are rigid motions, and the joint can reach M P N.
 
-        The function tests two poses P: the identity and the planar pose `_AWAY`.
+        Two poses P are tested: the identity and the planar pose with the coordinates `_AWAY`.
         """
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
@@ -173,7 +169,7 @@ def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
 def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
     """Return the coordinates of a pose (..., 4, 4) of a planar or floating joint."""
     if kind is JointKind.PLANAR:
-        return np.concatenate((P[..., :2, 3], turn_in_plane(P)[..., np.newaxis]), axis=-1)
+        return np.concatenate((P[..., :2, 3], planar_angle(P)[..., np.newaxis]), axis=-1)
     if kind is not JointKind.FLOATING:
         raise NotImplementedError(f"the coordinates of a {kind} joint")
     return np.concatenate((P[..., :3, 3], quaternion_of(P[..., :3, :3])), axis=-1)
@@ -181,28 +177,27 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
 
 def is_pose(kind: JointKind, T: FloatArray) -> bool:
     """Return whether a planar or floating joint can reach a pose; a floating joint can reach every pose."""
-    near = NEARLY * (1.0 + np.abs(T).max())
-    if not is_rigid(T, near):
+    tolerance = _POSE_TOLERANCE * (1.0 + np.abs(T).max())
+    if not is_rigid(T, tolerance):
         return False
-    return kind is JointKind.FLOATING or bool(np.abs(onto_plane(T) - T).max() <= near)
+    return kind is JointKind.FLOATING or bool(np.abs(nearest_planar_pose(T) - T).max() <= tolerance)
 
 
-def turn_in_plane(P: FloatArray) -> FloatArray:
+def planar_angle(P: FloatArray) -> FloatArray:
     """Return the angle of the rotation about z that is nearest to a pose's rotation."""
     return np.arctan2(P[..., 1, 0] - P[..., 0, 1], P[..., 0, 0] + P[..., 1, 1])
 
 
-def onto_plane(P: FloatArray) -> FloatArray:
-    """Return the planar pose (4, 4) that is nearest to a pose."""
+def nearest_planar_pose(P: FloatArray) -> FloatArray:
     return pose_of(JointKind.PLANAR, coordinates_of(JointKind.PLANAR, P))
 
 
-def undoing(M: FloatArray) -> FloatArray:
+def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
-    M must keep the direction of the plane's normal or reverse it. Then M consists of a translation along the
-    normal and a motion in the plane. If M reverses the normal, M also contains half a turn about x. N
-    contains the opposite translation, and the same half turn if M contains it.
+    M must keep or reverse the plane's normal. M then consists of a translation along the normal and a motion
+    in the plane, and of half a turn about x if M reverses the normal. N contains the opposite translation,
+    and the same half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -230,7 +225,7 @@ class Edge:
     inner: int
     outer: int
 
-    def beyond(self, body: int) -> int:
+    def other_body(self, body: int) -> int:
         return self.outer if body == self.inner else self.inner
 
 
@@ -239,37 +234,41 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        parting: Indices of joints that are fixed in this model and move in the other model. The links before
-            and after such a joint belong to different bodies.
-        labels: The name of each link, by which links of the two models are paired; by default its name in the
+        separating: Indices of joints that are fixed in this model and move in the other model. The links
+            before and after such a joint belong to different bodies.
+        labels: A name for each link, by which links of the two models are paired; by default its name in the
             tree.
+
+    Attributes:
+        homes: (4, 4) pose of each link in the zero configuration.
+        body_of: Index of each link's body.
+        bodies: The links of each body.
+        edges: The joints between the bodies.
+        orders: Each entry lists consecutive joints whose order `reordered` changed, in their new order.
+        lengths: Length (m) of the path from the root to each link.
+        depths: Number of joints on the path from the root to each link.
     """
 
     def __init__(
-        self, tree: KinematicTree, parting: Collection[int] = (), labels: Sequence[str] | None = None
+        self, tree: KinematicTree, separating: Collection[int] = (), labels: Sequence[str] | None = None
     ) -> None:
         self.tree = tree
         self.labels = tree.links if labels is None else tuple(labels)
-        homes, body, edges, bodies = [np.eye(4)], [0], list[Edge](), [[0]]
-        lengths, depths = [0.0], [0]
-        for i, joint in enumerate(tree.joints):
-            homes.append(homes[joint.parent] @ joint.T_parent_joint)
-            lengths.append(lengths[joint.parent] + joint.length)
-            depths.append(depths[joint.parent] + 1)
-            if joint.kind.nv or i in parting:
-                body.append(len(bodies))
-                edges.append(Edge(i, body[joint.parent], len(bodies)))
-                bodies.append([i + 1])
-            else:
-                body.append(body[joint.parent])
-                bodies[body[-1]].append(i + 1)
-        self.homes, self.body_of, self.edges = homes, body, edges
-        self.bodies = bodies
-        #: Each entry lists consecutive joints that `in_order` put in another order, in this new order.
+        self.homes, self.body_of, self.bodies, self.edges = [np.eye(4)], [0], [[0]], list[Edge]()
+        self.lengths, self.depths = [0.0], [0]
         self.orders: tuple[tuple[str, ...], ...] = ()
-        #: Each link has the length (m) of the path from the root and the number of joints on it.
-        self.lengths, self.depths = lengths, depths
         self._screws: dict[int, Screw] = {}
+        for i, joint in enumerate(tree.joints):
+            self.homes.append(self.homes[joint.parent] @ joint.T_parent_joint)
+            self.lengths.append(self.lengths[joint.parent] + joint.length)
+            self.depths.append(self.depths[joint.parent] + 1)
+            body = self.body_of[joint.parent]
+            if joint.kind.nv or i in separating:
+                self.edges.append(Edge(i, body, len(self.bodies)))
+                body = len(self.bodies)
+                self.bodies.append([])
+            self.body_of.append(body)
+            self.bodies[body].append(i + 1)
 
     def joint(self, edge: Edge) -> Joint:
         return self.tree.joints[edge.joint]
@@ -281,7 +280,7 @@ class Mechanism:
             known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
         return known
 
-    def in_order(self, names: Sequence[str]) -> Mechanism:
+    def reordered(self, names: Sequence[str]) -> Mechanism:
         """Return a mechanism with consecutive joints in another order, from the inner body outwards.
 
         The motion stays the same. The result does not contain the links between these joints.
@@ -290,8 +289,8 @@ class Mechanism:
         run = [edge for edge in self.edges if edge.joint in joints]
         other = copy(self)
         vars(other).pop("edges_of", None)
-        places = dict(zip(run, joints, strict=True))
-        other.edges = [replace(edge, joint=places[edge]) if edge in places else edge for edge in self.edges]
+        new = dict(zip(run, joints, strict=True))
+        other.edges = [replace(edge, joint=new[edge]) if edge in new else edge for edge in self.edges]
         other.bodies = list(self.bodies)
         for k, edge in enumerate(run[:-1]):
             if {one.joint for one in run[: k + 1]} != set(joints[: k + 1]):
@@ -299,27 +298,31 @@ class Mechanism:
         other.orders = (*self.orders, tuple(names))
         return other
 
-    def may_be_taken(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the named joints are consecutive, and the given order results in the same motion."""
+    def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
+        """Return whether the named joints are consecutive, and the order of `names` gives the same motion."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
-        one_line = all(
-            inner.outer == outer.inner and len(self.edges_of[outer.inner]) == 2
-            for inner, outer in pairwise(run)
-        )
-        changed = (
+        consecutive = all(self._follows(inner, outer) for inner, outer in pairwise(run))
+        exchanged = (
             (one, other)
-            for k, one in enumerate(run)
-            for other in run[k + 1 :]
+            for one, other in combinations(run, 2)
             if joints.index(one.joint) > joints.index(other.joint)
         )
-        return len(run) == len(names) and one_line and all(self._commute(*two, tolerance) for two in changed)
+        return (
+            len(run) == len(names)
+            and consecutive
+            and all(self._commute(*pair, tolerance) for pair in exchanged)
+        )
+
+    def _follows(self, inner: Edge, outer: Edge) -> bool:
+        """Return whether only one joint follows `inner`, and this joint is `outer`."""
+        return inner.outer == outer.inner and len(self.edges_of[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """For each sequence of joints without a branch, yield all joint orders that give the same motion."""
+        """Yield, for each sequence of joints without a branch, all joint orders that give the same motion."""
         run: list[Edge] = []
-        for edge in self.edges:  # Depth first; a run of joints ends where a body has several child joints.
-            if run and edge.inner == run[-1].outer and len(self.edges_of[edge.inner]) == 2:
+        for edge in self.edges:
+            if run and self._follows(run[-1], edge):
                 run.append(edge)
                 continue
             yield self._orders(run, tolerance)
@@ -327,10 +330,7 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """Yield all orders of the joints of `run` that give the same motion; the given order comes first.
-
-        Neighbours are exchanged if they commute.
-        """
+        """Yield all orders of the joints of `run` that give the same motion, first the order of `run`."""
         if not run:
             yield []
         for k, edge in enumerate(run):
@@ -349,9 +349,8 @@ class Mechanism:
             return False
         if not any(kind.turns for kind in kinds):
             return True
-        s, t = self.screw(one), self.screw(other)
-        angle, way = between_lines(s, t, placed=all(kind.turns for kind in kinds))
-        return tolerance.holds(angle, way)
+        both_turn = all(kind.turns for kind in kinds)
+        return tolerance.holds(*between_lines(self.screw(one), self.screw(other), placed=both_turn))
 
     @cached_property
     def edges_of(self) -> list[list[Edge]]:
@@ -364,16 +363,18 @@ class Mechanism:
 
     @cached_property
     def size(self) -> float:
-        """Length (m) of the longest path from the root to a link, the scale of the mechanism's lengths."""
+        """Length (m) of the longest path from the root to a link."""
         return max(self.lengths)
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error of poses read from a file, summed over all links (rad, and as a fraction of `size`).
+        """Rounding error of poses that are read from a file (rad, and as a fraction of `size`).
 
-        This error includes the small tilts of Pinocchio's axes (URDF514).
+        The parser and the writer of the file round each joint's constant transform and axis. The error
+        includes the small tilts of Pinocchio's axes (URDF514).
         """
-        return EPS * of_two_texts(max(self.depths)) + 2.0 * sum(joint.tilt for joint in self.tree.joints)
+        joints = max(self.depths) + 1
+        return EPS * ((CONSTANT + WRITTEN + AXES) * joints) + 2.0 * sum(j.tilt for j in self.tree.joints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,13 +395,13 @@ def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
 
 
 def size_of(a: Mechanism, b: Mechanism) -> float:
-    """Return the robot's size (m). Comparisons multiply an angle by this size to obtain a distance."""
+    """Return the length (m) by which comparisons multiply an angle to obtain a distance."""
     return max(a.size, b.size, LEAST_SIZE)
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
-    ux, uy, uz = s.direction.tolist()  # Thousands of calls are faster with plain floats.
+    ux, uy, uz = s.direction.tolist()  # thousands of calls are faster with plain floats
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
@@ -423,21 +424,20 @@ class MatchedJoints:
         a: Joint of A (index in its tree).
         b: Joint of B (index in its tree).
         kind: Kind of motion: "turns" (revolute), "prismatic", "planar" or "floating".
-        previous: Index of the previous step on the path from the base; -1 for the first step.
+        previous: Index of the previous joint pair on the path from the base; -1 for the first pair.
         sense: +1 or -1, the factor in the formula of `offset`.
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
-        before: (4, 4) the rigid motion L that is inserted before B's joint, in A's zero configuration.
+        before: (4, 4) rigid motion L before B's joint (module docstring), in A's zero configuration.
         axis: Screw of A's joint in the zero configuration. The sign of the screw describes the motion of the
             body that is farther from the base.
-        other: Screw of B's joint, with the same sign convention. If the two screws agree, `other is axis` is
-            true.
+        other: Screw of B's joint, with the sign convention of `axis`. If the screws agree, `other is axis`.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes of the two joints; for planar or floating joints, between the
             origins of their frames.
         conversion: Converts the coordinates of A's planar or floating joint to those of B's joint; None if
             the coordinates are equal.
-        unlike: "a" if the joint is fixed only in A, "b" if it is fixed only in B, "kind" if the kinds of
-            motion differ; else "".
+        unlike: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds of motion
+            differ; else "".
     """
 
     a: int
@@ -466,13 +466,13 @@ class FramePair:
     Attributes:
         a: Link of A (index in its tree).
         b: Link of B (index in its tree).
-        previous: Index of the last step on the path to the links; -1 if no joint moves the links.
+        previous: Index of the last joint pair on the path to the links; -1 if no joint moves the links.
         home: (4, 4) pose of A's link in the zero configuration.
-        end: (4, 4) the rigid motion L that is inserted after the last joint, in A's zero configuration.
+        end: (4, 4) rigid motion L after the last joint (module docstring), in A's zero configuration.
         tilt: Angle (rad) between the frames of the two links.
         shift: Distance (m) between the origins of these two frames.
-        tool: (4, 4) pose of B's link in the frame of A's link, if the two links are two different
-            end-effector frames on the same body. Otherwise the identity.
+        tool: (4, 4) pose of B's link in the frame of A's link, if the links are different end-effector
+            frames on the same body. Otherwise the identity.
     """
 
     a: int
@@ -484,8 +484,8 @@ class FramePair:
     shift: float
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
-    def put_right(self) -> FramePair:
-        """Return the same pair without a difference; B's link is then another end-effector frame, `tool`."""
+    def as_tool(self) -> FramePair:
+        """Return the pair as two end-effector frames that do not count as a difference; set `tool`."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -508,8 +508,7 @@ class Alignment:
         only_a: Indices of the joints that only A has.
         only_b: Indices of the joints that only B has.
         matched: Number of joint pairs and link pairs that agree.
-        worst: The largest difference (m) between a joint or link of A and the matched joint or link of B.
-            Differences of angles are multiplied by the robot's size.
+        worst: Largest difference (m) between matched joints or links. Angles are multiplied by `size_of`.
     """
 
     a: Mechanism
@@ -525,7 +524,7 @@ class Alignment:
 
     @property
     def complete(self) -> bool:
-        """Whether every joint and link of A agrees with a joint or link of B, and the reverse."""
+        """Whether all joints and links of A and B are matched, and agree."""
         alike = not any(step.unlike for step in self.steps)
         return alike and not (self.worst or self.only_a or self.only_b)
 
@@ -537,20 +536,21 @@ class Alignment:
         )
 
     @property
-    def size(self) -> float:
-        return size_of(self.a, self.b)
+    def score(self) -> tuple[int, float]:
+        return self.matched, self.worst
 
     @property
-    def inner_off(self) -> tuple[float, float]:
+    def inner_differences(self) -> tuple[float, float]:
         """Smallest and largest difference (m) of matched axes, and of matched links that have child joints.
 
         Differences of 0 do not count.
         """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
-        links = [one for one in self.frames if one.a in carry[0] or one.b in carry[1]]
-        off = [(step.tilt, step.shift) for step in self.steps] + [(link.tilt, link.shift) for link in links]
-        some = [tilt * self.size + shift for tilt, shift in off if tilt or shift]
-        return min(some, default=0.0), max(some, default=0.0)
+        frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
+        size = size_of(self.a, self.b)
+        both: list[MatchedJoints | FramePair] = [*self.steps, *frames]
+        sizes = [one.tilt * size + one.shift for one in both if one.differs]
+        return min(sizes, default=0.0), max(sizes, default=0.0)
 
     @property
     def names(self) -> dict[str, str]:
@@ -572,53 +572,52 @@ class Alignment:
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield two matched joint pairs (a, b) and (c, d) for which (a, d) and (c, b) are possible too.
 
-        Four conditions hold. The four joints are attached to the same body of A or B. The user did not match
-        them. The names of A's two joints do not occur in B. At each pair or below it, a joint or a link
+        Four conditions hold. The joints are attached to the same body of A or B. The user did not match the
+        joints. The names of A's two joints do not occur in B. At each pair or below it, a joint or a link
         differs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
-        lead = sorted({i for end in ends for i in self.indices(end)})
-        some = [self.steps[i] for i in lead if self.a.tree.joints[self.steps[i].a].name not in known_names]
-        for k, one in enumerate(some):
-            for other in some[k + 1 :]:
-                if other.previous == one.previous and other.kind == one.kind:
-                    yield frozenset(((one.a, one.b), (other.a, other.b)))
+        steps = [self.steps[i] for i in sorted({i for end in ends for i in self.indices(end)})]
+        unnamed = [step for step in steps if self.a.tree.joints[step.a].name not in known_names]
+        for one, other in combinations(unnamed, 2):
+            if other.previous == one.previous and other.kind == one.kind:
+                yield frozenset(((one.a, one.b), (other.a, other.b)))
 
     def frames_of(self, pairs: Sequence[tuple[int, int]]) -> list[FramePair]:
         """Make a `FramePair` for each pair of a link of A and a link of B on matched bodies."""
-        on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
+        matched_on = {(self.a.body_of[frame.a], self.b.body_of[frame.b]): frame for frame in self.frames}
         rounding = tolerance_of(self.a, self.b)
-        found = []
+        frames = []
         for a, b in pairs:
-            if (known := on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
+            if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
             # A matched pair of links on these bodies gives the transform from B's body to A's.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
-            home, at = self.a.homes[a], T_a_b @ self.b.homes[b]
-            tilt, shift = apart(home, at)
+            home, end = self.a.homes[a], IDENTITY
+            tilt, shift = pose_difference(home, T_a_b @ self.b.homes[b])
             if rounding.holds(tilt, shift):
-                found.append(FramePair(a, b, known.previous, home, IDENTITY, 0.0, 0.0))
+                tilt = shift = 0.0
             else:
-                end = at @ inverse(home)
-                found.append(FramePair(a, b, known.previous, home, end, tilt, shift))
-        return found
+                end = T_a_b @ self.b.homes[b] @ inverse(home)
+            frames.append(FramePair(a, b, known.previous, home, end, tilt, shift))
+        return frames
 
-    def indices(self, previous: int) -> list[int]:
-        """Return the indices of the steps from the base to the step `previous`, including that step."""
+    def indices(self, last: int) -> list[int]:
+        """Return the indices of the joint pairs on the path from the base to the pair `last`."""
         found = []
-        while previous >= 0:
-            found.append(previous)
-            previous = self.steps[previous].previous
+        while last >= 0:
+            found.append(last)
+            last = self.steps[last].previous
         return found[::-1]
 
-    def path(self, previous: int) -> list[MatchedJoints]:
-        return [self.steps[i] for i in self.indices(previous)]
+    def path(self, last: int) -> list[MatchedJoints]:
+        return [self.steps[i] for i in self.indices(last)]
 
     @property
     def deepest(self) -> int:
-        """One more than the number of steps on the longest path."""
+        """One more than the number of joint pairs on the longest path."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
 
@@ -627,8 +626,8 @@ class Gauge:
     """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
-        base: A link of A and a link of B. The search for matching joints starts at the bodies of these two
-            links. If `base` is None, the search chooses its first bodies by link names.
+        base: The link of A and the link of B at whose bodies the search for matching joints starts. If `base`
+            is None, the search chooses its first bodies by link names.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: (`sense`, `offset`) of `MatchedJoints`, by the joint's name in A; a missing joint has (1, 0.0).
         conversions: Converts A's coordinates of a planar or floating joint to B's if they differ.
@@ -642,7 +641,7 @@ class Gauge:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: The choices for a strict comparison: A and B have the same root pose, and equal coordinates for each joint.
+#: The choices for a comparison without changes: equal root poses, and equal coordinates for each joint.
 AS_WRITTEN = Gauge()
 
 
@@ -655,11 +654,11 @@ class LinearFunction:
     constant: float
 
     def moved(self, slope: float, constant: float) -> LinearFunction:
-        """Return the linear function slope * f + constant, where f is this linear function."""
+        """Return slope * f + constant for this linear function f."""
         return LinearFunction(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Return the function's value for the given values of variables; a variable without a value is 0."""
+        """Return the function's value for values of the variables; a variable without a value is 0."""
         return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
 
@@ -671,7 +670,7 @@ class MatchedValues:
     b: LinearFunction
     #: The value of B's joint as B's URDF defines it: sense * b + offset.
     written: LinearFunction
-    #: Rounding error (rad or m) that was removed from the constant of `b`, minus that of one step.
+    #: Difference of the constants (rad or m), as far as it exceeds the rounding error of one joint.
     rounding: float = 0.0
 
     @property
@@ -687,23 +686,19 @@ class Variables:
     """The values of all matched joints as linear functions of some variables, and the variables' ranges.
 
     Attributes:
-        pairs: The joint values of each step; None for planar and floating joints.
+        pairs: The joint values of each joint pair; None for planar and floating joints.
         ranges: Range of each variable, rad or m; infinite without a limit.
-        freer_a: Indices of the steps whose joint is independent in A and a mimic joint in B.
-        freer_b: Indices of the steps whose joint is independent in B and a mimic joint in A.
-        rules: Indices of the steps with different mimic rules in A and B.
+        rules: Indices of the joint pairs with different mimic rules; a joint may be independent in one model.
         leaders: Each coordinate of B as a linear function of a variable, by the joint's name in B.
     """
 
     pairs: tuple[MatchedValues | None, ...]
     ranges: dict[str, tuple[float, float]]
-    freer_a: tuple[int, ...]
-    freer_b: tuple[int, ...]
     rules: tuple[int, ...]
     leaders: dict[str, LinearFunction]
 
     def range(self, line: LinearFunction) -> tuple[float, float]:
-        """Return the smallest and the largest value of a linear function over the ranges of the variables."""
+        """Return the smallest and the largest value of a linear function over its variable's range."""
         if not line.slope:
             return line.constant, line.constant
         ends = sorted(line.slope * end + line.constant for end in self.ranges[line.variable])
@@ -722,11 +717,11 @@ class Variables:
 
 
 def variables_of(found: Alignment, tolerance: Tolerance) -> Variables:
-    """Return the joint values of all steps of an alignment, and the ranges of their variables."""
-    return _MechanismBuilder(found, tolerance).make()
+    """Return the values of all matched joints of an alignment, and the ranges of their variables."""
+    return _VariablesBuilder(found, tolerance).variables()
 
 
-class _MechanismBuilder:
+class _VariablesBuilder:
     def __init__(self, found: Alignment, tolerance: Tolerance) -> None:
         self.found, self.tolerance = found, tolerance
         self.trees = found.a.tree, found.b.tree
@@ -774,36 +769,29 @@ class _MechanismBuilder:
             return self.leaders[joint.name]
         return self.leaders[joint.mimic.leader].moved(joint.mimic.multiplier, joint.mimic.offset)
 
-    def make(self) -> Variables:
-        pairs, freer_a, freer_b, rules = list[MatchedValues | None](), list[int](), list[int](), list[int]()
+    def variables(self) -> Variables:
+        pairs, rules = list[MatchedValues | None](), list[int]()
         for i, step in enumerate(self.found.steps):
             if step.kind in ("planar", "floating") or step.unlike == "kind":
                 pairs.append(None)
                 continue
             a, written = self._a(step), self._b(step)
             b = written.moved(step.sense, -step.sense * step.offset)
-            follow = [
-                tree.joints[j].mimic is not None for tree, j in zip(self.trees, (step.a, step.b), strict=True)
-            ]
-            beyond = 0.0
+            rounding = 0.0
             if self._alike(a, b):
-                beyond = max(0.0, abs(a.constant - b.constant) - self._one_step(a))
+                rounding = max(0.0, abs(a.constant - b.constant) - self._one_step(a))
                 b = a
             elif not step.unlike:
-                (
-                    freer_a if follow == [False, True] else freer_b if follow == [True, False] else rules
-                ).append(i)
-            pairs.append(MatchedValues(a, b, written, beyond))
-        ranges = self._ranges(pairs)
-        return Variables(tuple(pairs), ranges, tuple(freer_a), tuple(freer_b), tuple(rules), self.leaders)
+                rules.append(i)
+            pairs.append(MatchedValues(a, b, written, rounding))
+        return Variables(tuple(pairs), self._ranges(pairs), tuple(rules), self.leaders)
 
     def _alike(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two linear functions differ by rounding only.
 
-        The offset of a mimic rule depends on the zero offsets of two joints. urdfkin computes a joint's zero
-        offset from poses, in which the rounding errors of all joints before it add up. Therefore, the
-        tolerance for the constants is the sum of the rounding errors of all joints of the path. The slopes do
-        not depend on zero offsets, so their tolerance is the rounding error of one joint.
+        The constants depend on zero offsets, which urdfkin computes from poses. In a pose, the rounding
+        errors of all joints of the path add up, so the tolerance for the constants is the sum of these
+        errors. The slopes do not depend on zero offsets: their tolerance is the rounding error of one joint.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
@@ -813,10 +801,9 @@ class _MechanismBuilder:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
-        """Return the range of each coordinate, computed from the limits of the independent joints it moves.
+        """Return the range of each variable: the intersection of the limits of the joints that it moves.
 
-        If a coordinate moves a joint of A and a joint of B, its range is the intersection of their limits. If
-        A's limits and B's limits do not intersect, the range consists of A's limits. The limits of a mimic
+        If A's limits and B's limits do not intersect, the range consists of A's limits. The limits of a mimic
         joint do not count, because a mimic joint follows its rule even beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
@@ -832,7 +819,7 @@ class _MechanismBuilder:
         for step, pair in zip(self.found.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
-                if pair is None:  # The two joints are of different kinds, and each has its own coordinate.
+                if pair is None:  # each of two joints of different kinds has its own coordinate
                     if step.unlike and joint.nq == 1:
                         own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
                     continue

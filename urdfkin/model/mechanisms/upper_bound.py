@@ -1,11 +1,11 @@
 """Upper bounds on the distance between a frame's poses in two models, proven for all configurations.
 
-Support functions. The support function of a set W of points is h(u) = max over p in W of u . p. The largest
-distance of a point of W from the origin is the maximum of h(u) over all unit vectors u. If a rotation R moves
-W, the new support function is h'(u) = h(R^T u). If a joint may rotate W by any angle of a range, h'(u) is the
-largest h(R^T u) over all these angles. If a joint translates W by a vector p, h'(u) is h(u) + u . p, with the
-p of the joint's range for which u . p is largest. urdfkin computes h joint by joint along the chain, so it
-needs no search over joint values.
+**Support functions.** The support function of a set W of points is h(u) = max over p in W of u . p. The
+largest distance of a point of W from the origin is the maximum of h(u) over all unit vectors u. If a rotation
+R moves W, the new support function is h'(u) = h(R^T u). If a joint may rotate W by any angle of a range,
+h'(u) is the largest h(R^T u) over all these angles. If a joint translates W by a vector p, h'(u) is h(u) +
+u . p, with the p of the joint's range for which u . p is largest. urdfkin computes h joint by joint along the
+chain, without a search over joint values.
 
 urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
 s h(u) for s >= 0, so interpolation between grid points gives an upper bound. If a joint rotates W by any
@@ -13,7 +13,7 @@ angle of a range, the vectors R^T u form an arc. A polygon contains this arc, an
 is at one of its corners. At each joint, the interpolation makes the bound larger. This relative error is
 proportional to the square of the distance between grid points.
 
-Recursion. Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
+**Recursion.** Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
 position of A's frame. Joint i moves by e(S t) in A and by e(S' t') in B, and L is a constant rigid motion
 before B's joint. These motions change d to
 
@@ -23,16 +23,26 @@ If joint i is the same in A and B, the first three terms are 0. For each directi
 at most the sum of the maxima of these four terms. urdfkin computes the maxima from the support functions of y
 and d. If A and B differ at one joint only, the bound exceeds the true maximum only because of the
 interpolation. If A and B differ at several joints, the terms of these joints may be largest in different
-configurations. The sum of their maxima then exceeds the true maximum. If A and B differ only in constant
+configurations. The sum of the maxima then exceeds the true maximum. If A and B differ only in constant
 motions L, urdfkin also computes a second bound without interpolation. The second bound is the sum of the
 distances by which each L can move the frame.
+
+**Second derivatives.** `curvature` bounds the second derivatives of D = p_B - p_A joint by joint. The
+derivative of a rotated vector by the angle is the cross product of the axis u with the rotated vector. With d
+and y as above, the derivatives by a joint value are
+
+    y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
+
+with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
+and t' are the screw, axis, point and value of the matched joint in B. A derivative is a free vector: a joint
+between the base and this joint rotates the derivative and does not translate it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -46,19 +56,18 @@ from urdfkin.model.mechanisms.mechanism import (
     MatchedValues,
     Screw,
     Variables,
-    apart,
+    pose_difference,
 )
-from urdfkin.model.tree import FloatArray
+from urdfkin.model.tree import FloatArray, pose
 
-_WHOLE = 2.0 * math.pi
-#: A regular polygon with this number of corners contains a circle.
-#: The polygon's corners are 0.1 % farther from the centre than the circle.
-_AROUND = 64
+_FULL_TURN = 2.0 * math.pi
+#: Number of corners of a regular polygon around a circle; its corners are 0.1 % outside the circle.
+_CORNERS = 64
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A grid of points on the surface of a cube; each point stands for a direction.
+    """A grid of points on the surface of a cube; each point represents a direction.
 
     Attributes:
         cells: Number of cells along an edge of a face.
@@ -124,48 +133,46 @@ class Support:
             near = v[at] + up * (v[at + 1] - v[at])
             far = v[at + cells + 1] + up * (v[at + cells + 2] - v[at + cells + 1])
             found = (near + right * (far - near)) * largest
-        found[np.isnan(found)] = np.inf  # Zero times infinity is NaN; the bound is then infinite.
+        found[np.isnan(found)] = np.inf  # zero times infinity is NaN; the bound is then infinite
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
-    def turned(self, screw: Screw, low: float, high: float) -> Support:
-        """Rotate the set about a screw by all angles of a range. Return the support function of the union."""
+    def rotate(self, screw: Screw, low: float, high: float) -> Support:
+        """Return the support function of all rotations of the set about a screw, by low to high (rad)."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
-        best = centred.turned_back(screw.direction, angles, factors).max(axis=0)
+        best = centred.rotated_values(screw.direction, angles, factors).max(axis=0)
         return Support(self.grid, best + G @ screw.point)
 
-    def turned_back(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
+    def rotated_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return the support function's values (angles, n) at the n grid points after rotations of the set.
 
         The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
         the grid points by the opposite angle. The component of a grid point perpendicular to the axis is
-        multiplied by the angle's number in `factors`.
+        multiplied by the angle's factor in `factors`.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
-        back = rotation_about(axis, angles)  # A row vector times R equals R^T times the column vector.
-        across = (G - along) @ back * np.reshape(factors, (-1, 1, 1))
+        R = rotation_about(axis, angles)  # a row vector times R equals R^T times the column vector
+        across = (G - along) @ R * np.reshape(factors, (-1, 1, 1))
         return self.at(along + across)
 
-    def slid(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Translate the set by all distances (m) of a range. Return the support function of the union."""
+    def translate(self, direction: FloatArray, low: float, high: float) -> Support:
+        """Return the support function of all translations of the set, by low to high (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
-            ways = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
-        return Support(self.grid, self.values + ways)
+            shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
+        return Support(self.grid, self.values + shifts)
 
-    def moved(self, T: FloatArray) -> Support:
+    def transform(self, T: FloatArray) -> Support:
         """Return the support function of the set after a rigid motion T."""
         return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
         """Return an upper bound (m) on the distance of any point of the set from a screw's line."""
         x, y, _ = axis_aligning(screw.direction).T
-        corners = [
-            factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in _corners(0.0, _WHOLE, _AROUND)
-        ]
-        u = np.array(corners)
+        corners = _corners(0.0, _FULL_TURN, _CORNERS)
+        u = np.array([factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in corners])
         return float(max((self.at(u) - u @ screw.point).max(), 0.0))
 
     def largest(self) -> float:
@@ -176,10 +183,10 @@ class Support:
         Therefore, |u| is at least cos r times the sum of c_k |g_k|, and h(u) / |u| is at most 1 / cos r times
         the largest h(g_k) / |g_k|.
         """
-        share = float((self.values / self.grid.lengths).max(initial=0.0))
-        if math.isnan(share):  # Zero times infinity proves nothing.
+        largest = float((self.values / self.grid.lengths).max(initial=0.0))
+        if math.isnan(largest):  # zero times infinity proves nothing
             return math.inf
-        return share / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
+        return largest / math.cos(math.atan(math.sqrt(2.0) / self.grid.cells))
 
     def __add__(self, other: Support) -> Support:
         return Support(self.grid, self.values + other.values)
@@ -194,21 +201,21 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 
     Each corner is a pair: its angle (rad) and its distance from the circle's centre.
     """
-    if high - low >= _WHOLE:
+    if high - low >= _FULL_TURN:
         half = math.pi / segments
         return [(2.0 * half * k, 1.0 / math.cos(half)) for k in range(segments)]
     if high == low:
         return [(low, 1.0)]
-    count = max(1, math.ceil((high - low) / _WHOLE * segments))
+    count = max(1, math.ceil((high - low) / _FULL_TURN * segments))
     half = (high - low) / (2.0 * count)
     middles = [(low + (2 * k + 1) * half, 1.0 / math.cos(half)) for k in range(count)]
     return [(low, 1.0), *middles, (high, 1.0)]
 
 
-#: `COARSE` is for the bounds of many frames; `FINE` gives a smaller bound, but takes longer.
+#: `FINE` gives a smaller bound than `COARSE`, but takes longer.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
-#: A revolute joint's variable has at most this number of sample values.
-#: If the range needs more, the joint's angles in A and B are treated as independent.
+#: Maximum number of sample values of a revolute joint's variable.
+#: If a range needs more samples, the joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
 
@@ -221,19 +228,19 @@ def upper_bounds(
     They are inf if the difference grows without bound with the value of an unlimited joint, or if two matched
     joints are of different kinds.
     """
-    steps, pairs = behind_first(found, variables, frame)
+    steps, pairs = from_first_difference(found, variables, frame)
     if not steps and frame.end is IDENTITY:
         return 0.0, 0.0
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
         return math.inf, math.inf
-    radians = _radians(steps, pairs, variables, frame)
-    if not steps:  # No joint differs, so the distance is the same in every configuration.
+    radians = _angle_bound(steps, pairs, variables, frame)
+    if not steps:  # no joint differs, so the distance is equal in all configurations
         d = frame.end[:3, :3] @ frame.home[:3, 3] + frame.end[:3, 3] - frame.home[:3, 3]
         return float(np.linalg.norm(d)), radians
-    return _metres(steps, pairs, variables, frame, grid), radians
+    return _distance_bound(steps, pairs, variables, frame, grid), radians
 
 
-def behind_first(
+def from_first_difference(
     found: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the steps and joint values on the path to a frame, starting with the first step that differs."""
@@ -247,20 +254,16 @@ def _differs(step: MatchedJoints, pair: MatchedValues | None) -> bool:
     return step.differs or bool(step.unlike) or (pair is not None and pair.a != pair.b)
 
 
-def _radians(
+def _angle_bound(
     steps: Sequence[MatchedJoints],
     pairs: Sequence[MatchedValues | None],
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Return a bound (rad) on the angle between a frame's orientations in A and B.
-
-    The bound is a sum: each joint or constant motion that differs contributes the largest angle that it
-    causes.
-    """
-    total = apart(IDENTITY, frame.end)[0]
+    """Return the sum of the largest angles (rad) that each difference causes between A and B."""
+    total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
-        total += apart(IDENTITY, step.before)[0]
+        total += pose_difference(IDENTITY, step.before)[0]
         if step.kind != "turns" or pair is None:
             continue
         if step.other is not step.axis:
@@ -273,41 +276,41 @@ def _radians(
     return min(total, math.pi)
 
 
-def _metres(
+def _distance_bound(
     steps: Sequence[MatchedJoints],
     pairs: Sequence[MatchedValues | None],
     variables: Variables,
     frame: FramePair,
     grid: Grid,
 ) -> float:
-    d, y = at_the_frame(frame, grid)
-    ways = _off(frame.end, y.largest())
+    d, y = start_at_frame(frame, grid)
+    by_constant_motions = _displacement_bound(frame.end, y.largest())
     for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
-        d, y = passed(step, pair, variables, d, y)
+        d, y = after_joint(step, pair, variables, d, y)
         moves_alike = step.other is step.axis and pair is not None and pair.a == pair.b
-        ways += _off(step.before, y.largest()) if moves_alike else math.inf
-    return min(d.largest(), ways)
+        by_constant_motions += _displacement_bound(step.before, y.largest()) if moves_alike else math.inf
+    return min(d.largest(), by_constant_motions)
 
 
-def _off(L: FloatArray, reach: float) -> float:
+def _displacement_bound(L: FloatArray, reach: float) -> float:
     """Return a bound (m) on the distance |(R - 1) y + p| by which L moves a point y, |y| <= `reach`."""
-    turned, moved = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
-    return moved + _times(turned, reach)
+    rotation, translation = float(np.linalg.norm(L[:3, :3] - np.eye(3))), float(np.linalg.norm(L[:3, 3]))
+    return translation + _product(rotation, reach)
 
 
-def _times(factor: float, reach: float) -> float:
-    """Return factor * reach, which is 0 if the factor is 0 and the reach is infinite."""
+def _product(factor: float, reach: float) -> float:
+    """Return factor * reach; the result is 0 if the factor is 0 and the reach is infinite."""
     return factor * reach if factor else 0.0
 
 
-def at_the_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return d and y at the frame, with which the recursion of the module docstring begins."""
+def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
+    """Return d and y of the recursion (module docstring) at the frame, where the recursion begins."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
 
 
-def passed(
+def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
     """Return d and y of the recursion (module docstring) after one more joint."""
@@ -317,21 +320,21 @@ def passed(
         d = Support(d.grid, d.largest() * d.grid.lengths)
         y = Support(d.grid, np.full(len(d.grid.points), math.inf))
     else:
-        d = difference(step, pair, variables, y, d)
+        d = d_after_joint(step, pair, variables, y, d)
         ends = variables.range(pair.b)
-        y = y.turned(step.other, *ends) if step.kind == "turns" else y.slid(step.other.direction, *ends)
-    return before_it(step, d, y)
+        y = y.rotate(step.other, *ends) if step.kind == "turns" else y.translate(step.other.direction, *ends)
+    return after_constant_motion(step, d, y)
 
 
-def before_it(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
+def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
     """Return d and y of the recursion (module docstring) after the constant rigid motion L of a step."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
-    return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.moved(L)
+    return Support(d.grid, d.values + y.at(G @ (L[:3, :3] - np.eye(3))) + G @ L[:3, 3]), y.transform(L)
 
 
-def difference(
+def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
     """Return d of the recursion (module docstring) after one more joint, but before its motion L."""
@@ -339,11 +342,11 @@ def difference(
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
         if same:
-            return d.turned(about, *variables.range(pair.a)) if d.values.any() else d
+            return d.rotate(about, *variables.range(pair.a)) if d.values.any() else d
         z = _values(pair, variables, d.grid)
         if z is not None:
             return _common_difference(step, pair, z, y, d)
-        return d.turned(about, *variables.range(pair.a)) + _independent_difference(step, pair, variables, y)
+        return d.rotate(about, *variables.range(pair.a)) + _independent_difference(step, pair, variables, y)
     return d if same else d + _prismatic_difference(step, pair, variables, y.grid)
 
 
@@ -352,7 +355,7 @@ def _prismatic_difference(
 ) -> Support:
     """Return the support function of the difference between the translations by two matched prismatic joints.
 
-    The difference is largest if each joint value is at one of its limits.
+    The difference is largest if each joint value is at a limit.
     """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
@@ -372,11 +375,11 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
     """Return sample values (n,) of the variable that moves a revolute joint of A and its matched joint of B.
 
     The result is None if different variables move the two joints, or if more than `MOST_VALUES` samples are
-    needed. It is also None if the variable has no limits and one of the two slopes is not 0, 1 or -1.
+    needed. The result is also None if the variable has no limits and a slope is not 0, 1 or -1.
     """
     if (name := pair.variable) is None:
         return None
-    low, high = variables.ranges.get(name, (0.0, 0.0))  # Without a range, the joints in A and B do not move.
+    low, high = variables.ranges.get(name, (0.0, 0.0))  # without a range, the joints in A and B do not move
     fastest = max(abs(pair.a.slope), abs(pair.b.slope))
     if math.isinf(high - low):
         if {abs(pair.a.slope), abs(pair.b.slope)} - {0.0, 1.0}:
@@ -389,7 +392,7 @@ def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray
 def _common_difference(
     step: MatchedJoints, pair: MatchedValues, z: FloatArray, y: Support, d: Support
 ) -> Support:
-    """Return the result of `difference` for two revolute joints that the same variable moves.
+    """Return the result of `d_after_joint` for two revolute joints that the same variable moves.
 
     `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
     Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
@@ -406,22 +409,23 @@ def _common_difference(
     turns = [rotation_about(screw.direction, values) for screw, values in ((axis, t), (other, t_other))]
     D = turns[1] - turns[0]
     c = (other.point - turns[1] @ other.point) - (axis.point - turns[0] @ axis.point)
-    apart_ = y.at(G @ D) + (G @ c.T).T
-    widest = y.radius(other)
+    at_samples = y.at(G @ D) + (G @ c.T).T
+    radius = y.radius(other)
     if pair.a.slope == pair.b.slope:
         tilt = float(np.linalg.norm(other.direction - axis.direction))
         reach = Support(y.grid, y.values - G @ other.point).largest() if tilt else 0.0
-        off = float(np.linalg.norm(np.cross(other.point - axis.point, axis.direction)))
-        late = abs(pair.b.constant - pair.a.constant)
-        bend = _times(2.0 * tilt + min(late, 2.0), widest) + tilt * reach + off
-        bend *= pair.a.slope**2
+        axis_offset = float(np.linalg.norm(np.cross(other.point - axis.point, axis.direction)))
+        angle_offset = abs(pair.b.constant - pair.a.constant)
+        second = _product(2.0 * tilt + min(angle_offset, 2.0), radius) + tilt * reach + axis_offset
+        second *= pair.a.slope**2
     else:
-        bend = _times(pair.a.slope**2, y.radius(axis)) + _times(pair.b.slope**2, widest)
-    between = np.maximum(apart_[:-1], apart_[1:]) + bend * (z[1] - z[0]) ** 2 / 8.0 * y.grid.lengths
+        second = _product(pair.a.slope**2, y.radius(axis)) + _product(pair.b.slope**2, radius)
+    between = np.maximum(at_samples[:-1], at_samples[1:])
+    between = between + second * (z[1] - z[0]) ** 2 / 8.0 * y.grid.lengths
     if d.values.any():
         half = abs(pair.a.slope) * (z[1] - z[0]) / 2.0
-        ends = d.turned_back(axis.direction, t, 1.0)
-        middles = d.turned_back(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
+        ends = d.rotated_values(axis.direction, t, 1.0)
+        middles = d.rotated_values(axis.direction, (t[:-1] + t[1:]) / 2.0, 1.0 / math.cos(half))
         between += np.maximum(np.maximum(ends[:-1], ends[1:]), middles)
     return Support(y.grid, between.max(axis=0))
 
@@ -431,15 +435,138 @@ def _independent_difference(
 ) -> Support:
     """Return the change of d by two revolute joints whose angles are treated as independent.
 
-    If A and B have the same axis, a point's two positions differ at most by the chord of the largest
-    difference of the two angles. If the axes differ, the result is the sum of the support functions of
+    If A and B have the same axis, the positions of a point in A and B differ at most by the chord of the
+    largest difference of the angles. If the axes differ, the result is the sum of the support functions of
     e(S' t') y and -e(S t) y.
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
-        there = y.turned(step.other, *variables.range(pair.b))
-        back = Support(y.grid, y.values).turned(step.axis, *variables.range(pair.a))
-        return Support(y.grid, there.values + back.at(-G))
-    chord = _times(2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0), y.radius(step.axis))
+        y_b = y.rotate(step.other, *variables.range(pair.b))
+        y_a = y.rotate(step.axis, *variables.range(pair.a))
+        return Support(y.grid, y_b.values + y_a.at(-G))
+    chord = _product(2.0 * math.sin(min(variables.off(pair), math.pi) / 2.0), y.radius(step.axis))
     across = np.linalg.norm(G - (G @ u)[:, None] * u, axis=1)
-    return Support(y.grid, np.array([_times(length, chord) for length in across]))
+    return Support(y.grid, np.array([_product(length, chord) for length in across]))
+
+
+#: Support functions of the vectors d and y.
+_Vectors = tuple[Support, Support]
+
+
+def curvature(
+    steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
+) -> tuple[list[str], FloatArray]:
+    """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
+
+    The bounds hold for matched joints that one variable moves by the same factor in A and B. If any other
+    pair of joints has an effect on D, all bounds are inf.
+    """
+    names = list(dict.fromkeys(line.variable for pair in pairs for line in (pair.a, pair.b) if line.slope))
+    M = np.zeros((len(names), len(names)))
+    for i, j, bound in _second_derivatives(steps, pairs, variables, frame):
+        both = pairs[i], pairs[j]
+        if not all(one.a.slope or one.b.slope for one in both):
+            continue
+        alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
+        # For a prismatic joint i, `bound` contains no difference between the values of the two joints.
+        if not all(alike) and (bound or (steps[i].kind != "turns" and not alike[0])):
+            return names, np.full_like(M, math.inf)
+        if not bound:
+            continue
+        second = bound * abs(pairs[i].a.slope * pairs[j].a.slope)
+        row, column = (names.index(pairs[k].a.variable) for k in (i, j))
+        M[row, column] += second
+        if i != j:
+            M[column, row] += second
+    return names, M
+
+
+def _second_derivatives(
+    steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
+) -> Iterator[tuple[int, int, float]]:
+    """Yield i, j and a bound on the second derivative with respect to joints i and j, for all j <= i."""
+    free = [_as_free_vectors(step) for step in steps]
+    d, y = start_at_frame(frame, COARSE)
+    for i in reversed(range(len(steps))):
+        first = _derivatives(steps[i], pairs[i], variables, d, y)
+        if steps[i].kind == "turns":
+            yield i, i, _pass_to_front(_cross_products(free[i], *first), free[: i + 1], pairs, variables)
+        vectors = after_constant_motion(free[i], *first)
+        for j in reversed(range(i)):
+            if steps[j].kind == "turns":
+                second = _derivatives(free[j], pairs[j], variables, *vectors)
+                yield i, j, _pass_to_front(second, free[: j + 1], pairs, variables)
+                vectors = after_joint(free[j], pairs[j], variables, *vectors)
+            else:
+                vectors = after_constant_motion(free[j], *vectors)
+        d, y = after_joint(steps[i], pairs[i], variables, d, y)
+
+
+def _pass_to_front(
+    vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
+) -> float:
+    """Return the largest length of d at the base; `vectors` contains d and y at the last joint."""
+    vectors = after_constant_motion(steps[-1], *vectors)
+    for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
+        slides = step.kind != "turns"
+        vectors = (
+            after_constant_motion(step, *vectors) if slides else after_joint(step, pair, variables, *vectors)
+        )
+    return vectors[0].largest()
+
+
+def _derivatives(
+    step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
+) -> _Vectors:
+    """Return the derivatives of d and y (module docstring) by a joint's value, before its motion L."""
+    if step.kind != "turns":
+        u, other = step.axis.direction, step.other.direction
+        return point(d.grid, other - u), point(d.grid, other)
+    d, y = d_after_joint(step, pair, variables, y, d), y.rotate(step.other, *variables.range(pair.b))
+    return _cross_products(step, d, y)
+
+
+def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
+    """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
+
+    If u and u' differ, their difference is added to the bound on u x d.
+    """
+    G, axis, other = d.grid.points, step.axis, step.other
+    by_axes = 0.0
+    if other is not axis:
+        reach = Support(d.grid, y.values - G @ other.point).largest()
+        by_axes = float(np.linalg.norm(other.direction - axis.direction)) * reach
+        by_axes += float(np.linalg.norm(np.cross(axis.direction, axis.point - other.point)))
+    across_a, across_b = np.cross(G, axis.direction), np.cross(G, other.direction)
+    d_cross = Support(d.grid, d.at(across_a) + by_axes * d.grid.lengths)
+    return d_cross, Support(d.grid, y.at(across_b) - across_b @ other.point)
+
+
+def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
+    """Return a pair of matched joints without its translations, which do not affect free vectors."""
+    axis = Screw(step.axis.direction, np.zeros(3))
+    other = axis if step.other is step.axis else Screw(step.other.direction, np.zeros(3))
+    before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
+    return replace(step, axis=axis, other=other, before=before)
+
+
+def relevant_joints(
+    found: Alignment, variables: Variables, frame: FramePair
+) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
+    """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
+
+    Most joints before the first difference of the models only rotate D. But an earlier joint changes the
+    length of D if a joint after the first difference mimics it. So the result begins with the first joint
+    that differs, or whose variable also moves a joint after the first difference.
+    """
+    steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
+    first = len(steps) - len(from_first_difference(found, variables, frame)[0])
+    for i in reversed(range(first)):
+        if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
+            first = i  # all joints from joint i to the first difference are included
+    return steps[first:], pairs[first:]
+
+
+def _variables(pairs: Sequence[MatchedValues | None]) -> set[str]:
+    lines = (line for pair in pairs if pair is not None for line in (pair.a, pair.b))
+    return {line.variable for line in lines if line.slope}

@@ -1,13 +1,13 @@
-// The page's behaviour: theme, sorting, filtering, folding, copying. Everything is readable without it.
+// Behaviour of the page: theme, sorting, filtering, folding, copying. Without this script, all text is visible.
 "use strict";
 (() => {
   const $ = (query, root = document) => root.querySelector(query);
   const $$ = (query, root = document) => [...root.querySelectorAll(query)];
   const root = document.documentElement;
 
-  // -- theme: as the system, light, dark ---------------------------------------------------------------
+  // -- theme -------------------------------------------------------------------------------------------
   const THEMES = { "": "as the system", light: "light", dark: "dark" };
-  const remember = (value) => { try { localStorage.setItem("urdfkin-theme", value); } catch { /* a file may not */ } };
+  const remember = (value) => { try { localStorage.setItem("urdfkin-theme", value); } catch { /* a page from a file may have no storage */ } };
   const recall = () => { try { return localStorage.getItem("urdfkin-theme") || ""; } catch { return ""; } };
   const setTheme = (theme) => {
     if (theme) root.dataset.theme = theme; else delete root.dataset.theme;
@@ -23,7 +23,7 @@
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => document.dispatchEvent(new Event("themechange")));
 
-  // -- paper folds nothing: what is folded of an open robot is opened, and folded again ------------
+  // -- printing: folded sections of an open robot are unfolded, and folded again afterwards ------------
   let opened = [];
   addEventListener("beforeprint", () => {
     opened = $$("details.robot[open] details.fold:not([open])");
@@ -31,7 +31,7 @@
   });
   addEventListener("afterprint", () => { for (const details of opened) details.open = false; });
 
-  // -- tables sort by the head that is pressed ---------------------------------------------------------
+  // -- sorting: a click on a heading sorts the table by this column -------------------------------------
   const key = (row, column, isText) => {
     const cell = row.cells[column];
     if (isText) return cell.textContent.trim().toLowerCase();
@@ -54,7 +54,7 @@
     if (head) sort(head.closest("table"), head.cellIndex);
   });
 
-  // -- the overview filters ----------------------------------------------------------------------------
+  // -- filtering the overview ---------------------------------------------------------------------------
   const find = $("#find"), verdict = $("#verdict");
   const filter = () => {
     const words = find.value.trim().toLowerCase();
@@ -84,7 +84,7 @@
     robot.open = true;
     show();
     if (document.getElementById(part)) return;
-    // The details lie in a file: the page scrolls to them when they are loaded.
+    // The details are in a file; the page scrolls to the details when the file is loaded.
     const loaded = (event) => {
       if (event.detail !== robot) return;
       document.removeEventListener("robotloaded", loaded);
@@ -94,12 +94,12 @@
   };
   addEventListener("hashchange", goTo);
   document.addEventListener("click", (event) => {
-    // The same link pressed twice changes no hash.
+    // A second click on a link does not change the hash of the page, so there is no event "hashchange".
     if (event.target.closest?.("#overview a, .verdict a")) setTimeout(goTo);
   });
   goTo();
 
-  // -- Denavit-Hartenberg tables: the chain and the convention are chosen once for view and table ---------
+  // -- Denavit-Hartenberg tables: the selected chain and convention apply to the 3D view and the tables -----
   const connect = (robot) => {
     const chains = $$(".chain", robot), chain = $("select[data-chain]", robot), convention = $("select[data-convention]", robot);
     if (!chain) return;
@@ -115,7 +115,7 @@
   };
   $$("details.robot").forEach(connect);
 
-  // -- details that lie in a file beside the page: loaded when a robot is unfolded --------------------------
+  // -- details in a file beside the page: loaded when the reader unfolds the robot ---------------------------
   const waiting = new Map();
   const missing = (robot, why) => {
     $(".body", robot).innerHTML = '<p class="reason" role="note"></p>';
@@ -126,7 +126,7 @@
     if (!robot) return;
     waiting.delete(index);
     if (token !== root.dataset.token) return void missing(robot, "belongs to another report");
-    $(".body", robot).innerHTML = details;  // made by the same template as the page, every name escaped
+    $(".body", robot).innerHTML = details;  // from the template of the page, which escapes every name
     connect(robot);
     document.dispatchEvent(new CustomEvent("robotloaded", { detail: robot }));
   };

@@ -1,5 +1,5 @@
-// The 3D view of a robot: kinematic skeleton, joint axes, frames, and the Denavit-Hartenberg frames of a chain.
-// Drawn with three.js. One WebGL context serves all views of a page, for browsers offer only a few.
+// 3D view of a robot: kinematic skeleton, joint axes, frames, and the Denavit-Hartenberg frames of a chain.
+// All views of a page share one WebGL context of three.js, because browsers limit the number of contexts.
 "use strict";
 (() => {
   const KIND = { FIXED: 0, REVOLUTE: 1, CONTINUOUS: 2, PRISMATIC: 3, PLANAR: 4, FLOATING: 5 };
@@ -20,10 +20,9 @@
   };
   const pose = (m) => new THREE.Matrix4().set(...m, 0, 0, 0, 1);
   const origin = (T, target = new THREE.Vector3()) => target.setFromMatrixPosition(T);
-  const inSet = (values) => (value) => values.includes(value);
-  const turns = inSet([KIND.REVOLUTE, KIND.CONTINUOUS]);
+  const turns = (kind) => kind === KIND.REVOLUTE || kind === KIND.CONTINUOUS;
 
-  // -- one renderer for all ----------------------------------------------------------------------------
+  // -- renderer of all views ---------------------------------------------------------------------------
   let shared;
   const renderer = () => {
     if (shared === undefined) {
@@ -37,7 +36,7 @@
     return shared;
   };
 
-  // -- kinematics: only what the eye needs --------------------------------------------------------------
+  // -- forward kinematics -------------------------------------------------------------------------------
   class Robot {
     constructor(data) {
       this.links = data.links;
@@ -68,13 +67,13 @@
       }
       return M;
     }
-    // A joint's parent link always stands before its child.
+    // The parent link of a joint comes before its child link.
     move() {
       for (const joint of this.joints) {
         this.poses[joint.child].multiplyMatrices(this.poses[joint.parent], joint.T).multiply(this.motion(joint));
       }
     }
-    // Frames of a table, and the two segments of each row: along z by d, and along x by a.
+    // Return the frames of a table, and the two segments of each row: along z by d, and along x by a.
     dh(chain, convention) {
       const table = chain[convention], frames = [], normals = [], offsets = [];
       let T = this.poses[chain.base].clone().multiply(pose(table.base));
@@ -130,7 +129,7 @@
       this.theme();
     }
 
-    // Lengths of the drawing: reach for the whole, bones for each joint.
+    // Compute the size of the robot (`reach`), and the size of the symbol at each link.
     measure() {
       const box = new THREE.Box3();
       for (const T of this.robot.poses) box.expandByPoint(origin(T));
@@ -186,7 +185,7 @@
       }
       group.add(mesh);
       if (joint.kind === KIND.PRISMATIC) {
-        // The rail from the joint's place at zero to where it stands.
+        // The rail goes from the joint's origin at q = 0 to the current origin.
         joint.rail = this.rod(new THREE.Vector3(), Z, boneWidth, this.materials.slide);
         this.scene.add(joint.rail);
       }
@@ -244,7 +243,7 @@
       this.scene.add(grid);
     }
 
-    // -- Denavit-Hartenberg: rebuilt when the chain changes, moved when the joints do ---------------------
+    // -- Denavit-Hartenberg frames: rebuilt when the chain changes, moved when a joint moves --------------
     chosen() {
       const chain = this.section.querySelector("[data-chain]");
       return chain ? [this.robot.chains[chain.value], this.section.querySelector("[data-convention]").value] : null;
@@ -287,7 +286,7 @@
       this.moveDh();
       this.invalidate();
     }
-    // From the same side always, as near as every link's origin allows.
+    // Look from a fixed direction, at the smallest distance at which the origins of all links are visible.
     look() {
       this.touched = false;
       const width = this.canvas.clientWidth || 1, height = this.canvas.clientHeight || 1, margin = 1.28;
@@ -356,7 +355,7 @@
       this.dhParts.visible = on("dh");
       const legend = this.section.querySelector(".dhkey");
       if (legend) legend.hidden = !on("dh");
-      // The tables' frames stand inside the joints: the robot fades while they are looked at.
+      // The robot is transparent while the frames of the tables are shown, because joints cover these frames.
       for (const name of ["bone", "fixed", "turn", "slide", "free"]) {
         Object.assign(this.materials[name], { transparent: on("dh"), opacity: on("dh") ? 0.32 : 1, depthWrite: !on("dh"), needsUpdate: true });
       }
@@ -417,7 +416,7 @@
       const label = document.createElement("label"), words = document.createElement("span"), output = document.createElement("output");
       const input = Object.assign(document.createElement("input"), { type: "range", min, max, step: "any", value: 0 });
       words.textContent = words.title = name;
-      // An output can be labelled, too: the first of the two in a label is what it names.
+      // The label belongs to its first control, so the slider comes before the output.
       label.append(words, input, output);
       input.ariaLabel = name;
       box.append(label);
@@ -428,7 +427,7 @@
       }
       this.sliders.push({ at, min, max, set: () => { input.value = this.robot.q[at]; tell(); } });
     }
-    // Zero, or what is nearest to it within a joint's own limits: the sliders then say where the robot is.
+    // Set each joint to zero, or to the limit nearest to zero, so that the sliders show the drawn configuration.
     neutral() {
       this.robot.neutral();
       for (const { at, min, max } of this.sliders) this.robot.q[at] = Math.min(Math.max(this.robot.q[at], min), max);
@@ -466,7 +465,7 @@
     }
   }
 
-  // A view starts when it first comes into sight, or when the page is printed.
+  // A view starts when it first becomes visible, or when the page is printed.
   const start = (target) => {
     watcher.unobserve(target);
     if (renderer()) target.view = new View(target);
@@ -478,7 +477,7 @@
   const watcher = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) if (isIntersecting) start(target);
   }, { rootMargin: "200px" });
-  // Paper has light colours in every theme. The drawing must be complete when the event returns.
+  // A printed page has light colours in every theme. The drawing must be complete when the event handler returns.
   const redraw = (onPaper) => {
     printing = onPaper;
     for (const target of document.querySelectorAll("[data-view]")) {

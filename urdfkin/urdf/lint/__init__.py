@@ -1,7 +1,4 @@
-"""Check a URDF and return findings, each with a code and a position.
-
-urdfkin checks every URDF before it uses it.
-"""
+"""Check a URDF and return findings, each with a code and a position. `load` checks every URDF."""
 
 from urdfkin.urdf.findings import Finding, PinocchioReading, Severity, UrdfError, UrdfWarning
 from urdfkin.urdf.lint.runner import check, check_text

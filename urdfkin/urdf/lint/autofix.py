@@ -4,14 +4,14 @@ urdfkin accepts a fix if three conditions hold:
 
 - The new file has fewer findings with the code of the fix.
 - The new file has no new findings.
-- The new file describes the same robot. The names, limits and other numbers are equal if a URDF reader uses
-  them. There are two exceptions. Rounding may change the direction of a joint axis. The rotation of a joint
-  origin may change by at most `Fix.turns` (rad).
+- The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
+  exceptions. Rounding may change the direction of a joint axis. The rotation of a joint origin may change by
+  at most `Fix.turns` (rad).
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
-a CI service, for example an escape sequence or a GitHub workflow command. `git apply` would refuse a patch
-with escaped text. urdfkin therefore writes such a patch as git's binary patch in ASCII, below the readable
-patch as a comment.
+a CI service, for example an escape sequence or a GitHub workflow command. If such text were escaped in the
+patch, `git apply` would refuse the patch. The patch is then a binary patch of git in ASCII, after the escaped
+text of the patch as a comment.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from __future__ import annotations
 import base64
 import difflib
 import hashlib
+import io
 import os
+import string
 import zlib
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping
@@ -32,17 +34,17 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: `--fix` makes at most this number of passes over a file. One pass applies the fixes of one code.
+#: Maximum number of passes of `--fix` over a file. One pass applies the fixes of one code.
 #: If two fixes overlap, the second fix needs another pass.
 PASSES = 100
 
-#: Rounding the numbers of a unit vector to doubles rotates it by at most twice 2**-53 rad.
+#: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.
 TILT = Fraction(1, 2**52)
 
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """A fixed file, the fixed findings, and the reason for each code whose fixes were not applied."""
+    """A fixed file, the fixed findings, and for each code that was not fixed, the reason."""
 
     text: Text
     fixed: tuple[Finding, ...]
@@ -54,8 +56,8 @@ def mend(
 ) -> Mended:
     """Apply the automatic fixes of a file, one code after another. A file with errors is not changed.
 
-    `look` checks a text and returns all findings. `choose` returns a filter that selects the findings to fix,
-    once for each pass over the file.
+    `look` checks a text and returns all findings. `choose` is called for each pass over the file, and returns
+    a function that decides whether a finding is fixed.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -84,8 +86,8 @@ def mend(
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # The reporter stores a limited number of findings with one code.
-    # After a fix, the reporter can store another of these findings, which would look new.
+    # Codes with more findings than a reporter stores are left out.
+    # After a fix, the reporter can store another of these findings, which would then look new.
     many = {finding.code for finding in before.findings if finding.also}
     old, new = (
         Counter((f.code, f.element, f.name) for f in seen.findings if f.code not in many)
@@ -106,9 +108,9 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield differences between two robots. Ignore unused values, such as the axis of a fixed joint.
+    """Yield the differences between two robots, except in unused values such as the axis of a fixed joint.
 
-    `turns` is the bound on the rotation (rad) of each joint's frame.
+    `turns` are upper bounds on the allowed rotation (rad) of each joint's frame, by joint name.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
@@ -120,11 +122,11 @@ def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> I
 
 def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     """Return the first property in which two joints differ, or None."""
-    # If one of the three angles changes, the frame rotates by at most the same angle.
+    # If roll, pitch or yaw changes by an angle, the frame rotates by at most this angle.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
+    names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
     equal = {
-        "name, type, parent or child": (a.name, a.kind, a.parent, a.child)
-        == (b.name, b.kind, b.parent, b.child),
+        "name, type, parent or child": names_a == names_b,
         "origin": (a.xyz, a.quaternion) == (b.xyz, b.quaternion),
         "orientation": rotation <= Fraction(turns) * _SLACK,
         "axis": a.kind not in AXIAL or _same_direction(a.axis, b.axis),
@@ -134,7 +136,7 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: This factor allows for the rounding errors of `Fix.turns`, which is a sum of doubles.
+#: Factor for the rounding errors of `Fix.turns`, which is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
@@ -149,7 +151,7 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
 
 
 def _limits(joint: JointRecord) -> tuple[float | None, ...]:
-    """Return the limits that have an effect. For example, a continuous joint has no position limits."""
+    """Return the limits that have an effect: only revolute and prismatic joints have position limits."""
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()
@@ -161,16 +163,18 @@ def _rule(joint: JointRecord) -> tuple[str, float, float] | None:
     return None if rule is None else (rule.leader, rule.multiplier, rule.offset)
 
 
-#: Bytes per line of git's binary patch.
+#: Number of bytes in each line of git's binary patch.
 _IN_A_LINE = 52
+#: Letters for the number of bytes in a line of git's binary patch.
+_COUNTS = string.ascii_uppercase + string.ascii_lowercase
 _NO_END = "\\ No newline at end of file\n"
 
 
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
-    """Return the patch of one file, safe to print; "" if the file does not change.
+    """Return the patch of one file, safe to print; an empty string if the file does not change.
 
-    The name `file` is relative to the current folder. The bytes are UTF-8, because `--fix` changes no other
-    file. `shown` escapes, in one line, text that controls a terminal or a log.
+    `file` is the name relative to the current folder. `before` and `after` are UTF-8. `shown` escapes text
+    that controls a terminal or a log in one line.
     """
     if before == after:
         return ""
@@ -183,22 +187,18 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
 
 
 def _relative(file: str) -> str:
-    """Return a file name for `git apply`, which is relative if the file is in the current folder."""
+    """Return a file name for `git apply`: a relative name if the file is in the current folder."""
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 
 
 def _unified_diff(name: str, before: bytes, after: bytes) -> str:
-    # git needs a tab after a file name that contains spaces.
-    end = "\t" if " " in name else ""
+    end = "\t" if " " in name else ""  # git needs a tab after a file name that contains spaces
     old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
-    found = difflib.unified_diff(_lines(before.decode()), _lines(after.decode()), old, new)
+    # Like git, StringIO ends a line only at a line feed.
+    a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))
+    found = difflib.unified_diff(a, b, old, new)
     return "".join(line if line.endswith("\n") else f"{line}\n{_NO_END}" for line in found)
-
-
-def _lines(text: str) -> list[str]:
-    """Split a text into lines like git: only a line feed ends a line."""
-    return [*(f"{line}\n" for line in text.split("\n")[:-1]), *filter(None, text.split("\n")[-1:])]
 
 
 def _quote(name: str) -> str:
@@ -212,10 +212,9 @@ def _quote(name: str) -> str:
 
 
 def _binary(name: str, before: bytes, after: bytes) -> str:
-    """Return git's binary patch; its file names are relative to the root of the repository."""
-    top = next(
-        (folder for folder in (Path.cwd(), *Path.cwd().parents) if (folder / ".git").exists()), Path.cwd()
-    )
+    """Return git's binary patch, with the file name relative to the root of the repository."""
+    here = Path.cwd()
+    top = next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
     place = os.path.relpath(name, top)
     old, new = (_quote(f"{side}/{Path(place).as_posix()}") for side in "ab")
     digests = (hashlib.sha1(b"blob %d\0" % len(data) + data).hexdigest() for data in (before, after))
@@ -226,8 +225,6 @@ def _binary(name: str, before: bytes, after: bytes) -> str:
 def _encode(data: bytes) -> str:
     packed = zlib.compress(data)
     pieces = (packed[i : i + _IN_A_LINE] for i in range(0, len(packed), _IN_A_LINE))
-    return "".join(f"{_length(len(piece))}{base64.b85encode(piece, pad=True).decode()}\n" for piece in pieces)
-
-
-def _length(count: int) -> str:
-    return chr(ord("A") + count - 1) if count <= 26 else chr(ord("a") + count - 27)
+    return "".join(
+        f"{_COUNTS[len(piece) - 1]}{base64.b85encode(piece, pad=True).decode()}\n" for piece in pieces
+    )

@@ -1,7 +1,7 @@
 """Write findings as text, JSON, SARIF 2.1.0, or GitHub workflow commands.
 
-Code-scanning services and editors read SARIF: OASIS "Static Analysis Results Interchange Format (SARIF)
-Version 2.1.0".
+SARIF is a format of code-scanning services and editors: OASIS "Static Analysis Results Interchange Format
+(SARIF) Version 2.1.0".
 """
 
 from __future__ import annotations
@@ -24,30 +24,18 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
-    The run contains a rule about MJCF or USD files only if a finding has its code. Each silenced finding has
-    the reason of its comment, and is marked as "suppressed in source".
+    A rule about MJCF or USD files is in the run only if a finding has the rule's code. A silenced finding is
+    marked as "suppressed in source", with the reason in the comment.
     """
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}
-    run = {
-        "tool": {
-            "driver": {
-                "name": "urdfkin",
-                "version": version,
-                "rules": [_rule(rule) for rule in rules.values()],
-            }
-        },
-        "columnKind": "unicodeCodePoints",
-        "results": [
-            *(_result(finding, index[finding.code]) for finding in findings),
-            *(
-                _result(finding, index[finding.code])
-                | {"suppressions": [{"kind": "inSource", "justification": reason}]}
-                for finding, reason in silenced
-            ),
-        ],
-    }
+    results = [_result(finding, index[finding.code]) for finding in findings]
+    for finding, reason in silenced:
+        suppression = {"kind": "inSource", "justification": reason}
+        results.append(_result(finding, index[finding.code]) | {"suppressions": [suppression]})
+    driver = {"name": "urdfkin", "version": version, "rules": [_rule(rule) for rule in rules.values()]}
+    run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
 
@@ -105,21 +93,18 @@ def _region(finding: Finding) -> dict[str, int]:
 
 
 def _uri(file: str) -> str:
-    """Return a file name as a URI reference, relative for a relative name; `stdin` for standard input.
-
-    Bytes that a URI does not allow are written as %XX.
-    """
+    """Return a file name as a URI reference, relative if the name is relative."""
     if file.startswith("<"):
         return file.strip("<>")
     return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))
 
 
-#: Version of the JSON format; the version changes when a field is removed or changes its meaning.
+#: Version of the JSON format; the number changes when a field is removed or changes its meaning.
 JSON_VERSION = 1
 
 
 def summary(findings: Sequence[Finding], files: int) -> str:
-    """Return one line with the number of errors, warnings, notes and files.
+    """Return one line with the numbers of errors, warnings, notes and files.
 
     >>> summary([], 1)
     'no findings in 1 file'
@@ -135,9 +120,8 @@ def statistics(findings: Sequence[Finding]) -> Iterator[str]:
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count
-        worst[finding.code] = min(
-            worst.get(finding.code, finding.severity), finding.severity, key=lambda s: s.rank
-        )
+        severities = worst.get(finding.code, finding.severity), finding.severity
+        worst[finding.code] = min(severities, key=lambda severity: severity.rank)
         fixable |= {finding.code} if finding.fix else set()
     for code, count in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
         mark = "[*]" if code in fixable else "   "
@@ -152,9 +136,9 @@ def as_json(
 ) -> str:
     """Return the findings as one JSON document.
 
-    An entry of "findings" has the fields of `Finding`, and the `title` of its code. An entry of "silenced"
-    also has the `reason` in the comment that silences the finding. The positions in a `fix` are byte indices.
-    The byte after a byte order mark has the index 0.
+    An entry of "findings" has the fields of `Finding`, and the `title` of the code. An entry of "silenced"
+    also has the `reason` in the comment that silences the finding. The positions in a `fix` are byte indices,
+    which do not count a byte order mark.
     """
     document = {
         "schema": "urdfkin-findings",
@@ -174,7 +158,7 @@ def _entry(finding: Finding) -> dict[str, Any]:
 
 
 def as_github(findings: Sequence[Finding]) -> str:
-    """Return a workflow command for each finding, errors first; GitHub shows a finding beside its line."""
+    """Return a workflow command for each finding, errors first. GitHub shows each finding beside its line."""
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
         f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"

@@ -1,10 +1,10 @@
 """Find a rule by its code, and return the documentation of each rule as data and as text.
 
-The parser and each module in `lint.rules` is a topic: a TOML file with the name of the module, beside it,
-documents its rules. The documentation of one rule is called a page. If the top of the file defines `cure`,
-`others` or `question`, the pages without this entry use it. The table `parts` defines texts that replace
-`{name}` in examples. Such a text is a string, or a pair [text, times] for a repeated text, in which `{i}` is
-the index of the repetition. Line breaks in prose have no meaning.
+The rules are defined in the parser and in the modules of `lint.rules`. Beside each module, a TOML file with
+the name of the module contains a page for each rule. An entry `cure`, `others` or `question` at the top of
+the file is the default for all pages. The table `parts` defines texts that replace `{name}` in examples. Each
+of these texts is a string, or a pair [text, times] for a repeated text, in which `{i}` is the index of the
+repetition. Line breaks in prose have no meaning.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _MODULES = (parser, dialect, joints, bodies)
 
-#: The rules of each topic.
+#: The rules about URDF files, by the name of their module.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in _MODULES
@@ -37,12 +37,11 @@ RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda r
 #: The rules about MJCF and USD files by code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: The names of a rule are its code, the digits of the code, and its short name, in lower case.
+#: Code of each rule, by all names of the rule: the code in lower case, its digits, and the short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
-_TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own} | dict.fromkeys(
-    OF_OTHERS, "left_out"
-)
+_TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
+_TOPIC |= dict.fromkeys(OF_OTHERS, "left_out")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +49,13 @@ class Page:
     """The documentation of a rule.
 
     Attributes:
-        title: The problem in one line. This line is also in the tables of all rules.
+        title: The problem in one line.
         why: The consequences of the problem for a user.
-        example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
-            example begins with a joint or a comment, urdfkin adds the links `base` and `tip` to it.
+        example: A minimal example with the problem: a whole document, or the content of `<robot>`. An example
+            that begins with a joint or a comment also needs the links `base` and `tip`.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
-        question: The entry about this problem on the page of questions and answers, or None.
+        question: The entry about the problem in docs/questions.md, or None.
     """
 
     title: str
@@ -108,16 +107,16 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    """Return a rule by its code or short name, in upper or lower case, or raise UnknownNameError."""
-    known, name_or_code = RULES | OF_OTHERS, word.strip().lower()
+    """Return the rule with a code or short name, in upper or lower case, or raise UnknownNameError."""
+    known, name = RULES | OF_OTHERS, word.strip().lower()
     codes = CODES | {name: rule.id for rule in OF_OTHERS.values() for name in (rule.id.lower(), rule.slug)}
-    if name_or_code not in codes:
+    if name not in codes:
         raise UnknownNameError("code", word, [*known, *(rule.slug for rule in known.values())])
-    return known[codes[name_or_code]]
+    return known[codes[name]]
 
 
 def find_rules(word: str) -> tuple[Rule, ...]:
-    """Return the rules for a code, a short name, the first digits of codes, or ALL.
+    """Return the rules with a code, a short name or the first digits of codes, or all rules for ALL.
 
     Raise UnknownNameError if there is no such rule.
 
@@ -133,7 +132,7 @@ def find_rules(word: str) -> tuple[Rule, ...]:
     return family if family and prefix.lstrip(string.ascii_uppercase) else (find_rule(word),)
 
 
-#: Longer lines of an example are cut.
+#: Maximum number of characters in a line of a printed example.
 _WIDEST = 100
 #: Width of prose on a terminal, in characters.
 WIDTH = 88
@@ -150,19 +149,14 @@ def explain(rule: Rule) -> str:
         textwrap.fill(content.others, WIDTH),
     ]
     if rule.oracle is not None:
-        paragraphs.append(
-            textwrap.fill(
-                "Pinocchio cannot check such a robot. urdfkin reports its results as not verified.",
-                WIDTH,
-            )
-        )
+        paragraphs.append("Pinocchio cannot check the results of a robot that has this finding.")
     if content.question is not None:
         paragraphs.append(f"{content.question}.")
     return "\n\n".join(paragraphs)
 
 
 def _example(text: str) -> str:
-    """Indent an example, escape unprintable characters and cut long lines."""
+    """Indent an example, escape unprintable characters, and cut long lines."""
     lines = [printable(line) for line in text.strip("\n").split("\n")]
     cut = [line if len(line) <= _WIDEST else line[: _WIDEST - 4] + " ..." for line in lines]
-    return textwrap.indent("\n".join(cut), "    ", lambda line: True).rstrip()
+    return "\n".join(f"    {line}" for line in cut).rstrip()

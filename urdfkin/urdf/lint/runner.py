@@ -1,6 +1,6 @@
-"""Run all rules on a URDF, from rules about its bytes and its XML to rules about its numbers and names.
+"""Run all rules on a URDF: rules about bytes, XML, elements, names, joints, numbers and links.
 
-The text is read once. `urdfkin.load` builds the robot from the same records that the rules have checked.
+The text is parsed once. `urdfkin.load` builds the robot from the records that the rules have checked.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def check(
 ) -> Findings:
     """Check a URDF and return the findings by line.
 
-    The function checks the text of the URDF. It also checks that the packages and mesh files named in the
-    text exist, but it opens no mesh.
+    Besides the text of the URDF, the function checks that packages and mesh files in the text exist. No mesh
+    is opened.
 
     Args:
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
@@ -53,16 +53,17 @@ def check(
         mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
             are notes. The default is True, except for robots of the catalogue with invalid mimic rules.
         root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
-        xacro_args: Arguments for a .xacro file, which is expanded first. Lines refer to the expanded text.
+        xacro_args: Arguments for a .xacro file, which is expanded first. Line numbers of findings are those
+            of the expanded text.
         fold: Whether to combine many warnings with one code into a single warning that lists the lines. If
             `fold` is True and there are more than a hundred errors with one code, the hundredth error lists
-            the lines of the others.
+            the lines of all further errors.
 
     Returns:
         The findings that no comment silences, as a list. Notebooks show this list as a table. The list is
         empty if the file has no problem. If a file has more than 10,000 findings with one code, the list
         contains the first 10,000. The attribute `also` of the last of these findings contains the line
-        numbers of the others.
+        numbers of all further findings.
 
     Raises:
         SourceError: the file cannot be read.
@@ -88,10 +89,10 @@ class Examined:
     """The result of a check.
 
     Attributes:
-        data: The bytes of the text without a byte order mark. The line and column numbers and the fixes of
-            the findings refer to positions in `data`.
+        data: The bytes of the text without a byte order mark. All positions in the findings are positions in
+            `data`.
         robot: The records of the robot; None if the text is not a URDF.
-        silenced: The findings that a comment silences, each with the reason in this comment.
+        silenced: The findings that a comment silences, each with the reason in the comment.
     """
 
     text: Text
@@ -112,7 +113,7 @@ def examine(
 ) -> Examined:
     """Check a text that `read_source` has returned, with the arguments of `check`.
 
-    `wanted` returns whether to report a finding, before findings are combined.
+    `wanted` is called before findings are combined, and returns whether a finding is reported.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
@@ -127,7 +128,7 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """Return the file of a text, at which the search for packages begins; None if the text has no file."""
+    """Return the file of a text; None if the text has no file."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
@@ -135,7 +136,7 @@ def file_of(text: Text) -> Path | None:
 def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
     """Check the bytes of a URDF and return the findings by line, with the arguments of `check`.
 
-    The function opens no file and no connection, and uses neither yourdfpy nor Pinocchio.
+    The function opens no file and no network connection, and uses neither yourdfpy nor Pinocchio.
 
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
     []
@@ -148,9 +149,9 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
     """Parse and check the bytes in a reporter, and return the records; None if the file is not a URDF.
 
-    If `mimic` is False, mimic joints move freely, and all findings about them are notes. The kind
-    `root_joint`, "floating" or "planar", adds a joint; the file must not contain the names of this joint and
-    its parent link.
+    If `mimic` is False, mimic joints move freely, and all findings about mimic joints are notes. `root_joint`
+    is "floating" or "planar" if the robot gets an additional joint `root_joint` with the parent link
+    `universe`; the file must not contain these names.
     """
     root = read_document(report)
     read_comments(report, CODES)

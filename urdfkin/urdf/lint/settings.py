@@ -1,6 +1,6 @@
 """Find the files and the settings for `urdfkin check`, and select the findings to report.
 
-Settings are in pyproject.toml. Their files and patterns are relative to the folder of this file:
+Settings are in pyproject.toml. Files and patterns in the settings are relative to the folder of this file:
 
     [tool.urdfkin]
     ignore = ["URDF601"]
@@ -8,10 +8,10 @@ Settings are in pyproject.toml. Their files and patterns are relative to the fol
     baseline = "urdfkin-baseline.json"
     per-file-ignores = { "legacy/*" = ["URDF5"] }
 
-urdfkin reports a finding if its code is selected and the finding is neither in the baseline nor in the older
-version of the file. A baseline is a JSON file with known findings. A finding is known if an entry has the
-same file, code, severity, element, name and found text. The line numbers are not compared, so a finding stays
-known after you edit other lines.
+A finding is reported if its code is selected and the finding is neither in the baseline nor in an older
+version of the file. A baseline is a JSON file with known findings. A finding is known if the baseline has an
+entry with the same file, code, severity, element, name and wrong text. Line numbers are not compared, so a
+finding is still known after you edit other lines.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
 from urdfkin.urdf.lint.runner import Examined, file_of
 from urdfkin.urdf.sources import Text, as_word, is_xacro
 
-#: Version of the file format; the version changes when a field is removed or changes its meaning.
+#: Version of the format of baselines; the number changes when a field is removed or changes its meaning.
 BASELINE_VERSION = 1
 
 Key = tuple[str, ...]
@@ -51,12 +51,12 @@ def key_of(finding: Finding, file: str) -> Key:
 
 @dataclass(slots=True)
 class Baseline:
-    """The known findings, and how many findings of this run match them.
+    """The known findings, and how many of them were found again.
 
     Attributes:
-        counts: Number of known findings, by key, that no finding of this run has matched yet.
+        counts: Number of known findings that were not found again yet, by key.
         root: The folder to which the file names in the keys are relative.
-        met: The number of findings of this run that matched a known finding.
+        met: Number of known findings that were found again.
     """
 
     counts: Counter[Key]
@@ -64,7 +64,7 @@ class Baseline:
     met: int = 0
 
     def knows(self, finding: Finding) -> bool:
-        """Return whether a finding is known. Each known finding matches only one finding of this run."""
+        """Return whether a finding is known, and count the known finding as found again."""
         key = key_of(finding, relative(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
@@ -73,7 +73,7 @@ class Baseline:
         return True
 
     def gone(self, files: Iterable[str]) -> int:
-        """Return the number of known findings that no longer occur in the checked files."""
+        """Return the number of known findings in the checked files that were not found again."""
         checked = {relative(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
@@ -88,44 +88,37 @@ def relative(file: str, root: Path) -> str:
 
 def read_baseline(path: Path) -> Baseline:
     """Read a baseline; raise SourceError or InputError if the file cannot be read or is no baseline."""
+    counts = Counter[Key]()
     try:
         document = json.loads(read_text(path))
         if document["schema"] != "urdfkin-baseline" or document["version"] != BASELINE_VERSION:
             raise ValueError
-        counts = Counter(
-            {
-                tuple(str(entry[name]) for name in _FIELDS): int(entry["count"])
-                for entry in document["findings"]
-            }
-        )
+        for entry in document["findings"]:
+            counts[tuple(str(entry[name]) for name in _FIELDS)] = int(entry["count"])
     except (ValueError, TypeError, LookupError, RecursionError):
-        raise InputError(
-            "this file is not a baseline of urdfkin",
-            where=str(path),
-            remedy="write a baseline with: urdfkin check --write-baseline FILE ...",
-        ) from None
+        remedy = "write a baseline with: urdfkin check --write-baseline FILE ..."
+        raise InputError("this file is not a baseline of urdfkin", where=str(path), remedy=remedy) from None
     return Baseline(counts, path.parent)
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return a baseline with the findings of the checked `files`.
+    """Return the text of a baseline with the findings of the checked `files`.
 
-    Entries of an older baseline at `path` about other existing files are copied. If the file at `path` is not
-    a baseline, raise InputError.
+    If there is an older baseline at `path`, its entries about other existing files are copied. If the file at
+    `path` is not a baseline, raise InputError.
     """
     counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
     if path.exists():
         checked = {relative(file, path.parent) for file in files}
         older = read_baseline(path).counts
-        counts |= Counter(
-            {key: n for key, n in older.items() if key[0] not in checked and (path.parent / key[0]).exists()}
-        )
+        others = [key for key in older if key[0] not in checked and (path.parent / key[0]).exists()]
+        counts |= Counter({key: older[key] for key in others})
     entries = [dict(zip(_FIELDS, key, strict=True)) | {"count": n} for key, n in sorted(counts.items())]
     document = {"schema": "urdfkin-baseline", "version": BASELINE_VERSION, "findings": entries}
     return json.dumps(document, indent=1) + "\n"
 
 
-#: The type of each setting.
+#: Type of each setting.
 _KINDS = {
     "select": list, "ignore": list, "per-file-ignores": dict, "strict": bool, "notes": bool,
     "include": list, "exclude": list, "baseline": str,
@@ -137,13 +130,13 @@ _WORDS = {
     str: "a string",
 }
 
-#: Robot files in a folder match these patterns. Most .xacro files contain only a part of a robot.
+#: Default patterns of robot files in a folder; most .xacro files contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """A table of settings, whose types were checked; `file` is None if there is no table."""
+    """A table of checked settings. `file` is the file of the table; None without a table."""
 
     file: Path | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -154,18 +147,17 @@ class Settings:
         return Path() if self.file is None else self.file.parent
 
     def ignored_in(self, file: str) -> frozenset[str]:
-        table = self.values.get("per-file-ignores", {}).items()
-        return codes(
-            word for pattern, words in table if matches(file, [pattern], self.root) for word in words
-        )
+        table = self.values.get("per-file-ignores", {})
+        patterns = [pattern for pattern in table if matches(file, [pattern], self.root)]
+        return codes(word for pattern in patterns for word in table[pattern])
 
 
 def find_settings(start: Path) -> Settings:
     """Return the settings that apply in a folder; empty settings if there is no table [tool.urdfkin].
 
-    The table is in pyproject.toml of this folder or of a folder above it, up to the first folder that
-    contains .git. Raise SourceError if a pyproject.toml cannot be read, and InputError if it is not TOML or a
-    setting is wrong.
+    The table is in the pyproject.toml of the folder or of a folder above, up to the first folder that
+    contains .git. Raise SourceError if a pyproject.toml cannot be read, and InputError if the file is not
+    TOML or a setting is wrong.
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
@@ -177,15 +169,13 @@ def find_settings(start: Path) -> Settings:
 
 
 def read_settings(file: Path) -> Settings:
-    """Return the settings in the table [tool.urdfkin] of a given file.
+    """Return the settings in the table [tool.urdfkin] of a file.
 
-    Raise SourceError if the file cannot be read, and InputError if it has no such table or a setting is
-    wrong.
+    Raise SourceError if the file cannot be read, and InputError without this table or with a wrong setting.
     """
     if (found := _table(file, pipes=True)) is None:
-        raise InputError(
-            "no table [tool.urdfkin]", where=str(file), remedy="add this table, or omit --config"
-        )
+        remedy = "add this table, or omit --config"
+        raise InputError("no table [tool.urdfkin]", where=str(file), remedy=remedy)
     return _check_settings(file, found)
 
 
@@ -204,9 +194,9 @@ def _check_settings(file: Path, table: Any) -> Settings:
         if name not in _KINDS:
             raise UnknownNameError("setting", name, _KINDS, where=where)
         kind = _KINDS[name]
-        lists = (
-            [value] if kind is list else [*value.values()] if kind is dict and isinstance(value, dict) else []
-        )
+        lists = [value] if kind is list else []
+        if kind is dict and isinstance(value, dict):
+            lists = [*value.values()]
         if not isinstance(value, kind) or not all(_is_list_of_strings(each) for each in lists):
             raise InputError(f"{name} must be {_WORDS[kind]}", where=where, found=repr(value))
         if name in ("select", "ignore", "per-file-ignores"):
@@ -215,9 +205,8 @@ def _check_settings(file: Path, table: Any) -> Settings:
             except UnknownNameError as error:
                 raise InputError(f"{name}: {error.what}", where=where, remedy=error.remedy) from None
     if "baseline" in table and not exists(baseline := file.parent / table["baseline"]):
-        raise SourceError(
-            "the baseline file does not exist", where=str(baseline), remedy=f"change the setting in {where}"
-        )
+        remedy = f"change the setting in {where}"
+        raise SourceError("the baseline file does not exist", where=str(baseline), remedy=remedy)
     return Settings(file, table)
 
 
@@ -226,7 +215,7 @@ def _is_list_of_strings(value: Any) -> bool:
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """Return the codes of all rules that `find_rules` finds for the given words, or raise UnknownNameError.
+    """Return the codes of all rules that words name (see `find_rules`), or raise UnknownNameError.
 
     >>> sorted(codes(["rounded-pi", "URDF52"]))[:3]
     ['URDF520', 'URDF521', 'URDF522']
@@ -251,7 +240,7 @@ def matches(file: str, patterns: Iterable[str], root: Path) -> bool:
     )
 
 
-#: A xacro file can include files with these suffixes.
+#: Suffixes of files that a xacro file can include.
 _PARTS = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 
@@ -262,7 +251,7 @@ class Choice:
     Attributes:
         codes: The selected codes.
         notes: Whether notes are reported.
-        baseline: The known findings, or None. The baseline object counts the matched findings.
+        baseline: The known findings, or None.
     """
 
     codes: frozenset[str]
@@ -273,40 +262,37 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        Call the function exactly once for each finding of the file, in order, because it counts the findings
-        that match a baseline. `before` is a baseline with the findings in an older version of the file.
+        Call the function exactly once for each finding of the file, in order, because the function counts the
+        known findings. `before` is a baseline with the findings in an older version of the file.
         """
         codes = self.codes - self.settings.ignored_in(text.label)
         known = [baseline for baseline in (self.baseline, before) if baseline is not None]
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # `any` would stop after the first match, but each baseline must count the finding.
+            # Each baseline must count the finding, but `any` would not call `knows` of the second baseline.
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the same filter as `of` with copies of the baselines, for a second check of a file."""
-        copies = [
-            None if known is None else replace(known, counts=Counter(known.counts))
-            for known in (self.baseline, before)
-        ]
+        """Return the function of `of` with copies of the baselines, for a second check of a file."""
+        copies = [known and replace(known, counts=Counter(known.counts)) for known in (self.baseline, before)]
         return replace(self, baseline=copies[0]).of(text, copies[1])
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings of an older version of a file, which `look` finds.
+    """Return the findings in an older version of a file. `look` checks the text of a file.
 
-    If neither the file nor a file that it uses has changed, the findings are the same, and None is returned.
-    If a mesh file was deleted after the older version, the finding about the missing mesh counts as new.
+    If no file that affects the findings has changed, the result is None, because no finding is new. If a mesh
+    file was deleted after the older version, the finding about the missing mesh is new.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # The older xacro file cannot be expanded.
-        # If a file that the xacro file may include has changed, every finding is new.
+        # The older version of a xacro file cannot be expanded.
+        # If any file has changed that the xacro file may include, every finding is new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
@@ -318,16 +304,16 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     return Baseline(Counter(key_of(finding, relative(finding.file, Path())) for finding in found))
 
 
-#: ROS's build tools and urdfkin skip a folder that contains one of these files.
+#: Names of files that make ROS's build tools and urdfkin skip a folder.
 LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def collected(word: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the files for one argument, sorted by name; raise SourceError if there is none.
+    """Return the files that an argument of the command names, sorted; raise SourceError if there is none.
 
     The argument `word` is a file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[`, `**`. The
-    patterns `include` select file names in a folder. The patterns `exclude` skip files and folders, except a
-    file that the user names.
+    files in a folder match the patterns `include`. Files and folders that match the patterns `exclude` are
+    skipped, except a file that the user names.
     """
     path = Path(word)
     if word == "-" or word in catalogue():

@@ -1,8 +1,8 @@
 """Enclosures: intervals that provably contain the true values of one sample.
 
-`urdfkin.kinematics.equations` is evaluated with interval arithmetic (`urdfkin.verify.exact.numbers`). The
-inputs are the decimals in the URDF text and the exact values of q, v and a. An enclosure proves a bound on
-the rounding error. An enclosure does not prove the equations, but the agreement with Pinocchio supports them.
+Interval arithmetic (`urdfkin.verify.exact.numbers`) evaluates `urdfkin.kinematics.equations` for the decimals
+in the URDF text and the exact values of q, v and a. An enclosure proves a bound on the rounding error, but
+not the equations, which the agreement with Pinocchio supports.
 """
 
 from __future__ import annotations
@@ -37,9 +37,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
-#: Smallest and largest accepted number of decimal digits.
-#: A double has 15 digits.
-#: A computation with more than 10,000 digits takes too long.
+#: Minimum number of decimal digits (that of a double) and maximum number (for a limited time).
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])
@@ -49,7 +47,12 @@ _ENDS = np.vectorize(ends, otypes=[float, float])
 class Enclosure:
     """Bounds of the true value of each number in a result, in the shape of the result of the `Robot` method.
 
-    `pinocchio` is None if Pinocchio cannot compute the result.
+    Attributes:
+        quantity: Name of the quantity.
+        lower: Lower bound of each true value.
+        upper: Upper bound of each true value.
+        urdfkin: urdfkin's result.
+        pinocchio: Pinocchio's result; None if Pinocchio cannot compute the result.
     """
 
     quantity: str
@@ -60,10 +63,7 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower`: 0 for each number whose true value is a double.
-
-        For all other numbers, the width is at least the distance between two neighbouring doubles.
-        """
+        """The difference `upper - lower`, which is 0 if the true value is a double."""
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
@@ -74,7 +74,8 @@ class Enclosure:
     def error(self, x: ArrayLike) -> FloatArray:
         """Return an upper bound on the difference between each number of `x` and the true value.
 
-        If `x` has a different shape than the quantity, InputError is raised.
+        Raises:
+            InputError: the shape of `x` is not that of the quantity.
         """
         x = self._alike(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
@@ -102,7 +103,7 @@ class Enclosures:
     """Intervals that contain the true placement, velocity, acceleration and Jacobians of a frame.
 
     The quantities have the shapes and units of the results of `Robot`. `digits` is the number of decimal
-    digits of the interval arithmetic. The ends of the resulting intervals are rounded outward to doubles.
+    digits of the interval arithmetic; the ends of the intervals are then rounded outward to doubles.
     """
 
     frame: str
@@ -139,7 +140,7 @@ def enclose(
     """Return intervals that contain the true results of one frame for one sample (`Robot.enclose`).
 
     Raises:
-        InputError: a batch of inputs, a wrong length, or an invalid number of digits.
+        InputError: the inputs are a batch or have a wrong length, or the number of digits is invalid.
         UnknownNameError: the frame or reference does not exist.
     """
     if digits is not None:

@@ -4,8 +4,7 @@ An interval consists of a midpoint with many digits, and a radius. The library A
 that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
 triples of intervals.
 
-`read_exact` reads the decimals of a URDF text without rounding them to doubles. Names and order of the joints
-come from the tree. `urdfkin.urdf.lint` has already checked the text.
+`read_exact` reads the decimals of a URDF text, which `urdfkin.urdf.lint` has checked, without rounding them.
 """
 
 from __future__ import annotations
@@ -30,20 +29,20 @@ from urdfkin.system.locks import lock_over_forks
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.verify.bounds import DecimalErrors
 
-#: Number of digits in the accuracy study.
-#: A double has 16 digits, so fifty digits are enough to measure an error in its last digit.
+#: Number of digits in the accuracy study, enough to measure an error in the last of a double's 16 digits.
 DIGITS = 50
 #: Twice the 15 decimal digits of a double.
 _TWO_DOUBLES = 30
-#: A decimal digit needs `_BITS` bits, and an interval has `_MORE_BITS` additional bits.
-#: Arb stores a midpoint and a radius.
-#: With a midpoint of 53 bits, an interval can be four times as wide as the distance of two doubles.
-#: Therefore, 15 digits, the precision of a double, have 55 bits.
-_BITS, _MORE_BITS = math.log2(10.0), 5
-#: Number of significant digits of a written decimal: 17 digits determine every double.
-#: The module `decimal` computes with `_ALL_DIGITS` digits before a decimal is rounded.
-_SIGNIFICANT, _ALL_DIGITS = 17, 200
-#: Additional bits of precision in iterations.
+#: Number of bits for each decimal digit of an interval.
+_BITS = math.log2(10.0)
+#: Number of additional bits of an interval. 15 digits, the precision of a double, then have 55 bits.
+#: With 53 bits, an interval could be four times as wide as the distance of two doubles.
+_MORE_BITS = 5
+#: Number of significant digits of a written decimal; 17 digits determine every double.
+_SIGNIFICANT = 17
+#: Number of digits of an exact decimal before it is rounded.
+_ALL_DIGITS = 200
+#: Number of additional bits in iterations.
 _SPARE = 30
 
 _ONE_THREAD = lock_over_forks()
@@ -52,17 +51,16 @@ _ONE_THREAD = lock_over_forks()
 def enough_digits(joints: int) -> int:
     """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    The function adds one digit for each joint on the path to the frame. A joint with an oblique axis makes
-    intervals wider by a third of a digit.
+    Each joint on the path to the frame adds one digit. A joint with an oblique axis needs a third of a digit.
     """
     return _TWO_DOUBLES + joints
 
 
 @contextmanager
 def precision(digits: int) -> Iterator[None]:
-    """Set the number of decimal digits of intervals in a `with` block; 15 digits are those of a double.
+    """Set the number of decimal digits of intervals in a `with` block.
 
-    Arb has one precision for the whole process. Therefore, only one thread at a time can be in such a block.
+    Arb has one precision for the whole process, so only one thread at a time can be in such a block.
     """
     with _ONE_THREAD, ctx.workprec(math.ceil(digits * _BITS) + _MORE_BITS):
         yield
@@ -88,11 +86,11 @@ def _outward(end: arb, towards: float) -> float:
 
 
 def decimal(x: Number, negligible: float) -> str | None:
-    """Return an interval as a decimal of 17 significant digits; None if the interval is too wide.
+    """Return an interval's midpoint as a decimal of 17 significant digits; None if the interval is too wide.
 
-    The radius must be at most 1e-20 times the midpoint. The midpoint is rounded to 17 digits. Therefore, the
-    decimal differs from the true value by at most 0.501 units of its last digit. An interval that contains 0
-    becomes 0 if its radius is at most 1e-10 of `negligible`.
+    The radius must be at most 1e-20 times the midpoint, so the decimal differs from the true value by at most
+    0.501 units of its last digit. An interval that contains 0 becomes 0 if its radius is at most 1e-10 times
+    `negligible`.
 
     >>> with precision(50):
     ...     decimal(exact(1) / 3, 1e-15), decimal(exact(2), 1e-15), decimal(arb(0.0, 1e-40), 1e-15)
@@ -114,10 +112,7 @@ def decimal(x: Number, negligible: float) -> str | None:
 
 
 class NumberType(NamedTuple):
-    """Functions for one type of number, for example intervals (`BALLS`).
-
-    `number` converts a decimal in the URDF text, or the double to which a joint is locked.
-    """
+    """Functions for one type of number, such as intervals; `number` converts a decimal or a double."""
 
     number: Callable[[str | float], Number]
     sine_cosine: Callable[[Number], tuple[Number, Number]]
@@ -160,14 +155,12 @@ def from_quaternion(quaternion: Sequence[Number], kind: NumberType = BALLS) -> M
 
 
 def nearest_rotation(M: Matrix) -> Matrix:
-    """Return the rotation nearest to M, which must be nearly a rotation.
+    """Return the rotation U nearest to M, from the polar decomposition M = U H; M must be nearly a rotation.
 
-    In the polar decomposition M = U H, the orthogonal factor U is the rotation nearest to M.
-
-    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
-    (1 + E) has the same orthogonal factor U. X^T X - 1 = 2 E + E^2. The eigenvalues of E are above -1, so |E|
-    <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of each interval of the
-    result.
+    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The orthogonal
+    factor of the result X = U (1 + E) is also U. From X^T X - 1 = 2 E + E^2, and because the eigenvalues of E
+    are above -1, follow |E| <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of
+    each interval.
     """
     with ctx.workprec(ctx.prec + _SPARE):
         for _ in range(6):
@@ -194,8 +187,12 @@ _WITH_QUATERNIONS = (1, 1)
 class ExactJoint:
     """The numbers of one joint in the URDF text, not rounded to doubles.
 
-    R and p (m) are the pose of the joint frame in its parent link. A joint without a mimic rule has the
-    multiplier 1 and the offset 0.
+    Attributes:
+        R: Rotation from the joint frame to the frame of the parent link.
+        p: Origin of the joint frame in the parent link, m.
+        axis: Unit vector in the joint frame.
+        multiplier: Multiplier of the mimic rule; 1 without a rule.
+        offset: Offset of the mimic rule; 0 without a rule.
     """
 
     R: Matrix
@@ -208,28 +205,26 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
 ) -> dict[int, ExactJoint]:
-    """Read the exact numbers of the joints `among` (None: all), by the joints' index in the tree.
+    """Read the exact numbers of the joints with the indices `among` (None: all), by index in the tree.
 
-    A `root_joint` of the tree is not in the text. InputError is raised if another joint of the tree is not in
-    the text.
+    Raises:
+        InputError: the text does not contain a joint, except for the `root_joint` of `load`.
     """
-    words = _Text(text, kind)
-    return {
-        i: words.joint_of(tree.joints[i], tree.name)
-        for i in (range(len(tree.joints)) if among is None else among)
-    }
+    exact_text = _ExactText(text, kind)
+    indices = range(len(tree.joints)) if among is None else among
+    return {i: exact_text.joint_of(tree.joints[i], tree.name) for i in indices}
 
 
 def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-    """Return the errors that converting a URDF's decimals to doubles causes (`against_true_values`).
+    """Return the errors of converting a URDF's decimals to doubles, for `against_true_values`.
 
-    `path` contains the indices of the joints of a frame's path, from the root. q has the shape (n, nq).
+    `path` contains the indices of the joints of a frame's path, from the root; q has the shape (n, nq).
     """
-    return _Text(text).conversion(tree, path, q)
+    return _ExactText(text).conversion(tree, path, q)
 
 
 @lru_cache(maxsize=1)  # parsing a large URDF takes longer than computing the intervals of one sample
-class _Text:
+class _ExactText:
     def __init__(self, text: str, kind: NumberType = BALLS) -> None:
         self.kind = kind
         root = plain_xml(text)
@@ -247,7 +242,7 @@ class _Text:
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
     def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
-        """Return a joint that is locked at the exact value of a double."""
+        """Return the joint `free`, locked at a double."""
         R, p = free.R, free.p
         value = free.multiplier * self.kind.number(lock.q) + free.offset
         if lock.joint.kind.turns:
@@ -286,7 +281,7 @@ class _Text:
         return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.kind)
 
     def rule(self, name: str) -> tuple[Number, Number]:
-        """Return M and C of a joint with the value M q + C, where q is the value of the independent joint."""
+        """Return M and C of a mimic joint's value M q + C, with the value q of the independent joint."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -302,18 +297,18 @@ class _Text:
         at |= {joint.name: joint.lock.q for joint in tree.joints if joint.lock and not joint.lock.joint.mimic}
         angles, rules, lengths, step = np.zeros(len(q)), 0, [0.0], 0
         for i in path:
-            joint, own = tree.joints[i], tree.joints[i].unlocked
+            joint, unlocked = tree.joints[i], tree.joints[i].unlocked
             if (element := self.elements.get(joint.name)) is not None:
                 origin = element.find("origin")
                 if not self.has_quaternion(origin):
                     angles += math.fsum(abs(float(x)) for x in self.numbers(origin, "rpy", "0")) / 2.0
-                if own.mimic is not None:
+                if unlocked.mimic is not None:
                     value = self.value(joint.name, at)
                     rules += value.rules
-                    if own.kind.turns:
+                    if unlocked.kind.turns:
                         angles += value.error + 0.5 * (value.rules - 1) * (value.moved + value.offset)
                     elif joint.lock is None:
-                        lengths[step] += max(0.0, value.offset - abs(own.mimic.offset))
+                        lengths[step] += max(0.0, value.offset - abs(unlocked.mimic.offset))
                     else:
                         lengths[step] += max(0.0, value.moved + value.offset - abs(joint.lock.value))
             if joint.kind.nv:
@@ -322,7 +317,7 @@ class _Text:
         return DecimalErrors(angles, rules, np.array(lengths))
 
     def value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
-        """Return bounds on a joint's value and its rounding error, for values `at` of independent joints."""
+        """Return bounds on a joint's value and its rounding error; `at`: values of independent joints."""
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
             return _ValueBound(abs(at[name]), 0.0, 0.0, 0)
@@ -337,8 +332,9 @@ class _ValueBound(NamedTuple):
 
     Attributes:
         moved: |M q|.
-        offset: Sum of the absolute values of the terms of C. C has one term for each mimic rule.
+        offset: Sum of the absolute values of the terms of C, one for each mimic rule.
         error: Rounding error of the value, in eps, if a program applies the rules one after the other.
+        rules: Number of mimic rules.
     """
 
     moved: Any

@@ -1,8 +1,8 @@
 """The forward recursion of section 7.7, computed with intervals that contain the true values.
 
-The equations are those of `urdfkin.kinematics.equations`, in world axes as in the textbook. The inputs are
-the URDF's decimals and the exact values of q, v and a. The results are reference values that measure rounding
-errors. The reference values do not check the equations; the comparison with Pinocchio checks them.
+The inputs are the URDF's decimals and the exact values of q, v and a. The equations are those of
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The results measure rounding errors;
+Pinocchio's results check the equations.
 """
 
 from __future__ import annotations
@@ -29,9 +29,7 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: Axis and kind of motion for each joint velocity of a planar or floating joint.
-#: The first entry is the index of an axis of the child link.
-#: The second entry is True for a rotation about this axis and False for a translation along it.
+#: Axis of the child link, and True for a rotation, for each joint velocity of a planar or floating joint.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -39,10 +37,7 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Convert the motion of one base to the state of the root link in the recursion.
-
-    The nearest exact rotation replaces the rotation matrix, which is correct to nine digits.
-    """
+    """Convert the motion of one base to the state of the root link, with the nearest exact rotation."""
 
     def vector(x: FloatArray) -> Vector:
         return exact(x[0]), exact(x[1]), exact(x[2])
@@ -54,7 +49,7 @@ def on_base(base: BaseNumbers) -> State:
 
 @dataclass(frozen=True, slots=True)
 class ExactMotion:
-    """Position, velocity and acceleration, and Jacobian columns of each link in one sample, by link index."""
+    """Position, velocity, acceleration and Jacobian columns of each link in one sample, by link index."""
 
     states: Mapping[int, State]
     columns: Mapping[int, tuple[Column, ...]]
@@ -72,24 +67,25 @@ def move(
 ) -> ExactMotion:
     """Return the motion of the links of `joints` in one sample; without `base`, the root link is fixed.
 
-    `joints` is a result of `read_exact`. A joint comes after all joints on its path to the root.
+    `joints` is a result of `read_exact`, in which a joint comes after all joints on its path to the root.
     """
     q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
     columns: dict[int, tuple[Column, ...]] = {0: ()}
-    for i, own in joints.items():
+    for i, exact_joint in joints.items():
         joint, at, rate_at = tree.joints[i], tree.q_index[i], tree.v_index[i]
-        placed = _RECURSION.turned(_RECURSION.carried(states[joint.parent], own.p), own.R)
+        placed = _RECURSION.turned(_RECURSION.carried(states[joint.parent], exact_joint.p), exact_joint.R)
         kind, new = joint.kind, tuple[Column, ...]()
         if kind.has_axis:
-            coordinate = own.multiplier * q[at] + own.offset
-            rates = own.multiplier * v[rate_at], own.multiplier * a[rate_at]
-            z = _RECURSION.seen(placed, own.axis)
+            axis, multiplier = exact_joint.axis, exact_joint.multiplier
+            coordinate = multiplier * q[at] + exact_joint.offset
+            rates = multiplier * v[rate_at], multiplier * a[rate_at]
+            z = _RECURSION.seen(placed, axis)
             if kind.turns:
-                moved = _RECURSION.revolute(placed, own.axis, about(own.axis, coordinate), *rates)
+                moved = _RECURSION.revolute(placed, axis, about(axis, coordinate), *rates)
             else:
-                moved = _RECURSION.prismatic(placed, own.axis, coordinate, *rates)
-            new = (Column(z, kind.turns, moved, i, rate_at, own.multiplier),)
+                moved = _RECURSION.prismatic(placed, axis, coordinate, *rates)
+            new = (Column(z, kind.turns, moved, i, rate_at, multiplier),)
         elif kind is JointKind.FIXED:
             moved = placed
         elif kind is JointKind.PLANAR:
@@ -135,8 +131,7 @@ def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Refer
     """Return the spatial acceleration (6,) of a link, [linear; angular].
 
     The linear part at the frame's origin is the classical acceleration minus w x vel. In WORLD, the linear
-    part is the acceleration of the body's point at the world origin. Therefore, the function also subtracts
-    alpha x p.
+    part is that of the body point at the world origin, which is smaller by alpha x p.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
@@ -161,7 +156,7 @@ def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDAr
     """Return the Hessian (6, nv, nv) of a link."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        # The product of an interval and an array is not defined.
+        # The product of an interval and a NumPy array is not defined.
         out[of, by] += _array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 

@@ -1,4 +1,4 @@
-"""Odd URDFs, each with the verdict it deserves and the codes and lines it must be given; a module a topic."""
+"""Odd URDFs with the expected verdict, codes and lines. Each module has the cases of one module of rules."""
 
 from importlib import import_module
 

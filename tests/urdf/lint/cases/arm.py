@@ -1,4 +1,4 @@
-"""A small arm in which one thing can be changed, and what a changed one deserves."""
+"""A small arm of which each part can be changed, and cases of changed arms."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ ACCEPT, WARN, REJECT = "accept", "accept-with-warning", "reject"
 
 @dataclass(frozen=True)
 class Case:
-    """One document, its verdict, and the findings it must have among others: `CODE:LINE CODE:LINE`."""
+    """A document, its verdict, and the codes and lines of findings that must occur: `CODE:LINE CODE:LINE`."""
 
     name: str
     text: str | bytes
@@ -18,8 +18,8 @@ class Case:
 
     @property
     def findings(self) -> set[tuple[str, int]]:
-        """Code and line of each."""
-        return {(one.partition(":")[0], int(one.partition(":")[2])) for one in self.codes.split()}
+        pairs = (one.split(":") for one in self.codes.split())
+        return {(code, int(line)) for code, line in pairs}
 
     @property
     def data(self) -> bytes:
@@ -41,7 +41,7 @@ def arm(
     follow: str = "",
     more: str = "",
 ) -> str:
-    """Line 3 to 5: links; 6: joint j1 with everything that can be changed; 7: joint j2; 8: more."""
+    """Write an arm: the links on lines 3 to 5, joint j1 on line 6, joint j2 on line 7, `more` on line 8."""
     return f"""{head}
 <robot {robot}>
   {base}

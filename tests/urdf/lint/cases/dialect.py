@@ -15,12 +15,12 @@ _CP1252 = '<?xml version="1.0" encoding="cp1252"?>\n'
 
 
 def _called(name: str) -> str:
-    """The arm with one more link of this name."""
+    """Write the arm with an additional link."""
     return arm(more=f'<link name="{name}"/>' + fixed("k", "tool", name))
 
 
 def _before(comment: str, text: str = arm(axis=_LONG)) -> str:
-    """The comment on a line of its own before the joint with the long axis; everything else as before."""
+    """Write the arm with a comment on its own line before joint j1, whose axis is too long."""
     return text.replace('  <joint name="j1"', f'  {comment}\n  <joint name="j1"')
 
 
@@ -92,7 +92,7 @@ CASES = [
     Case("name-shell", _called("$(rm x)"), WARN),
     Case("name-html", _called("&lt;b&gt;"), WARN),
     Case("name-very-long", _called("n" * 5000), WARN),
-    # Comments for urdfkin: what they silence, and where.
+    # Comments that silence findings.
     Case("silenced-before-the-joint", _before(_SAID.format("URDF503")), ACCEPT),
     Case("silenced-by-its-name", _before(_SAID.format("axis-not-unit")), ACCEPT),
     Case("silenced-with-others", _before(_SAID.format("URDF601, URDF503")), ACCEPT, "URDF121:6"),

@@ -21,7 +21,7 @@ _MIMIC = '<mimic joint="j1"/>'
 
 
 def apart(*joints: str) -> str:
-    """Three more links, with joints between some of them."""
+    """Write the arm with three additional links, and with joints."""
     return arm(more="".join([*(f'<link name="c{i}"/>' for i in range(3)), *joints]))
 
 
@@ -80,7 +80,7 @@ CASES = [
     Case("mimic-beyond-by-a-digit", follows('joint="j1" multiplier="1.0005"'), ACCEPT),
     Case("mimic-prismatic-of-revolute", arm(second='type="prismatic"', follow=_MIMIC), ACCEPT),
     Case("mimic-huge", follows('joint="j1" multiplier="1e300"'), WARN, "URDF526:7"),
-    # Legal and odd.
+    # Suspicious values.
     Case("rpy-exact", rpy("1.5707963267948966 0 0"), ACCEPT),
     Case("rpy-3.1416", rpy("0 3.1416 0"), ACCEPT, "URDF601:6"),
     Case("rpy-cut-off", rpy("0 0 1.5707"), ACCEPT, "URDF601:6"),

@@ -1,8 +1,8 @@
-"""What an MJCF file says beside its joints: each thing alone, and every word that must be said of it."""
+"""MJCF files with one part that a tree cannot represent, and the expected findings."""
 
 
 class Mjcf:
-    """A robot of MJCF, and the findings it must have and no others: code and message."""
+    """An MJCF text and the code and message of all its findings."""
 
     def __init__(self, name: str, text: str, *findings: str) -> None:
         self.name, self.text = name, text
@@ -20,7 +20,7 @@ def _two(
     world: str = "",
     more: str = "",
 ) -> str:
-    """Two bodies on the world, each with one joint, and one thing that can be put in."""
+    """Write two bodies in the world, each with one joint, and an additional part."""
     mass = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
     return f"""<mujoco>
   <worldbody>

@@ -92,7 +92,7 @@ CASES = [
     Case("axis-nan", axis("0 0 nan"), REJECT, "URDF301:6"),
     Case("quaternion-three", origin('quat_xyzw="0 0 1"', "1.1"), REJECT, "URDF302:6"),
     Case("mimic-nan", follows('joint="j1" multiplier="nan"'), REJECT, "URDF301:7"),
-    # What joints are made of.
+    # Links and joints.
     Case("version-1.2-needs-no-effort", arm(robot=_NEW, limit='<limit lower="-1" upper="1"/>'), WARN),
     Case("no-child", arm(ends='<parent link="base"/>'), REJECT, "URDF210:6"),
     Case("child-without-link", arm(ends='<parent link="base"/><child/>'), REJECT, "URDF211:6"),

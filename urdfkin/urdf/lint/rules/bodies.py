@@ -1,7 +1,4 @@
-"""Check inertials, shapes, materials and meshes.
-
-No finding of these checks is an error, because kinematics does not use this content.
-"""
+"""Check inertials, shapes, materials and meshes, which kinematics does not use."""
 
 from __future__ import annotations
 
@@ -18,17 +15,17 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: A larger mass (kg) or distance of the centre of mass from the origin (m) is reported.
+#: Largest mass (kg) and coordinate (m) of a centre of mass that are not reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: A smaller mass (kg) is probably a placeholder: its moments of inertia are not checked.
+#: Mass (kg) below which moments of inertia are not checked, because the mass is probably a placeholder.
 NEGLIGIBLE = 1e-3
 
-#: Moments of inertia per kg (m^2) below this number count as rounding errors.
+#: Largest moment of inertia per kg (m^2) that is treated as a rounding error.
 #: Only bodies smaller than about 0.03 mm have such small moments.
 ROUNDING = 1e-9
 
-#: Moments of inertia have relative rounding errors of this size, because exporters write few digits.
+#: Relative rounding error of moments of inertia, for which exporters write few digits.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -50,13 +47,9 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     if tensor is not None:
         missing += [name for name in _MOMENTS if name not in tensor.attributes]
     if missing:
-        report.add(
-            INERTIAL_INCOMPLETE,
-            "<inertial> is incomplete",
-            inertial,
-            found=f"no {', '.join(missing)}",
-            remedy="write <mass> and all six moments of <inertia>, or remove <inertial>",
-        )
+        message = "<inertial> is incomplete"
+        remedy = "write <mass> and all six moments of <inertia>, or remove <inertial>"
+        report.add(INERTIAL_INCOMPLETE, message, inertial, found=f"no {', '.join(missing)}", remedy=remedy)
     lever = None
     if origin is not None:
         lever = numbers.vector(origin, "xyz")
@@ -64,9 +57,10 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
     mass = None if mass_element is None else numbers.scalar(mass_element, "value")
     _check_mass(report, inertial, mass, lever)
     if tensor is not None:
-        moments = [numbers.scalar(tensor, name) for name in _MOMENTS]
-        if all(moment is not None for moment in moments):
-            _check_moments(report, tensor, [moment for moment in moments if moment is not None], mass)
+        read = (numbers.scalar(tensor, name) for name in _MOMENTS)
+        moments = [moment for moment in read if moment is not None]
+        if len(moments) == len(_MOMENTS):
+            _check_moments(report, tensor, moments, mass)
 
 
 def _check_mass(
@@ -83,26 +77,19 @@ def _check_mass(
             weight=1.0,
         )
     heavy = mass is not None and abs(mass) > HEAVIEST
-    if heavy or (lever is not None and max(abs(x) for x in lever) > FARTHEST):
-        what = f"mass {mass:g} kg" if heavy else f"centre of mass {max(abs(x) for x in lever or ()):g} m away"
-        report.add(
-            INERTIAL_SCALE,
-            "the mass or the centre of mass is far too large",
-            inertial,
-            found=what,
-            remedy="write the mass in kilograms and the centre of mass in metres",
-        )
+    distance = max(map(abs, lever or (0.0,)))
+    if heavy or distance > FARTHEST:
+        message = "the mass or the centre of mass is far too large"
+        remedy = "write the mass in kilograms and the centre of mass in metres"
+        found = f"mass {mass:g} kg" if heavy else f"centre of mass {distance:g} m away"
+        report.add(INERTIAL_SCALE, message, inertial, found=found, remedy=remedy)
 
 
 def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass: float | None) -> None:
     kilograms = 1.0 if mass is None else abs(mass)
     if mass == 0.0 and any(moments):
-        report.add(
-            INERTIAL_IMPOSSIBLE,
-            "the body has moments of inertia, but no mass",
-            tensor,
-            remedy="write the mass in kilograms, or remove the moments",
-        )
+        remedy = "write the mass in kilograms, or remove the moments"
+        report.add(INERTIAL_IMPOSSIBLE, "the body has moments of inertia, but no mass", tensor, remedy=remedy)
         return
     if 0.0 < kilograms < NEGLIGIBLE:
         return
@@ -115,13 +102,8 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
         found = f"{small:.3g}, {middle:.3g} and {large:.3g}"
     else:
         return
-    report.add(
-        INERTIAL_IMPOSSIBLE,
-        f"no body has this inertia: {what}",
-        tensor,
-        found=found,
-        remedy="check the units and signs of the moments; kinematics does not use them",
-    )
+    remedy = "check the units and signs of the moments; kinematics does not use them"
+    report.add(INERTIAL_IMPOSSIBLE, f"no body has this inertia: {what}", tensor, found=found, remedy=remedy)
 
 
 def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
@@ -153,7 +135,7 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
 UNREADABLE = Rule("URDF704", "unreadable-extra", WARNING)
 GEOMETRY = Rule("URDF705", "geometry-incomplete", WARNING)
 
-#: A numeric attribute of a shape has a name and a count of numbers, and may be required.
+#: Numeric attributes of each shape: the name, the count of numbers, and whether the attribute is required.
 _SHAPES: dict[str, tuple[tuple[str, int, bool], ...]] = {
     "box": (("size", 3, True),),
     "sphere": (("radius", 1, True),),
@@ -168,15 +150,20 @@ def check_shapes(report: Reporter, robot: RobotRecord) -> None:
     for link in robot.links.values():
         for shape in link.children:
             if shape.tag in ("visual", "collision"):
-                _check_geometry(report, shape, numbers)
-                _check_capsule(report, shape, robot.version)
+                _check_geometry(report, shape, numbers, robot.version)
 
 
-def _check_geometry(report: Reporter, owner: Element, numbers: NumberReader) -> None:
+def _check_geometry(
+    report: Reporter, owner: Element, numbers: NumberReader, version: tuple[int, int]
+) -> None:
     origin, geometry = owner.first("origin"), owner.first("geometry")
     if origin is not None:
         numbers.vector(origin, "xyz")
         numbers.vector(origin, "rpy")
+    capsule = None if geometry is None else geometry.first("capsule")
+    if capsule is not None and version < (1, 1):  # URDF readers skip the capsule
+        message = 'a capsule needs version="1.1" and is ignored'
+        report.add(GEOMETRY, message, capsule, remedy="use a cylinder and two spheres")
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None or shape.tag not in _SHAPES:
         lacks = "no <geometry>" if geometry is None else "an empty <geometry>"
@@ -202,26 +189,9 @@ def _check_geometry(report: Reporter, owner: Element, numbers: NumberReader) -> 
         check_address(report, shape)
 
 
-def _check_capsule(report: Reporter, owner: Element, version: tuple[int, int]) -> None:
-    """Report a capsule in a file of version 1.0, where readers skip it."""
-    geometry = owner.first("geometry")
-    capsule = None if geometry is None else geometry.first("capsule")
-    if capsule is not None and version < (1, 1):
-        report.add(
-            GEOMETRY,
-            'a capsule needs version="1.1" and is ignored',
-            capsule,
-            remedy="use a cylinder and two spheres",
-        )
-
-
 def _missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
-    report.add(
-        GEOMETRY,
-        f"the {shape.tag} of a {owner.tag} has no {attribute}",
-        shape,
-        remedy=f'write <{shape.tag} {attribute}="..."/>',
-    )
+    message = f"the {shape.tag} of a {owner.tag} has no {attribute}"
+    report.add(GEOMETRY, message, shape, remedy=f'write <{shape.tag} {attribute}="..."/>')
 
 
 MATERIAL_UNKNOWN = Rule("URDF708", "material-unknown", WARNING)
@@ -240,14 +210,9 @@ def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
     for material in robot.element.all("material"):
         name = material.attributes.get("name", "")
         if name in defined:
-            report.add(
-                MATERIAL_TWICE,
-                "another material of the robot has this name; urdfdom refuses the file",
-                material,
-                attribute="name",
-                found=quoted(name),
-                remedy=f"the first is on line {defined[name].line}; remove one of these materials",
-            )
+            message = "another material of the robot has this name; urdfdom refuses the file"
+            remedy = f"the first is on line {defined[name].line}; remove one of these materials"
+            report.add(MATERIAL_TWICE, message, material, attribute="name", found=quoted(name), remedy=remedy)
         defined.setdefault(name, material)
     inside = {
         material.attributes.get("name", "")
@@ -266,14 +231,10 @@ def _check_material(report: Reporter, visual: Element, defined: set[str]) -> Non
     name = material.attributes.get("name")
     anonymous = name is None or (not name and (material.first("color") or material.first("texture")))
     if name is None or (name not in defined and not anonymous):
-        report.add(
-            MATERIAL_UNKNOWN,
-            "the material has no name" if name is None else "the material is not defined",
-            material,
-            attribute="name",
-            found=None if name is None else quoted(name),
-            remedy='write <material name="..."> with a <color>',
-        )
+        message = "the material has no name" if name is None else "the material is not defined"
+        remedy = 'write <material name="..."> with a <color>'
+        found = None if name is None else quoted(name)
+        report.add(MATERIAL_UNKNOWN, message, material, attribute="name", found=found, remedy=remedy)
 
 
 MESH_MISSING = Rule("URDF706", "mesh-missing", WARNING)
@@ -281,9 +242,9 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report each missing mesh file. If a package is not found, report it only once.
+    """Report each missing mesh file, and each missing package once.
 
-    `beside` is the file of the URDF, or None for text, in which only `package://` meshes are searched.
+    `beside` is the file of the URDF. For a text, `beside` is None, and only `package://` meshes are searched.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
@@ -317,14 +278,9 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
 def check_address(report: Reporter, mesh: Element) -> None:
     filename = mesh.attributes["filename"]
     if filename.lower().startswith(("http:", "https:", "ftp:")):
-        report.add(
-            MESH_REMOTE,
-            "the mesh is on the network; it was not downloaded",
-            mesh,
-            attribute="filename",
-            found=quoted(filename),
-            remedy="copy the mesh into a package",
-        )
+        message = "the mesh is on the network and was not downloaded"
+        remedy = "copy the mesh into a package"
+        report.add(MESH_REMOTE, message, mesh, attribute="filename", found=quoted(filename), remedy=remedy)
 
 
 def _meshes(root: Element) -> Iterator[Element]:
@@ -351,14 +307,9 @@ def _exists(path: Path) -> bool:
 
 
 def _report_file(report: Reporter, mesh: Element, filename: str) -> None:
-    report.add(
-        MESH_MISSING,
-        "the mesh is not found",
-        mesh,
-        attribute="filename",
-        found=quoted(filename),
-        remedy="kinematics needs no mesh",
-    )
+    message = "the mesh is not found"
+    remedy = "kinematics needs no mesh"
+    report.add(MESH_MISSING, message, mesh, attribute="filename", found=quoted(filename), remedy=remedy)
 
 
 def _count(number: int) -> str:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TypeVar
 
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.urdf import parser
@@ -34,9 +32,7 @@ XACRO = Rule("URDF202", "unexpanded-xacro", ERROR)
 NO_LINKS = Rule("URDF205", "no-links", ERROR)
 NAMESPACE = Rule("URDF213", "default-namespace", WARNING)
 
-_T = TypeVar("_T")
-
-#: An SRDF, which accompanies a URDF, has these elements.
+#: Elements of SRDF, a format of files that supplement a URDF.
 _SRDF = {"group", "group_state", "end_effector", "virtual_joint", "disable_collisions", "passive_joint"}
 
 _XACRO_NAMESPACE = re.compile(r"https?://(www\.)?(ros|wiki\.ros)\.org/(wiki/)?xacro")
@@ -46,112 +42,83 @@ _XINCLUDE = "http://www.w3.org/2001/XInclude"
 
 def check_dialect(report: Reporter, root: Element) -> None:
     """Report a robot without a name or links, unexpanded xacro, includes and a default namespace."""
-    prefixes = _prefixes(root)
-    _check_namespaces(report, root, prefixes)
-    _check_name(report, root)
+    _check_namespaces(report, root)
+    name = root.attributes.get("name")
+    if name is None:
+        report.add(parser.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
+    elif not name.strip():
+        report.add(ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name")
     if not root.all("link"):
         srdf = any(child.tag in _SRDF for child in root.children)
-        remedy = (
-            "this is an SRDF; pass the URDF of the same robot" if srdf else "a robot has at least one <link>"
-        )
+        remedy = "this is an SRDF; pass the URDF of the robot" if srdf else "a robot has at least one <link>"
         report.add(NO_LINKS, "the robot has no link", root, remedy=remedy)
 
 
-def _prefixes(root: Element) -> dict[str, str]:
-    """Return the namespaces that the document declares, by prefix."""
-    return {
+def _check_namespaces(report: Reporter, root: Element) -> None:
+    if "xmlns" in root.attributes:
+        message = "xmlns puts the elements into a namespace, where most readers do not find them"
+        found = quoted(root.attributes["xmlns"])
+        report.add(NAMESPACE, message, root, attribute="xmlns", found=found, remedy="remove xmlns")
+    namespaces = {
         key.removeprefix("xmlns:"): value
         for element in root.walk()
         for key, value in element.attributes.items()
         if key.startswith("xmlns:")
     }
-
-
-def _check_namespaces(report: Reporter, root: Element, prefixes: dict[str, str]) -> None:
-    if "xmlns" in root.attributes:
-        report.add(
-            NAMESPACE,
-            "xmlns puts the elements into a namespace, where most readers do not find them",
-            root,
-            attribute="xmlns",
-            found=quoted(root.attributes["xmlns"]),
-            remedy="remove xmlns",
-        )
-    xacro = {prefix for prefix, uri in prefixes.items() if _XACRO_NAMESPACE.match(uri)} | {"xacro"}
-    macros = []
+    xacro = {prefix for prefix, uri in namespaces.items() if _XACRO_NAMESPACE.match(uri)} | {"xacro"}
+    macros: list[_Place] = []
     for element in root.walk():
         prefix, _, local = element.tag.rpartition(":")
         if prefix in xacro:
-            macros.append(element)
-        elif (local == "include" and prefixes.get(prefix) == _XINCLUDE) or element.tag == "xi:include":
-            report.add(
-                INCLUDE,
-                "the file includes another file",
-                element,
-                found=quoted(element.attributes.get("href", f"<{element.tag}>")),
-                remedy="insert the content of the other file here; urdfkin did not open it",
-            )
-    if not _check_macros(report, root, macros):
-        _check_expressions(report, root)
-
-
-_EXPAND = (
-    f"expand the file first: xacro FILE > robot.urdf, or {install_remedy('xacro')} and pass the .xacro file"
-)
-_HARMLESS = "; kinematics does not use it"
-
-
-def _check_macros(report: Reporter, root: Element, macros: list[Element]) -> bool:
-    """Report unexpanded xacro macros; return whether a macro may contain links or joints."""
-    missed, harmless = _partition(macros, lambda m: m.parent in (None, root) or m.holder.tag == "joint")
-    for group, severity in ((missed, None), (harmless, Severity.WARNING)):
-        if group:
-            report.add(
-                XACRO,
-                f"unexpanded xacro{_HARMLESS if severity else ''}",
-                group[0],
-                found=f"<{shortened(group[0].tag)}>{_more(group)}",
-                remedy=_EXPAND,
-                severity=severity,
-            )
-    return bool(missed)
-
-
-def _check_expressions(report: Reporter, root: Element) -> None:
-    """Report xacro expressions in attributes; the finding is an error if kinematics uses the attribute."""
-    written = [
+            macros.append((element, None))
+        elif (local == "include" and namespaces.get(prefix) == _XINCLUDE) or element.tag == "xi:include":
+            remedy = "insert the content of the other file here; urdfkin did not open it"
+            found = quoted(element.attributes.get("href", f"<{element.tag}>"))
+            report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
+    # A macro may contain links and joints if it is a child of <robot>.
+    if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
+        return
+    expressions: list[_Place] = [
         (element, key)
         for element in outside_extensions(root)
         for key, value in element.attributes.items()
         if "$" in value and is_expression(value) and not key.startswith("xmlns")
     ]
-    used, harmless = _partition(written, lambda place: _moves(place[0]))
-    for group, severity in ((used, None), (harmless, Severity.WARNING)):
-        if group:
-            element, key = group[0]
-            report.add(
-                XACRO,
-                f"unexpanded xacro expression{_HARMLESS if severity else ''}",
-                element,
-                attribute=key,
-                found=f"{shortened(key)}={quoted(element.attributes[key])}{_more(group)}",
-                remedy=_EXPAND,
-                severity=severity,
-            )
+    _report_xacro(report, "xacro expression", expressions, _is_used)
 
 
-def _moves(element: Element) -> bool:
+_EXPAND = (
+    f"expand the file first: xacro FILE > robot.urdf, or {install_remedy('xacro')} and pass the .xacro file"
+)
+
+#: An element, and the name of one of its attributes or None.
+_Place = tuple[Element, str | None]
+
+
+def _report_xacro(
+    report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
+) -> bool:
+    """Report unexpanded xacro; return whether kinematics uses one of the elements (an error)."""
+    used = [place for place in places if is_used(place[0])]
+    unused = [place for place in places if not is_used(place[0])]
+    for group, severity, message in (
+        (used, None, f"unexpanded {what}"),
+        (unused, Severity.WARNING, f"unexpanded {what}, which kinematics does not use"),
+    ):
+        if not group:
+            continue
+        element, key = group[0]
+        found = f"<{shortened(element.tag)}>"
+        if key is not None:
+            found = f"{shortened(key)}={quoted(element.attributes[key])}"
+        found += _more(group)
+        report.add(XACRO, message, element, attribute=key, found=found, remedy=_EXPAND, severity=severity)
+    return bool(used)
+
+
+def _is_used(element: Element) -> bool:
     """Return whether kinematics uses an element: a link, a joint, or an element inside a joint."""
-    holder = element.holder
-    return holder.tag == "joint" or (holder is element and element.tag == "link")
-
-
-def _partition(items: Iterable[_T], predicate: Callable[[_T], bool]) -> tuple[list[_T], list[_T]]:
-    """Return the items for which the predicate is true, and the others."""
-    parts: tuple[list[_T], list[_T]] = ([], [])
-    for one in items:
-        parts[not predicate(one)].append(one)
-    return parts
+    return element.holder.tag == "joint" or (element.holder is element and element.tag == "link")
 
 
 def _more(group: Sequence[object]) -> str:
@@ -168,32 +135,24 @@ def is_expression(value: str) -> bool:
     return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
 
 
-def _check_name(report: Reporter, root: Element) -> None:
-    name = root.attributes.get("name")
-    if name is None:
-        report.add(parser.MISSING_NAME, "the robot has no name", root, remedy='write <robot name="...">')
-    elif not name.strip():
-        report.add(ODD_NAME, "the robot's name is empty", root, attribute="name", remedy="give it a name")
-
-
 MISPLACED = Rule("URDF206", "misplaced-element", ERROR)
 UNKNOWN_ELEMENT = Rule("URDF207", "unknown-element", WARNING)
 UNKNOWN_ATTRIBUTE = Rule("URDF208", "unknown-attribute", WARNING)
 DUPLICATE_ELEMENT = Rule("URDF209", "duplicate-element", WARNING)
 STRAY_TEXT = Rule("URDF212", "stray-text", WARNING)
 
-#: Extension elements may have any content, even `<joint>` and `<link>`.
+#: Extension elements, which may have any content, even `<joint>` and `<link>`.
 OPAQUE = frozenset({"gazebo", "transmission", "ros2_control", "sensor", "plugin", "mujoco", "sdf", "verbose"})
 
-#: Simulators and vendors add these elements and attributes in widely used robots.
-_ADDED = (
+#: Elements and attributes of simulators and vendors that are common in URDF files.
+_COMMON = (
     "contact collision_checking self_filter surface gravity kinematic drake group dont_collapse D K"
     " mu_coulomb mu_viscous current command_effort gear_velocity"
 )
-EXTENSIONS = frozenset(_ADDED.split())
+EXTENSIONS = frozenset(_COMMON.split())
 
-#: Each line has the form `element: attributes > child elements`.
-#: Attributes of an element without a colon, and elements that are not in this table, are not checked.
+#: Lines of the form `element: attributes > child elements`.
+#: The attributes of an element without a colon are not checked, nor are elements that have no line.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -220,22 +179,22 @@ ATTRIBUTES = {
     if colon
 }
 
-#: URDF readers skip these elements and attributes for poses in other formats.
+#: Names of poses in other formats, as an element or an attribute. URDF readers skip them.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: `--fix` does not remove these attributes of other elements or formats.
+#: Attributes of other elements or formats, which `--fix` does not remove.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
-#: These child elements may occur only once in an element.
+#: Child elements that may occur only once in an element, by the tag of the element.
 _ONCE = {
     **{tag: CHILDREN[tag] for tag in ("joint", "inertial", "visual", "collision", "geometry")},
     "link": frozenset({"inertial"}),
 }
 
-#: Readers ignore text between the tags of these elements.
-_VALUES = {"origin", "axis", "limit", "mimic", "parent", "child"}
+#: Elements in which text between the tags is reported.
+_VALUES = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
 
-#: Text between the tags of these elements is a value that belongs in an attribute.
+#: Elements in which text between the tags is a value that belongs in an attribute.
 _VECTORS = ("origin", "axis")
 
 
@@ -259,49 +218,32 @@ def check_vocabulary(report: Reporter, root: Element) -> None:
 def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) -> None:
     parts = [part for part in outside_extensions(element) if _is_part(part)]
     for part in parts:
-        inside = part.parent.tag if part.parent else ""
         meant = nearest_tag(part.tag, _PARTS)
-        what = f"a {meant} inside <{inside}>" if part.tag == meant else f"<{part.tag}>"
-        report.add(
-            MISPLACED,
-            f"{what} is skipped, so it is missing from the robot",
-            part,
-            remedy=f"write <{meant}> as a child of <robot>",
-            owner=part.tag,
-        )
+        what = f"<{part.tag}>"
+        if part.tag == meant:
+            what = f"a {meant} inside <{part.parent.tag if part.parent else ''}>"
+        message = f"{what} is skipped, so the element is missing from the robot"
+        remedy = f"write <{meant}> as a child of <robot>"
+        report.add(MISPLACED, message, part, remedy=remedy, misplaced=True)
     if parts:
         return
     close = None if report.is_full(UNKNOWN_ELEMENT) else nearest_tag(element.tag, known)
     parent = element.parent
     if parent is not None and parent.tag in _VECTORS and element.text and not parent.attributes:
-        report.add(
-            STRAY_TEXT,
-            f"the value inside <{element.tag}> is skipped",
-            element,
-            found=quoted(element.text),
-            remedy=f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}",
-            severity=Severity.ERROR,
-        )
+        message, found = f"the value inside <{element.tag}> is skipped", quoted(element.text)
+        remedy = f"write the value as an attribute, as in {_EXAMPLES[parent.tag]}"
+        report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=Severity.ERROR)
         return
-    foreign = element.tag in _FOREIGN
-    remedy = (
-        f"write {_EXAMPLES['origin']}"
-        if foreign
-        else f"did you mean <{close}>?"
-        if close
-        else "remove the element"
-    )
-    report.add(
-        UNKNOWN_ELEMENT,
-        f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; it is skipped",
-        element,
-        remedy=remedy,
-        severity=Severity.NOTE if element.tag in EXTENSIONS else None,
-    )
+    message = f"URDF has no <{element.tag}> in <{parent.tag if parent else ''}>; the element is skipped"
+    remedy = f"did you mean <{close}>?" if close else "remove the element"
+    if element.tag in _FOREIGN:
+        remedy = f"write {_EXAMPLES['origin']}"
+    severity = Severity.NOTE if element.tag in EXTENSIONS else None
+    report.add(UNKNOWN_ELEMENT, message, element, remedy=remedy, severity=severity)
 
 
 def outside_extensions(element: Element) -> Iterator[Element]:
-    """Yield an element and all elements below this element, except elements in extensions."""
+    """Yield an element and all its descendants, except extension elements and their descendants."""
     stack = [element]
     while stack:
         element = stack.pop()
@@ -321,7 +263,7 @@ def _is_part(element: Element) -> bool:
 
 _PARTS = frozenset({"link", "joint"})
 
-#: Tags of this length or longer are not similar to `link` or `joint`: difflib's ratio is too small.
+#: Length of a tag from which on the tag is not similar to `link` or `joint`.
 _LONGEST_PART = 8
 
 
@@ -335,7 +277,7 @@ def _check_attributes(report: Reporter, element: Element) -> None:
         close = None if report.is_full(UNKNOWN_ATTRIBUTE) else nearest_tag(attribute, known)
         report.add(
             UNKNOWN_ATTRIBUTE,
-            f"<{element.tag}> has no attribute of this name; it is skipped",
+            f"<{element.tag}> has no attribute of this name; the attribute is skipped",
             element,
             attribute=attribute,
             found=f"{attribute}={quoted(element.attributes[attribute])}",
@@ -346,20 +288,16 @@ def _check_attributes(report: Reporter, element: Element) -> None:
 
 
 def _check_text(report: Reporter, element: Element) -> None:
-    if not element.text or element.tag not in _VALUES | {"robot", "joint", "link"}:
+    if not element.text or element.tag not in _VALUES:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
         return  # another finding already quotes this text
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
-    report.add(
-        STRAY_TEXT,
-        f"text inside <{element.tag}> is skipped",
-        element,
-        found=quoted(element.text),
-        remedy=f"write the value as an attribute, as in {example}" if example else "remove the text",
-        severity=Severity.ERROR if lost else None,
-    )
+    message, found = f"text inside <{element.tag}> is skipped", quoted(element.text)
+    remedy = f"write the value as an attribute, as in {example}" if example else "remove the text"
+    severity = Severity.ERROR if lost else None
+    report.add(STRAY_TEXT, message, element, found=found, remedy=remedy, severity=severity)
 
 
 _EXAMPLES = {
@@ -379,47 +317,30 @@ def _check_repeats(report: Reporter, element: Element) -> None:
     seen: dict[str, Element] = {}
     for child in element.children:
         if child.tag in seen and child.tag in once:
-            report.add(
-                DUPLICATE_ELEMENT,
-                f"a second <{child.tag}> is skipped; the first, on line {seen[child.tag].line}, is used",
-                child,
-                remedy="remove one of these elements",
-            )
+            message = f"a second <{child.tag}> is skipped; the first, on line {seen[child.tag].line}, is used"
+            report.add(DUPLICATE_ELEMENT, message, child, remedy="remove one of these elements")
         seen.setdefault(child.tag, child)
 
 
 UNDECLARED_PREFIX = Rule("URDF214", "undeclared-prefix", WARNING)
 
-#: Prefixes that XML declares itself.
-_PREDECLARED = ("xml", "xmlns")
-
-#: Other rules (URDF202 and URDF112) report names that begin with these words.
+#: Beginnings of tags that other rules (URDF202 and URDF112) report.
 _REPORTED = ("xacro:", "xi:include")
 
 
-@dataclass(slots=True)
-class _Use:
-    element: Element
-    attribute: str | None
-    times: int = 0
-
-
 def check_prefixes(report: Reporter, root: Element) -> None:
-    for prefix, use in _undeclared_prefixes(root).items():
-        more = f" and {use.times - 1} more" if use.times > 1 else ""
-        report.add(
-            UNDECLARED_PREFIX,
-            f"the prefix {quoted(prefix)} is not declared; most XML readers refuse the file",
-            use.element,
-            attribute=use.attribute,
-            found=quoted(use.attribute or f"<{use.element.tag}>") + more,
-            remedy=f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove the names with this prefix',
-        )
+    for prefix, places in _undeclared_prefixes(root).items():
+        element, attribute = places[0]
+        message = f"the prefix {quoted(prefix)} is not declared; most XML readers refuse the file"
+        remedy = f'write xmlns:{shortened(prefix)}="..." in <robot>, or remove the names with this prefix'
+        found = quoted(attribute or f"<{element.tag}>") + _more(places)
+        report.add(UNDECLARED_PREFIX, message, element, attribute=attribute, found=found, remedy=remedy)
 
 
-def _undeclared_prefixes(root: Element) -> dict[str, _Use]:
-    found: dict[str, _Use] = {}
-    declared = Counter(_PREDECLARED)
+def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
+    """Return the elements and attributes with each undeclared prefix, in file order."""
+    found: dict[str, list[_Place]] = {}
+    declared = Counter(("xml", "xmlns"))  # XML itself declares these prefixes
     stack = [(root, False)]
     while stack:
         element, leaving = stack.pop()
@@ -433,7 +354,7 @@ def _undeclared_prefixes(root: Element) -> dict[str, _Use]:
         stack += [(child, False) for child in reversed(element.children)]
         for prefix, attribute in _prefixes_of(element):
             if declared[prefix] < 1:
-                found.setdefault(prefix, _Use(element, attribute)).times += 1
+                found.setdefault(prefix, []).append((element, attribute))
     return found
 
 
@@ -452,14 +373,14 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: A name with more characters is reported, because it breaks tables and file paths.
+#: Maximum number of characters in a name that is not reported. Longer names break tables and file paths.
 LONGEST = 200
 
 
 def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
     """Report names that are reserved, easily confused, or troublesome for other programs.
 
-    The kind `root_joint` is None if the robot gets no additional joint `root_joint` below a link `universe`.
+    If `root_joint` is not None, the robot gets an additional joint `root_joint` below a link `universe`.
     """
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
@@ -472,52 +393,31 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
 
 
 def _check_odd(report: Reporter, name: str, element: Element) -> None:
-    reason = None
-    if not name.isprintable():
-        reason = "the name contains characters that cannot be printed"
-    elif name != name.strip():
-        reason = "the name begins or ends with a space"
-    elif "/" in name or "\\" in name:
-        reason = "the name contains a slash, like a path"
-    elif name[0] in "=+-@":
-        reason = "the name begins like a spreadsheet formula"
-    elif len(name) > LONGEST:
-        reason = f"the name has {len(name)} characters"
-    elif any(c in "\"'<>&|;`$" for c in name):
-        reason = "the name contains a special character of shells or XML"
-    if reason:
-        report.add(
-            ODD_NAME,
-            reason,
-            element,
-            attribute="name",
-            found=quoted(name),
-            remedy="use letters, digits, - and _",
-        )
+    reasons = {
+        "the name contains characters that cannot be printed": not name.isprintable(),
+        "the name begins or ends with a space": name != name.strip(),
+        "the name contains a slash, like a path": "/" in name or "\\" in name,
+        "the name begins like a spreadsheet formula": name[0] in "=+-@",
+        f"the name has {len(name)} characters": len(name) > LONGEST,
+        "the name contains a special character of shells or XML": bool(set(name) & set("\"'<>&|;`$")),
+    }
+    if reason := next((text for text, is_true in reasons.items() if is_true), None):
+        remedy = "use letters, digits, - and _"
+        report.add(ODD_NAME, reason, element, attribute="name", found=quoted(name), remedy=remedy)
 
 
 def _check_blanks(report: Reporter, element: Element) -> None:
     raw = report.raw(element, "name") if report.has_raw_blanks else None
     if raw is not None and any(c in raw for c in "\t\r\n"):
-        report.add(
-            NAME_BLANKS,
-            "the name contains a tab or a line end",
-            element,
-            attribute="name",
-            found=quoted(raw),
-            remedy="write the name on one line, without tabs",
-        )
+        message = "the name contains a tab or a line end"
+        remedy = "write the name on one line, without tabs"
+        report.add(NAME_BLANKS, message, element, attribute="name", found=quoted(raw), remedy=remedy)
 
 
 def _check_reserved(report: Reporter, name: str, element: Element, root_joint: str | None) -> None:
     if name == "universe" and element.tag == "joint":
-        report.add(
-            UNIVERSE,
-            "Pinocchio uses this name for the world and does not find the joint",
-            element,
-            attribute="name",
-            remedy="rename the joint",
-        )
+        message = "Pinocchio uses this name for the world and does not find the joint"
+        report.add(UNIVERSE, message, element, attribute="name", remedy="rename the joint")
     elif (element.tag, name) in (("link", "universe"), ("joint", "root_joint")):
         what = "the world" if name == "universe" else "the joint of a free or planar base"
         report.add(
@@ -525,9 +425,7 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
             f"the name is reserved for {what}",
             element,
             attribute="name",
-            remedy="rename the link or joint"
-            if root_joint
-            else "rename the link or joint, or load without root_joint",
+            remedy="rename the link or joint" + ("" if root_joint else ", or load without root_joint"),
             severity=Severity.ERROR if root_joint else None,
         )
 
@@ -536,18 +434,14 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
     seen: dict[str, str] = {}
     for name, element in named:
         if name.isascii() or len(name) > LONGEST:
-            continue  # a long name has another finding, and is slow to compare
+            continue  # a long name has another finding (URDF405), and is slow to compare
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
-            report.add(
-                LOOKALIKE,
-                "another name looks the same, but has different characters",
-                element,
-                attribute="name",
-                found=ascii(name) + " and " + ascii(first),
-                remedy="use only one of the two spellings",
-            )
+            message = "another name looks the same, but has different characters"
+            remedy = "use only one of the two spellings"
+            found = ascii(name) + " and " + ascii(first)
+            report.add(LOOKALIKE, message, element, attribute="name", found=found, remedy=remedy)
 
 
 BAD_COMMENT = Rule("URDF120", "bad-comment", WARNING)
@@ -560,7 +454,7 @@ _BETWEEN = re.compile(r"[,\s]+")
 def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
     """Apply the comments that silence findings, and report invalid comments.
 
-    `codes` is the code of each rule by its names in lower case.
+    `codes` has the code of each rule, by all names of the rule in lower case.
     """
     silences = Silences()
     for comment in report.comments:
@@ -585,25 +479,19 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
         remedy = f"did you mean {', '.join(dict.fromkeys(codes[word] for word in close))}?" if close else None
     else:
         what, remedy = "no reason is given", "write the reason after the bracket"
-    report.add(
-        BAD_COMMENT,
-        f"{what}, so the comment silences nothing",
-        found=quoted(f"<!--{comment.text}-->"),
-        remedy=remedy,
-        position=(comment.line, comment.column),
-    )
+    message = f"{what}, so the comment silences nothing"
+    found = quoted(f"<!--{comment.text}-->")
+    report.add(BAD_COMMENT, message, found=found, remedy=remedy, position=(comment.line, comment.column))
     return None
 
 
 def check_unused(report: Reporter) -> None:
-    """Report each code in an `ignore` comment that does not silence any finding, after all other rules."""
+    """Report each code in a comment that silences no finding. All other rules must have run before."""
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:
-                report.add(
-                    UNUSED_COMMENT,
-                    f"{code} is silenced, but there is no such warning or note here",
-                    found=quoted(f"<!--{silence.comment.text}-->"),
-                    remedy="remove the code from the comment; an error cannot be silenced",
-                    position=(silence.comment.line, silence.comment.column),
-                )
+                comment = silence.comment
+                message = f"{code} is silenced, but there is no warning or note with this code here"
+                remedy = "remove the code from the comment; an error cannot be silenced"
+                found, position = quoted(f"<!--{comment.text}-->"), (comment.line, comment.column)
+                report.add(UNUSED_COMMENT, message, found=found, remedy=remedy, position=position)

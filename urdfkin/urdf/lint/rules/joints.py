@@ -1,16 +1,17 @@
-"""Check that joints connect all links in one tree and have usable axes, limits and mimic rules.
+"""Check that joints connect all links in one tree, and have usable axes, limits and mimic rules.
 
-The module also reports legal values that are probably mistakes: rounded pi, degrees, millimetres, equal
-joints. No function is recursive, because a chain of 50,000 links would exceed the recursion limit.
+Legal values that are probably mistakes are also reported: rounded pi, degrees, millimetres, equal joints. No
+function is recursive, because a chain of 50,000 links would exceed Python's recursion limit.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 from urdfkin.urdf import parser
@@ -38,86 +39,75 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
-    """Report the reasons why the joints form no tree; return whether they form one."""
+    """Report all reasons why the joints form no tree; return whether the joints form a tree."""
     edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
-    sound = len(edges) == len(robot.joints) and _no_loops_or_diamonds(report, robot, edges)
+    sound = len(edges) == len(robot.joints) and _have_one_parent(report, robot, edges)
     return _one_root(report, robot) and sound and bool(robot.links)
 
 
 def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
-    """Return whether a joint has two different links that exist; otherwise report missing or equal links."""
+    """Return whether a joint connects two different links that exist; report missing or equal links."""
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
-            nearest = report.nearest(link, robot.links)
-            report.add(
-                UNKNOWN_LINK,
-                f"the {tag} link does not exist",
-                joint.element.first(tag),
-                attribute="link",
-                found=quoted(link),
-                remedy=f"did you mean {', '.join(nearest)}?"
-                if nearest
-                else f"add <link name={quoted(link)}/>",
-            )
+            nearest = ", ".join(report.nearest(link, robot.links))
+            message, at = f"the {tag} link does not exist", joint.element.first(tag)
+            remedy = f"did you mean {nearest}?" if nearest else f"add <link name={quoted(link)}/>"
+            report.add(UNKNOWN_LINK, message, at, attribute="link", found=quoted(link), remedy=remedy)
     if joint.parent is not None and joint.parent == joint.child:
-        report.add(
-            SELF_PARENT,
-            "the joint connects a link with itself",
-            joint.element.first("child"),
-            attribute="link",
-            found=quoted(joint.parent),
-            remedy="name another parent link or child link",
-        )
+        message, at = "the joint connects a link with itself", joint.element.first("child")
+        remedy, found = "name another parent link or child link", quoted(joint.parent)
+        report.add(SELF_PARENT, message, at, attribute="link", found=found, remedy=remedy)
         return False
     return joint.parent in robot.links and joint.child in robot.links
 
 
-def _no_loops_or_diamonds(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Search depth first for links with several parent joints.
+def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
+    """Return whether no link has several parent joints; report the second and all further parent joints.
 
-    If the child of a joint is on the current path, the joint closes a loop. If the child was already visited
-    on another path, the child has a second parent.
+    The links are visited depth first. If the child of a joint is on the current path, the joint closes a
+    loop. If the child was visited on another path, the joint is a further parent joint.
     """
-    below: dict[str, list[JointRecord]] = {}
-    children = set()
-    for joint in edges:
-        below.setdefault(joint.parent or "", []).append(joint)
-        children.add(joint.child)
+    below = _joints_by_parent(edges)
+    children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
-    repeated: list[tuple[JointRecord, bool]] = []
     visited: set[str] = set()
+    sound = True
     for start in [link for link in robot.links if link not in children] + list(robot.links):
         if start in visited:
             continue
-        path: set[str] = {start}
-        stack: list[tuple[str, list[JointRecord]]] = [(start, list(reversed(below.get(start, []))))]
         visited.add(start)
+        path, stack = {start}, [(start, iter(below.get(start, ())))]
         while stack:
             link, pending = stack[-1]
-            if not pending:
+            joint = next(pending, None)
+            if joint is None:
                 stack.pop()
                 path.discard(link)
                 continue
-            joint = pending.pop()
             child = joint.child or ""
             if child in visited:
-                repeated.append((joint, child in path))
+                _report_repeat(report, joint, first.get(child), loop=child in path)
+                sound = False
                 continue
             visited.add(child)
             first[child] = joint
             path.add(child)
-            stack.append((child, list(reversed(below.get(child, [])))))
-    for joint, loop in repeated:
-        _report_repeat(report, joint, first.get(joint.child or ""), loop=loop)
-    return not repeated
+            stack.append((child, iter(below.get(child, ()))))
+    return sound
+
+
+def _joints_by_parent(joints: Iterable[JointRecord]) -> dict[str, list[JointRecord]]:
+    below: dict[str, list[JointRecord]] = {}
+    for joint in joints:
+        below.setdefault(joint.parent or "", []).append(joint)
+    return below
 
 
 def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | None, *, loop: bool) -> None:
     if loop:
         rule, remedy = CYCLE, "remove a joint of the loop; a URDF is a tree"
-        message = (
-            f"the joint closes a loop: its child is an ancestor of its parent {quoted(joint.parent or '')}"
-        )
+        parent = quoted(joint.parent or "")
+        message = f"the joint closes a loop: its child is an ancestor of its parent {parent}"
     else:
         other = f"joint {quoted(first.name)} on line {first.element.line}" if first else "another joint"
         rule, remedy = SEVERAL_PARENTS, "a link has one parent; remove one of the joints"
@@ -129,8 +119,8 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     """Return whether exactly one link has no parent; report all further links without a parent.
 
-    If the child of a joint is missing or does not exist, the joint may be the parent joint of any link. In
-    this case no link is reported.
+    If the child of a joint is missing or does not exist, no link is reported, because the joint may be the
+    parent joint of any link.
     """
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
@@ -141,18 +131,13 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if not children <= robot.links.keys():
         return False  # another finding reports the joint with a wrong child
     parents = {joint.parent for joint in robot.joints}
-    # The root of the robot is the first link with children and without a parent.
-    # The other links without a parent are not connected with this root.
+    # The main root is the first link that has children and no parent.
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
-            report.add(
-                SEVERAL_ROOTS,
-                f"the link has no parent, and neither has {quoted(main)}",
-                robot.links[root],
-                attribute="name",
-                remedy="connect this link with a joint, or remove it",
-            )
+            message = f"the link has no parent, and neither has {quoted(main)}"
+            remedy = "connect this link with a joint, or remove it"
+            report.add(SEVERAL_ROOTS, message, robot.links[root], attribute="name", remedy=remedy)
     return False
 
 
@@ -161,21 +146,21 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If the length of an axis differs from 1 by less than this number, the finding is only a note.
+#: Difference of an axis's length from 1 below which the finding is only a note.
 #: Axes that are written with few digits have differences of this size.
 LENGTH_ROUNDING = 2e-4
 
-#: The length of a unit vector differs from 1 by at most this number, as in `kinematics.inputs`.
+#: Maximum difference of a unit vector's length from 1, as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: A z axis has x and y components below this fraction of its z component.
+#: Maximum fraction of the z component that the x and y components of a z axis may have.
 _LEAN = 1e-9
 
-#: Pinocchio replaces an axis by a coordinate axis within this relative tolerance.
+#: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
 #: Eigen's function `isApprox`, which compares squared lengths, has this default tolerance.
 _SNAPPED = 1e-12
 
-#: A tilt (rad) below this number is not reported, because the error bounds in `verify.bounds` include it.
+#: Maximum tilt (rad) that is not reported, because the error bounds in `verify.bounds` include it.
 _TILT = 2.0**-52
 
 
@@ -198,14 +183,10 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
     length = math.hypot(*joint.axis)
     if not SHORTEST < length < LONGEST:
         what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
-        report.add(
-            NO_DIRECTION,
-            f"the axis {what}",
-            joint.axis_element,
-            attribute="xyz",
-            found=_written(joint),
-            remedy='write a unit vector, such as xyz="0 0 1"',
-        )
+        message = f"the axis {what}"
+        remedy = 'write a unit vector, such as xyz="0 0 1"'
+        found = _written(joint)
+        report.add(NO_DIRECTION, message, joint.axis_element, attribute="xyz", found=found, remedy=remedy)
     elif abs(length - 1.0) > _ONE:
         unit = unit_vector(joint.axis)
         written = " ".join(repr(x).removesuffix(".0") for x in unit)
@@ -240,27 +221,24 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
     if snapped := _snap(axis):
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
+        message = f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}"
+        remedy = f'write xyz="{written}"; if the tilt is intended, double all three numbers'
         report.add(
-            NEARLY_COORDINATE_AXIS,
-            f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}",
-            element,
-            attribute="xyz",
-            found=_written(joint),
-            remedy=f'write xyz="{written}"; if the tilt is intended, double all three numbers',
-            weight=tilt,
-        )
+            NEARLY_COORDINATE_AXIS, message, element,
+            attribute="xyz", found=_written(joint), remedy=remedy, weight=tilt,
+        )  # fmt: skip
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """For joints with finding URDF514, return the angle (rad) from the file's axis to Pinocchio's axis."""
-    snapped = ((joint.name, _snap(joint.axis)) for joint in robot.joints if joint.kind in AXIAL)
-    return {name: result[1] for name, result in snapped if result is not None}
+    """Return the angle (rad) between a joint's axis in the file and in Pinocchio, if the axes differ."""
+    axial = (joint for joint in robot.joints if joint.kind in AXIAL)
+    return {joint.name: snapped[1] for joint in axial if (snapped := _snap(joint.axis))}
 
 
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that Pinocchio uses for an axis, and the angle between them (rad).
+    """Return the coordinate axis that Pinocchio uses instead of an axis, and the angle (rad) between the two.
 
-    The result is None if Pinocchio uses the axis unchanged.
+    The result is None if Pinocchio uses the axis in the file.
     """
     if axis is None:
         return None
@@ -283,14 +261,9 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
     if z > 0.0 and math.hypot(x, y) <= _LEAN * z:
         return
     at = joint.axis_element or joint.element
-    report.add(
-        PLANAR_AXIS,
-        "a planar joint moves in the XY plane of its frame, independent of <axis>",
-        at,
-        attribute="xyz",
-        found=_written(joint),
-        remedy='rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>',
-    )
+    message = "a planar joint moves in the XY plane of its frame, independent of <axis>"
+    remedy = 'rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>'
+    report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_written(joint), remedy=remedy)
 
 
 INVERTED_LIMIT = Rule("URDF507", "inverted-limit", ERROR)
@@ -305,19 +278,18 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # from URDF 1.2 on, urdfdom has the same rules for all joint types
+    strict = version >= (1, 2)  # since URDF 1.2, urdfdom applies the rules of limits to all joint types
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
             refused = strict or joint.kind in AXIAL
-            report.add(
-                NEGATIVE_LIMIT if refused else parser.IGNORED,
-                f"the limit of {attribute} is negative; Pinocchio {'refuses' if refused else 'ignores'} it",
-                limit.element,
-                attribute=attribute,
-                found=quoted(limit.element.attributes[attribute]),
-                remedy="write the limit without its sign",
-            )
+            rule, effect = parser.IGNORED, "ignores the limit"
+            if refused:
+                rule, effect = NEGATIVE_LIMIT, "refuses the file"
+            message = f"the limit of {attribute} is negative; Pinocchio {effect}"
+            remedy = "write the limit without its sign"
+            found = quoted(limit.element.attributes[attribute])
+            report.add(rule, message, limit.element, attribute=attribute, found=found, remedy=remedy)
     if joint.kind == "continuous":
         _check_continuous(report, limit)
     bounded = joint.kind in ("revolute", "prismatic")
@@ -329,23 +301,14 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
     found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
     if lower > upper:
-        report.add(
-            INVERTED_LIMIT,
-            "the lower limit is above the upper limit",
-            limit.element,
-            attribute="lower",
-            found=found if len(written) == 2 else f"{found} (a missing bound is 0)",
-            remedy="swap the limits" if len(written) == 2 else "write both limits",
-        )
+        message, remedy = "the lower limit is above the upper limit", "swap the limits"
+        if len(written) < 2:
+            found, remedy = f"{found} (a missing bound is 0)", "write both limits"
+        report.add(INVERTED_LIMIT, message, limit.element, attribute="lower", found=found, remedy=remedy)
     elif lower == upper and bounded:
-        report.add(
-            EMPTY_RANGE,
-            "the joint cannot move: its limits are equal",
-            limit.element,
-            attribute="lower",
-            found=found,
-            remedy="write the range, or make the joint fixed",
-        )
+        message = "the joint cannot move: its limits are equal"
+        remedy = "write the range, or make the joint fixed"
+        report.add(EMPTY_RANGE, message, limit.element, attribute="lower", found=found, remedy=remedy)
 
 
 def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
@@ -353,10 +316,10 @@ def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
     if any(getattr(limit, name) for name in written):
         report.add(
             parser.IGNORED,
-            "a continuous joint has no position limits; they are ignored",
+            "a continuous joint has no position limits; the limits are ignored",
             limit.element,
             attribute=written[0],
-            found=" ".join(f"{name}={quoted(limit.element.attributes[name])}" for name in written),
+            found=_written_bounds(limit),
             remedy='remove the limits, or write type="revolute"',
             fix=lambda: report.without(limit.element, *written),
         )
@@ -371,15 +334,15 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: A larger multiplier or offset (rad or m) of a mimic joint is reported.
+#: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
 LARGEST = 1e6
-#: A smaller unusable fraction of a mimicked joint's range is not reported.
-#: Limits of mimic joints are often written with few digits.
+#: Largest unusable fraction of a mimicked joint's range that is not reported.
+#: The limits of mimic joints are often written with few digits.
 LEAST_LOST = 1e-3
 
 
 def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
-    """Report problems of mimic joints. If the mimic rules are not enabled, every finding is a note."""
+    """Report problems of mimic joints. If `enabled` is False, every finding is a note."""
     checker = _MimicChecker(report, robot.by_name, enabled)
     for joint in robot.joints:
         if joint.mimic is not None:
@@ -414,17 +377,12 @@ class _MimicChecker:
 
     def check(self, joint: JointRecord, mimic: MimicRecord) -> None:
         if joint.kind == "fixed":
-            self.add(
-                parser.IGNORED,
-                "a fixed joint cannot mimic; its <mimic> is ignored",
-                mimic,
-                "joint",
-                "remove <mimic>",
-                lambda: self.report.without_element(mimic.element),
-            )
+            message, remedy = "a fixed joint cannot mimic; <mimic> is ignored", "remove <mimic>"
+            fix = partial(self.report.without_element, mimic.element)
+            self.add(parser.IGNORED, message, mimic, "joint", remedy, fix)
             return
         if joint.kind in ("planar", "floating"):
-            message = f"a {joint.kind} joint cannot mimic another: it has several coordinates"
+            message = f"a {joint.kind} joint has several coordinates and cannot mimic another joint"
             self.add(MIMIC_LEADER, message, mimic, "joint", "remove <mimic>")
             return
         leader = self.joints.get(mimic.leader)
@@ -450,49 +408,35 @@ class _MimicChecker:
 
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
         if mimic.multiplier == 0.0:
-            self.add(
-                MIMIC_CONSTANT,
-                f"the multiplier is zero: the joint stays at {mimic.offset:g}",
-                mimic,
-                "multiplier",
-                "write the ratio, or make the joint fixed",
-            )
+            message = f"the multiplier is zero: the joint stays at {mimic.offset:g}"
+            remedy = "write the ratio, or make the joint fixed"
+            self.add(MIMIC_CONSTANT, message, mimic, "multiplier", remedy)
         for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
             if abs(value) > LARGEST:
                 message = f"the {attribute} is far too large"
                 self.add(MIMIC_SCALE, message, mimic, attribute, "check the exponent")
         if joint.kind == "continuous":
-            self.add(
-                MIMIC_CONTINUOUS,
-                "a continuous joint mimics another: Pinocchio accepts this only if both are continuous",
-                mimic,
-                "joint",
-                'write type="revolute" for the mimic joint',
-            )
+            message = "Pinocchio accepts a continuous mimic joint only if the mimicked joint is continuous"
+            self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if leader.mimic is not None:
-            self.add(
-                MIMIC_CHAIN,
-                f"the mimicked joint itself mimics {leader.mimic.leader!r}",
-                mimic,
-                "joint",
-                "name the last joint of the chain: some readers resolve one step only",
-            )
+            message = f"the mimicked joint itself mimics {leader.mimic.leader!r}"
+            remedy = "name the last joint of the chain, because some readers apply only the last rule"
+            self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
         """Check that the limits of a mimic joint allow the full range of the mimicked joint."""
-        from urdfkin.model.configuration import kept_range, range_words
+        from urdfkin.model.configuration import allowed_range, range_words
         from urdfkin.model.tree import Limit
 
         rule, leader = self.resolved(mimic)
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
-        low, high = kept_range(rule, Limit(*limits, math.inf, math.inf), *moving)
-        if low <= high and (
-            rule.multiplier == 0.0 or high - low >= (1.0 - LEAST_LOST) * (moving[1] - moving[0])
-        ):
+        low, high = allowed_range(rule, Limit(*limits, math.inf, math.inf), *moving)
+        least = 0.0 if rule.multiplier == 0.0 else (1.0 - LEAST_LOST) * (moving[1] - moving[0])
+        if low <= high and high - low >= least:
             return
         allowed = f"only {range_words((low, high))}" if low < high else "no value"
         message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
@@ -510,7 +454,7 @@ class _MimicChecker:
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
         """Return the combined rule of a chain of mimic joints, and the joint at the end of the chain.
 
-        The joint is None if the chain of mimic rules is a circle, or names a joint that does not exist.
+        The joint is None if the chain is a circle, or if the last rule names a joint that does not exist.
         """
         from urdfkin.model.tree import Mimic
 
@@ -526,7 +470,7 @@ class _MimicChecker:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a joint, one revolution for a continuous joint, or None without valid limits."""
+    """Return the limits of a joint (+- pi for a continuous joint), or None without valid limits."""
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -536,7 +480,7 @@ def _range_of(joint: JointRecord) -> tuple[float, float] | None:
 
 
 def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
-    """Return the names of the joints in circles of mimic rules; each joint is visited once."""
+    """Return the names of all joints that are in a circle of mimic rules."""
     in_loops: set[str] = set()
     visited: set[str] = set()
     for start in joints:
@@ -560,33 +504,30 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
-#: A joint origin with a coordinate of at least this length (m) is probably in millimetres.
+#: Coordinate (m) of a joint origin from which on the origin is probably in millimetres.
 FAR = 100.0
 
-#: If the sum of all lengths of a robot is below this length (m), the lengths were probably scaled twice.
+#: Total length (m) of a robot below which the lengths were probably scaled twice.
 TINY = 1e-4
 
-#: A limit that is a whole number of at least `MANY` is probably in degrees.
+#: Smallest whole number that, as a limit, is probably in degrees.
 #: Some exporters write limits of at least `ENDLESS` for a joint without limits.
 MANY, ENDLESS = 30.0, 1000.0
 
-#: If a rounded multiple of pi moves a link by more than this length (m), the finding is a warning.
+#: Largest displacement (m) of a link by a rounded multiple of pi for which the finding is only a note.
 NOTICEABLE = 1e-3
 
-#: An angle that differs from a multiple of pi by less than this angle (rad) is not reported.
+#: Largest difference (rad) between an angle and a multiple of pi that is not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: A rounded multiple of pi is recognized only with at least this number of decimals.
+#: Multiples of pi, each with the number of decimals from which on its rounded value is recognized.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
 
 
 def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> None:
-    """Report legal values that are probably mistakes.
-
-    Lengths along chains are defined only if the joints form a tree (`sound`).
-    """
+    """Report legal values that are probably mistakes. `sound` is True if the joints form a tree."""
     reach = _reach(robot) if sound else {}
     for joint in robot.joints:
         _check_angles(report, joint, reach)
@@ -602,48 +543,42 @@ def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float])
     if origin is not None and joint.quaternion is None:
         written = origin.attributes.get("rpy", "").split(maxsplit=3)
         if any(abs(angle) >= 10.0 for angle in joint.rpy):
-            _degrees(report, joint, "rpy", quoted(" ".join(written)))
+            message, found = "the angles of the origin look like degrees", quoted(" ".join(written))
+            _report_degrees(report, message, origin, "rpy", found)
         elif len(written) == 3:
             _check_rounded(report, joint, written, reach.get(joint.child or "", 0.0))
     limit = joint.limit
     if limit is not None and joint.kind == "revolute":
         bounds = [bound for bound in (limit.lower, limit.upper) if bound is not None]
         if any(MANY <= abs(bound) < ENDLESS and bound == round(bound) for bound in bounds):
-            at = " ".join(
-                f"{name}={quoted(limit.element.attributes[name])}"
-                for name in ("lower", "upper")
-                if name in limit.element.attributes
-            )
-            _degrees(report, joint, "limit", at)
+            found = _written_bounds(limit)
+            _report_degrees(report, "the limits look like degrees", limit.element, "lower", found)
 
 
-def _degrees(report: Reporter, joint: JointRecord, what: str, found: str) -> None:
-    rpy = what == "rpy"
-    report.add(
-        DEGREES,
-        "the angles of the origin look like degrees" if rpy else "the limits look like degrees",
-        joint.origin_element if rpy else joint.limit.element if joint.limit else joint.element,
-        attribute="rpy" if rpy else "lower",
-        found=found,
-        remedy="write angles in radians",
-    )
+def _report_degrees(report: Reporter, message: str, at: Element, attribute: str, found: str) -> None:
+    report.add(DEGREES, message, at, attribute=attribute, found=found, remedy="write angles in radians")
+
+
+def _written_bounds(limit: LimitRecord) -> str:
+    written = limit.element.attributes
+    return " ".join(f"{name}={quoted(written[name])}" for name in ("lower", "upper") if name in written)
 
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
-    """For an origin with rounded multiples of pi, report the angle with the largest rounding error."""
+    """Report the rounded multiple of pi that has the largest rounding error of the angles of an origin."""
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
-    whole = list(written)
+    exact = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
         found = rounded_pi(word, angle)
         if found is None:
             continue
-        whole[k], turns = repr(found[1]), turns + abs(angle - found[1])
+        exact[k], turns = repr(found[1]), turns + abs(angle - found[1])
         if abs(angle - found[1]) > off:
             off, text, (multiple, meant) = abs(angle - found[1]), word, found
     if not off or joint.origin_element is None:
         return
     origin = joint.origin_element
-    moves = f", which moves the links below it by up to {_metres(off * reach)}" if reach > 0.0 else ""
+    moves = f", which moves the links below by up to {_metres(off * reach)}" if reach > 0.0 else ""
     report.add(
         ROUNDED_PI,
         f"rpy contains a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
@@ -653,20 +588,20 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
         remedy=f"write {meant!r} if you mean {_as_pi(multiple)}; urdfkin uses the value in the file",
         severity=Severity.WARNING if off * reach > NOTICEABLE else None,
         weight=off * reach,
-        fix=lambda: report.rewritten(origin, "rpy", _replace_words(report.raw(origin, "rpy"), whole), turns),
+        fix=lambda: report.rewritten(origin, "rpy", _replace_words(report.raw(origin, "rpy"), exact), turns),
     )
 
 
 def _replace_words(raw: str | None, words: list[str]) -> str:
-    """Replace the words in a raw attribute value, but keep the white space between the words."""
+    """Replace the words in the text of an attribute value, but keep the white space between the words."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
-    if len(blanks) != len(words) + 1:  # the raw value has references such as `&#32;`
+    if len(blanks) != len(words) + 1:  # the text contains references such as `&#32;`
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi that was probably rounded to a decimal, and its value; None without one.
+    """Return the multiple of pi (and its value) of which a decimal is probably a rounded value; else None.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -697,33 +632,23 @@ def _metres(length: float) -> str:
 
 
 def _check_lengths(report: Reporter, joint: JointRecord) -> None:
-    if joint.origin_element is not None and max(abs(x) for x in joint.xyz) >= FAR:
-        report.add(
-            MILLIMETRES,
-            "the joint is very far from its parent link",
-            joint.origin_element,
-            attribute="xyz",
-            found=f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}",
-            remedy="write lengths in metres",
-            weight=max(abs(x) for x in joint.xyz),
-        )
+    largest = max(abs(x) for x in joint.xyz)
+    add = partial(report.add, MILLIMETRES, remedy="write lengths in metres")
+    if joint.origin_element is not None and largest >= FAR:
+        message = "the joint is very far from its parent link"
+        found = f"xyz={quoted(joint.origin_element.attributes.get('xyz', ''))}"
+        add(message, joint.origin_element, attribute="xyz", found=found, weight=largest)
     limit = joint.limit
     if limit is not None and joint.kind == "prismatic":
         far = [bound for bound in (limit.lower, limit.upper) if bound and FAR <= abs(bound) < ENDLESS]
         if far:
-            report.add(
-                MILLIMETRES,
-                "a prismatic joint moves very far",
-                limit.element,
-                attribute="lower" if far[0] == limit.lower else "upper",
-                found=f"{far[0]:g}",
-                remedy="write lengths in metres",
-                weight=abs(far[0]),
-            )
+            message, found = "a prismatic joint moves very far", f"{far[0]:g}"
+            attribute = "lower" if far[0] == limit.lower else "upper"
+            add(message, limit.element, attribute=attribute, found=found, weight=abs(far[0]))
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
-    """Report a joint whose limits exclude 0, the neutral joint value. Mimic joints are not checked."""
+    """Report a joint (other than a mimic joint) whose limits exclude 0, the neutral joint value."""
     limit = joint.limit
     if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
         return
@@ -741,7 +666,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_places(report: Reporter, robot: RobotRecord) -> None:
-    """Report joints with the same parent, kind, origin and axis."""
+    """Report joints that have the parent, type, origin and axis of another joint."""
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL:
@@ -749,28 +674,20 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
         place = (joint.parent, joint.kind, joint.xyz, joint.rpy, joint.quaternion, joint.axis)
         first = places.setdefault(place, joint)
         if first is not joint:
-            report.add(
-                SAME_PLACE,
-                f"the joint has the same origin and axis as joint {quoted(first.name)}",
-                joint.element,
-                remedy="ignore this finding if both joints are intended",
-            )
+            message = f"the joint has the same origin and axis as joint {quoted(first.name)}"
+            remedy = "ignore this finding if both joints are intended"
+            report.add(SAME_PLACE, message, joint.element, remedy=remedy)
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return an upper bound (m) on the distance from each link to the links below it."""
-    below: dict[str, list[JointRecord]] = {}
-    for joint in robot.joints:
-        below.setdefault(joint.parent or "", []).append(joint)
-    roots = set(robot.links) - {joint.child for joint in robot.joints}
-    order, stack = [], list(roots)
-    while stack:
-        link = stack.pop()
-        order.append(link)
-        stack += [joint.child or "" for joint in below.get(link, [])]
+    """Return an upper bound (m) on the distance between each link and the links below it."""
+    below = _joints_by_parent(robot.joints)
+    order = list(robot.links.keys() - {joint.child for joint in robot.joints})
+    for link in order:
+        order += [joint.child or "" for joint in below.get(link, ())]
     reach = dict.fromkeys(order, 0.0)
     for link in reversed(order):
-        for joint in below.get(link, []):
+        for joint in below.get(link, ()):
             reach[link] = max(reach[link], math.hypot(*joint.xyz) + reach[joint.child or ""])
     return reach
 
@@ -779,19 +696,10 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
     whole = max(reach.values(), default=0.0)
     if math.isinf(whole):
         far = max(robot.joints, key=lambda joint: max(abs(x) for x in joint.xyz))
-        report.add(
-            OVERFLOW,
-            "the sum of the lengths along the chain is too large for a double",
-            far.origin_element or far.element,
-            attribute="xyz",
-            found=quoted((far.origin_element or far.element).attributes.get("xyz", "")),
-            remedy="check the exponent",
-        )
+        element = far.origin_element or far.element
+        message = "the sum of the lengths along the chain is too large for a double"
+        found = quoted(element.attributes.get("xyz", ""))
+        report.add(OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent")
     elif 0.0 < whole < TINY:
-        report.add(
-            TINY_ROBOT,
-            f"the sum of all lengths of the robot is {_metres(whole)}",
-            robot.element,
-            found=None,
-            remedy="write lengths in metres",
-        )
+        message = f"the sum of all lengths of the robot is {_metres(whole)}"
+        report.add(TINY_ROBOT, message, robot.element, remedy="write lengths in metres")

@@ -1,8 +1,8 @@
 """Findings of `load` about MJCF and USD: parts that a tree cannot represent, and probable mistakes.
 
-A finding names an element: an MJCF element by its tag and name, or a USD prim by its path. If the element is
-in the text of the file itself, the finding also contains the line. The line is unknown if the element is in
-an included file, in another layer, in a binary file, or after the first 10 MB.
+A finding names an MJCF element by the tag and the name of the element, or a USD prim by its path. The finding
+also contains the line of the element, unless the element is in an included file, in another layer, in a
+binary file, or after the first 10 MB.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: At most this number of bytes of a file is searched for elements.
+#: Number of bytes at the beginning of a file in which elements are searched.
 _SEARCHED = 10_000_000
-#: XML that is not an element has these beginnings and ends.
+#: Beginnings and ends of XML markup that is not an element.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Findings about these MJCF elements have a tag without a name.
+#: Tags of MJCF elements without a name, and the tags that findings about these elements have.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: This pattern matches a prim in the text form of USD, and the ends of other content.
+#: Regular expression for a prim in a USD text file, or a character that begins or ends other content.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
-#: Parts of USD without prims have these beginnings and ends.
+#: Beginnings and ends of comments, arrays, strings and references in a USD text file.
 _NO_PRIM = {
     b"#": re.compile(rb"[\r\n]"),
     b"[": re.compile(rb"\]"),
@@ -55,7 +55,7 @@ _NO_PRIM = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: An element, by tag and name, has a line and a column, from 1, and a width.
+#: Line and column (from 1) and width of each element, by tag and name.
 _Places = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
@@ -65,15 +65,14 @@ def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, 
     The finding is a warning if the part affects the motion or is a probable mistake, otherwise a note. `file`
     is the file's name in messages.
     """
-    found = [(one, *_element(one.where)) for one in listed]
-    places = _placed(data, _elements) if any(element for _, element, _ in found) else {}
-    return tuple(
-        _finding(
-            LEFT_OUT_MOTION if one.moves else LEFT_OUT if one.remedy is None else ANGLE_UNIT,
-            one, file, element, name, places,
-        )
-        for one, element, name in found
-    )  # fmt: skip
+    parts = tuple(listed)
+    places = _positions(data, _elements) if any(part.where for part in parts) else {}
+    found = []
+    for part in parts:
+        tag, _, name = (part.where or "").partition(" ")
+        rule = LEFT_OUT_MOTION if part.moves else LEFT_OUT if part.remedy is None else ANGLE_UNIT
+        found.append(_finding(rule, part, file, tag or None, name or None, places))
+    return tuple(found)
 
 
 def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
@@ -81,7 +80,7 @@ def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, 
     found = tuple(remarks)
     rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
     is_text = data.startswith(b"#usda") and any(one.where for one in found)
-    places = _placed(data, _prims) if is_text else {}
+    places = _positions(data, _prims) if is_text else {}
     return tuple(
         _finding(rules[one.kind], one, file, "prim" if one.where else None, one.where or None, places)
         for one in found
@@ -97,14 +96,8 @@ def _finding(
     )
 
 
-def _element(where: str | None) -> tuple[str | None, str | None]:
-    """Split a text such as `joint elbow` into the tag and the name of an element."""
-    tag, _, name = (where or "").partition(" ")
-    return tag or None, name or None
-
-
-def _placed(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
-    """Return the position of each element that `search` finds; of elements with the same name, the first."""
+def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
+    """Return the position of each element that `search` yields; the first if elements have the same name."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_SEARCHED]):
         found.setdefault((element, name), (first, last))
@@ -119,10 +112,10 @@ def _placed(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | Non
 
 
 def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
-    """Yield the tag, the name and the span of each MJCF element to which a finding can refer.
+    """Yield the tag, the name and the span (in bytes) of each MJCF element that a finding can name.
 
-    An equality without a name has its number among all equalities. If the file includes other files, this
-    number is unknown, and the equality is skipped.
+    The name of an equality without a name is its index among all equalities. If the file includes other
+    files, the index is unknown, and the equality is skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
@@ -156,14 +149,14 @@ def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
 
 
 def _prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
-    """Yield the path and the span of each prim in the text form of USD, also of prims inside variants."""
+    """Yield "prim", the path and the span (in bytes) of each prim in a USD text file, including variants."""
     above, prim, cursor, inside = list[str](), "", 0, 0
     while (found := _USDA.search(data, cursor)) is not None:
         cursor, token = found.end(), found[0]
         if found[1] is not None:
             prim = "/" + found[1].decode("utf-8", "replace")
             yield "prim", "".join(above) + prim, found.start(), found.end()
-        elif token in b"()":  # braces of metadata contain dictionaries
+        elif token in b"()":  # in the metadata between parentheses, braces enclose dictionaries
             inside += 1 if token == b"(" else -1
         elif token == b"{":
             above += [] if inside else [prim]

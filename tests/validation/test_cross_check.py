@@ -1,6 +1,8 @@
-"""A second oracle: three answers to each question, and it is found who stands alone."""
+"""Cross check of urdfkin, Pinocchio and a second oracle: the outlier among three results is found."""
 
 import itertools
+from functools import reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from urdfkin.report.reading import checked, contradictions
 from urdfkin.validation import comparison
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
-from urdfkin.validation.error_stats import OraclePair, ThreeSides, plus, tally, three_sides
+from urdfkin.validation.error_stats import CrossCheck, OraclePair, cross_check, plus, tally
 from urdfkin.verify.bounds import Bound
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import PinocchioOracle
@@ -26,37 +28,32 @@ FIRST = Bound(np.ones((1, 1, 1)), np.full((1, 1, 1), 4.0))
 SECOND = Bound(np.full((1, 1, 1), 2.0), np.full((1, 1, 1), 8.0))
 
 
-def asked(ours: float, pinocchios: float, second_oracle: float) -> ThreeSides:
+def checked_results(ours: float, pinocchios: float, second_oracle: float) -> CrossCheck:
+    """Compare three results with errors in eps."""
     one, two, three = (np.full((1, 1, 1), 1.0 + x * EPS) for x in (ours, pinocchios, second_oracle))
-    return three_sides("mujoco", one, two, three, FIRST, SECOND)
+    return cross_check("mujoco", one, two, three, FIRST, SECOND)
 
 
-#: Three answers, who stands alone, and how many cases are undecided.
-ALONE = [
+#: Three results, the outlier, and the number of undecided cases.
+OUTLIERS = [
     ((0, 4, 16), (0, 0, 0), 0), ((100, 0, 0), (1, 0, 0), 0), ((0, 100, 0), (0, 1, 0), 0),
     ((0, 0, 100), (0, 0, 1), 0), ((0, 100, 300), (0, 0, 0), 1), ((0, 8, 16), (0, 0, 0), 1),
     ((0, np.nan, 0), (0, 1, 0), 0), ((0, 0, np.inf), (0, 0, 1), 0),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("answers", "alone", "undecided"), ALONE)
-def test_who_disagrees_with_two_that_agree_stands_alone(
-    answers: tuple[float, float, float], alone: tuple[int, int, int], undecided: int
+@pytest.mark.parametrize(("results", "alone", "undecided"), OUTLIERS)
+def test_a_result_that_differs_from_two_equal_results_is_the_outlier(
+    results: tuple[float, float, float], alone: tuple[int, int, int], undecided: int
 ) -> None:
-    found = asked(*answers)
+    found = checked_results(*results)
     assert (found.alone, found.undecided) == (alone, undecided)
 
 
-def test_sums_add_up_in_any_order() -> None:
-    some = [asked(*answers) for answers in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
-    sums = set()
-    for order in itertools.permutations(some):
-        total: ThreeSides | None = None
-        for one in order:
-            total = plus(total, one)
-        sums.add(total)
-    (total,) = sums
-    assert total is not None
+def test_the_sum_does_not_depend_on_the_order() -> None:
+    some = [checked_results(*results) for results in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
+    (total,) = {reduce(add, order) for order in itertools.permutations(some)}
+    assert plus(None, total) == plus(total, None) == total
     assert total.alone == (1, 0, 0)
     assert total.undecided == 1
     assert total.urdfkin.failed == 2
@@ -64,29 +61,29 @@ def test_sums_add_up_in_any_order() -> None:
 
 #: Bounds: urdfkin and Pinocchio 4 eps, urdfkin and the second oracle 16 eps, the two oracles 20 eps.
 @pytest.mark.parametrize(
-    ("answers", "agree"),
+    ("results", "agree"),
     [
         ((0, 4, 4), (True, True, True)), ((0, 5, 4), (False, True, True)), ((0, 4, 16), (True, True, True)),
         ((0, 4, 17), (True, False, True)), ((0, -4, 16), (True, True, True)),
         ((0, -4, 17), (True, False, False)), ((0, -5, 16), (False, True, False)),
     ],
 )  # fmt: skip
-def test_two_answers_agree_up_to_their_bound_and_no_further(
-    answers: tuple[float, float, float], agree: tuple[bool, bool, bool]
+def test_two_results_agree_up_to_their_bound(
+    results: tuple[float, float, float], agree: tuple[bool, bool, bool]
 ) -> None:
-    found, (ours, pinocchios, second_oracle) = asked(*answers), answers
+    found, (ours, pinocchios, second_oracle) = checked_results(*results), results
     _, ours_second, theirs_second = agree
     assert (found.urdfkin.failed, found.pinocchio.failed) == (not ours_second, not theirs_second)
     assert found.urdfkin.share_of_bound == abs(ours - second_oracle) / 16
     assert found.pinocchio.share_of_bound == abs(pinocchios - second_oracle) / 20
     assert found.urdfkin.worst == abs(ours - second_oracle) / 2
-    # If two of the three agree, and no others, the third stands alone.
+    # If only one pair agrees, the third library is the outlier.
     assert found.alone == (agree[::-1] if sum(agree) == 1 else (0, 0, 0))
     assert found.undecided == (sum(agree) in (0, 2))
 
 
-def test_of_several_blocks_the_worst_disagreement_is_kept() -> None:
-    small, large = asked(0, 2, 6), asked(0, -4, 14)
+def test_a_sum_has_the_worst_disagreement() -> None:
+    small, large = checked_results(0, 2, 6), checked_results(0, -4, 14)
     for total in (small + large, large + small):
         assert total.urdfkin == OraclePair(0, large.urdfkin.worst, large.urdfkin.share_of_bound)
         assert total.pinocchio == OraclePair(0, large.pinocchio.worst, large.pinocchio.share_of_bound)
@@ -99,30 +96,30 @@ def document_of(**changes: Any) -> Document:
     return checked(report.as_dict(), "the report")
 
 
-def test_each_pair_is_measured_against_its_own_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    bounds: list[tuple[Bound, Bound]] = []
-    own: list[Bound] = []
+def test_each_pair_of_libraries_has_its_own_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    pairs: list[tuple[Bound, Bound]] = []
+    bounds: list[Bound] = []
 
-    def sides(*given: Any) -> ThreeSides:
-        bounds.append(given[-2:])
-        return three_sides(*given)
+    def record_pairs(*arguments: Any) -> CrossCheck:
+        pairs.append(arguments[-2:])
+        return cross_check(*arguments)
 
-    def counted(ours: FloatArray, theirs: FloatArray, bound: Bound, *others: Any) -> Any:
-        own.append(bound)
+    def record_bounds(ours: FloatArray, theirs: FloatArray, bound: Bound, *others: Any) -> Any:
+        bounds.append(bound)
         return tally(ours, theirs, bound, *others)
 
-    monkeypatch.setattr(comparison, "three_sides", sides)
-    monkeypatch.setattr(comparison, "tally", counted)
+    monkeypatch.setattr(comparison, "cross_check", record_pairs)
+    monkeypatch.setattr(comparison, "tally", record_bounds)
     assert validate(arm(), samples=0, oracle="mujoco").passed
-    assert len(bounds) == len(own) - 1 > 10  # Pinocchio's data.J is compared by itself
-    for (first, second), bound in zip(bounds, own, strict=False):
+    assert len(pairs) == len(bounds) - 1 > 10  # only Pinocchio has data.J
+    for (first, second), bound in zip(pairs, bounds, strict=False):
         assert np.array_equal(first.scale, bound.scale)
         assert np.array_equal(first.k, bound.k)
         assert np.array_equal(second.k, 2.0 * 30.0 / 24.0 * bound.k)
 
 
 @pytest.mark.slow
-def test_three_that_agree_are_told_side_by_side_in_every_form() -> None:
+def test_every_form_of_a_report_shows_the_cross_check() -> None:
     document = document_of()
     robot = document["robots"][0]
     assert robot["verdict"] == "verified"
@@ -142,9 +139,9 @@ ORACLES: dict[str, Any] = {"Pinocchio": PinocchioOracle, "MuJoCo": MujocoOracle}
 
 
 @pytest.mark.parametrize("who", ORACLES)
-def test_one_that_errs_stands_alone_in_the_report(who: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_oracle_is_the_outlier_in_the_report(who: str, monkeypatch: pytest.MonkeyPatch) -> None:
     right = ORACLES[who].velocities
-    monkeypatch.setattr(ORACLES[who], "velocities", lambda *given: right(*given) + 1e-6)
+    monkeypatch.setattr(ORACLES[who], "velocities", lambda *arguments: right(*arguments) + 1e-6)
     document = document_of()
     robot = document["robots"][0]
     assert robot["verdict"] == "disagrees"
@@ -162,7 +159,7 @@ def test_one_that_errs_stands_alone_in_the_report(who: str, monkeypatch: pytest.
         assert "urdfkin differs from the two others in 0, Pinocchio in 0" in (robot["reason"] or "")
 
 
-def test_a_second_oracle_that_cannot_read_the_robot_leaves_it_unverified_and_none_is_not_told() -> None:
+def test_a_robot_that_the_second_oracle_cannot_read_is_not_verified() -> None:
     text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
     report = validate(text, samples=0, oracle="mujoco")
     assert report.exit_code == 3

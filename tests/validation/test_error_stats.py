@@ -1,20 +1,21 @@
-"""A tally counts what lies outside its bound, adds up in any cut, and knows the worst case."""
+"""A tally counts results outside their bound, contains the worst case, and can be added in any order."""
 
 import math
 
 import numpy as np
 import pytest
 
+from tests.reading import present
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Inputs, Tally, histogram_bin, percentile, tally
 from urdfkin.verify.bounds import Bound
-from urdfkin.verify.certificate import BatchComparison
+from urdfkin.verify.comparison import BatchComparison
 
 FRAMES = ("a", "b", "c")
 
 
-def made(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> Tally:
-    """The tally of results that are off by so many eps, where 10 eps are allowed."""
+def tally_of(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> Tally:
+    """Return the tally of results with errors in eps; the bound is 10 eps."""
     ours = np.ones((*units.shape, 6))
     ours[..., 2] += units * EPS
     bound = Bound(np.ones_like(ours), np.full((*units.shape, 1), 10.0))
@@ -25,38 +26,35 @@ def made(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> 
 @pytest.mark.parametrize(
     ("units", "failed"), [(9.0, 0), (10.0, 0), (11.0, 1), (14.0, 1), (30.0, 1), (math.inf, 1), (math.nan, 1)]
 )
-def test_a_result_outside_its_bound_is_counted_however_little_and_disagrees(
-    units: float, failed: int
-) -> None:
-    found = made(np.array([[1.0, units, 2.0]]))
+def test_a_result_outside_its_bound_is_counted_and_disagrees(units: float, failed: int) -> None:
+    found = tally_of(np.array([[1.0, units, 2.0]]))
     assert (found.results, found.failed) == (3, failed)
     assert (found.share > 1.0) == bool(failed)
     assert BatchComparison(3, 1.0, found.share, ()).agrees == (not failed)
-    assert found.case is not None
-    assert found.case.frame == "b"
+    assert present(found.case).frame == "b"
 
 
 @pytest.mark.parametrize("cut", [1, 3, 7])
-def test_samples_and_frames_can_be_cut_anywhere(cut: int) -> None:
+def test_tallies_of_any_division_into_samples_and_frames_add_up(cut: int) -> None:
     units = np.round(np.random.default_rng(5).uniform(0.0, 12.0, (8, 3)))
-    whole = made(units)
-    assert made(units[:cut]) + made(units[cut:], cut) == whole
-    assert made(units[cut:], cut) + made(units[:cut]) == whole
+    whole = tally_of(units)
+    assert tally_of(units[:cut]) + tally_of(units[cut:], cut) == whole
+    assert tally_of(units[cut:], cut) + tally_of(units[:cut]) == whole
     for at in (1, 2):
-        left, right = made(units[:, :at], 0, FRAMES[:at]), made(units[:, at:], 0, FRAMES[at:])
+        left, right = tally_of(units[:, :at], 0, FRAMES[:at]), tally_of(units[:, at:], 0, FRAMES[at:])
         assert left.beside(right) == whole
-    nothing = made(units[:, :0], 0, ())
+    nothing = tally_of(units[:, :0], 0, ())
     assert nothing.beside(whole) == whole == whole.beside(nothing)
 
 
-def test_of_equal_cases_the_earlier_sample_wins_and_then_the_earlier_frame() -> None:
+def test_of_equal_worst_cases_the_earlier_sample_is_kept_and_then_the_earlier_frame() -> None:
     same = np.full((4, 3), 3.0)
-    found = made(same[2:], 2) + made(same[:2])
-    assert found.case is not None
-    assert (found.case.sample, found.case.frame, found.case.q) == (0, "a", (0.0,))
-    parts = made(same[:, :1], 0, ("a",)).beside(made(same[:, 1:], 0, ("b", "c")))
-    assert parts.case is not None
-    assert (parts.case.sample, parts.case.frame) == (0, "a")
+    for found in (
+        tally_of(same[2:], 2) + tally_of(same[:2]),
+        tally_of(same[:, :1], 0, ("a",)).beside(tally_of(same[:, 1:], 0, ("b", "c"))),
+    ):
+        case = present(found.case)
+        assert (case.sample, case.frame, case.q) == (0, "a", (0.0,))
 
 
 def test_a_percentile_is_the_upper_edge_of_its_bin_and_never_above_the_worst() -> None:
@@ -79,10 +77,10 @@ def test_the_histogram_has_ten_bins_a_decade_and_counts_an_edge_above_it() -> No
     np.testing.assert_allclose(HISTOGRAM_EDGES[[0, 10, 30, 80]], [1e-3, 1e-2, 1.0, 1e5])
 
 
-def test_results_without_numbers_agree_and_tallies_of_other_frames_do_not_add_up() -> None:
+def test_results_without_numbers_agree_and_tallies_of_different_frames_cannot_be_added() -> None:
     nothing = np.zeros((4, 3, 6, 0))
     bound = Bound(nothing, np.ones((4, 3, 1, 1)))
     found = tally(nothing, nothing, bound, FRAMES, 0, [([], [], [])] * 4)
     assert found == Tally(12, 0, 0.0, 0.0, (12, *([0] * 81)), (0.0,) * 3, None, (math.inf, 0.0))
     with pytest.raises(ValueError, match=r"shorter|longer"):
-        _ = made(np.ones((1, 3))) + made(np.ones((1, 2)), 0, FRAMES[:2])
+        _ = tally_of(np.ones((1, 3))) + tally_of(np.ones((1, 2)), 0, FRAMES[:2])

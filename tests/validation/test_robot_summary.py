@@ -1,8 +1,7 @@
-"""A report tells what a robot is, and the commands that it tells to type work."""
+"""Summaries of robots in a report, and the commands that compute a result again."""
 
 import json
 import shlex
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -13,21 +12,21 @@ import pytest
 import urdfkin
 from tests.cli.running import good
 from tests.cli.running import urdfkin as command
+from tests.reading import present
 from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint, limit
 from tests.urdfs import robot as robot_of
 from urdfkin.dh import dh_table
 from urdfkin.robot import Robot
-from urdfkin.validation import robot_summary as chains_module
+from urdfkin.validation import robot_summary
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_summary import MOST, chains_of
-from urdfkin.validation.timings import Clock, total
+from urdfkin.validation.timings import Timings
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 
-def test_the_chains_of_a_catalogues_robot_are_its_limbs_checked_in_both_conventions() -> None:
+def test_the_chains_of_a_catalogue_robot_are_its_limbs_checked_in_both_conventions() -> None:
     robot = urdfkin.load("talos")
     chains: Any = chains_of(robot, robot.verifier.oracle())
     assert [chain["limb"] for chain in chains] == ["left_arm", "right_arm", "left_leg", "right_leg", "head"]
@@ -39,7 +38,7 @@ def test_the_chains_of_a_catalogues_robot_are_its_limbs_checked_in_both_conventi
         assert joints == [row["joint"] for row in chain["modified"]["rows"]]
 
 
-def test_another_robots_chains_are_its_leaves_one_for_each_set_of_joints() -> None:
+def test_other_robots_have_one_chain_to_a_leaf_for_each_set_of_joints() -> None:
     robot = urdfkin.load(urdfkin.load("talos").urdf)
     chains = chains_of(robot, None)
     sets = [tuple(row["joint"] for row in chain["standard"]["rows"]) for chain in chains]
@@ -47,55 +46,36 @@ def test_another_robots_chains_are_its_leaves_one_for_each_set_of_joints() -> No
     assert all(chain["limb"] is None and chain["samples"] == 0 for chain in chains)
 
 
-def test_a_floating_root_has_no_table_and_time_is_told_by_whose_work_it_was() -> None:
-    report = validate("ur5", samples=0, root_joint="floating")
-    assert report.passed
-    assert report.command == "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating"
+def test_computing_times_add_up_to_the_time_of_a_robot() -> None:
     robot = validate("ur5", samples=10).robots[0]
-    assert robot.clock is not None
-    parts = robot.clock.as_dict()
+    parts = present(robot.timings).as_dict()
     assert all(seconds > 0.0 for seconds in parts.values())
     np.testing.assert_allclose(sum(parts.values()), robot.seconds, rtol=0.02, atol=1e-3)
-    both = total([Clock(1.0, 2.0, 3.0, 4.0), Clock(10.0, 20.0, 30.0, 40.0)])
-    assert both == Clock(11.0, 22.0, 33.0, 44.0)
+    both = Timings(1.0, 2.0, 3.0, 4.0) + Timings(10.0, 20.0, 30.0, 40.0)
+    assert both == Timings(11.0, 22.0, 33.0, 44.0)
 
 
-@pytest.fixture
-def shift(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Shift the tips of the tables that are made from now on, or of those of a convention."""
-    shifted, right = np.eye(4), dh_table
-    shifted[0, 3] = 1e-9
-
-    def wrong_from_now_on(*conventions: str) -> None:
-        def wrong(*args: str) -> object:
-            table = right(*args)  # type: ignore[arg-type]
-            changed = replace(table, tool=table.tool @ shifted)
-            return changed if not conventions or args[-1] in conventions else table
-
-        monkeypatch.setattr(chains_module, "dh_table", wrong)
-
-    return wrong_from_now_on
-
-
-def test_a_wrong_table_fails_its_robot(shift: Callable[..., None]) -> None:
-    shift()
-    robot = validate("ur5", samples=0).robots[0]
-    assert robot.failed == 0
-    assert robot.verdict is ValidationVerdict.DISAGREES
-
-
-@pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_of_both_conventions_the_worse_table_is_told(convention: str, shift: Callable[..., None]) -> None:
+@pytest.mark.parametrize("wrong", ["standard", "modified"])
+def test_a_wrong_table_of_one_convention_fails_the_robot(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("ur5")
     (good,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
-    shift(convention)
+    shifted = np.eye(4)
+    shifted[0, 3] = 1e-9
+
+    def shifted_table(tree: Any, tip: Any, base: Any, convention: str) -> object:
+        table = dh_table(tree, tip, base, convention)
+        return replace(table, tool=table.tool @ shifted) if convention == wrong else table
+
+    monkeypatch.setattr(robot_summary, "dh_table", shifted_table)
     (bad,) = cast("Any", chains_of(robot, robot.verifier.oracle()))
     assert bad["metres"] == pytest.approx(1e-9, rel=1e-3)
     assert bad["worst"] > 1e4 * good["worst"]
     assert bad["share_of_bound"] > 1.0 > good["share_of_bound"]
+    report = validate("ur5", samples=0).robots[0]
+    assert (report.failed, report.verdict) == (0, "disagrees")
 
 
-def test_what_must_agree_exactly_and_does_not_can_still_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_infinite_disagreement_is_null_in_the_document(monkeypatch: pytest.MonkeyPatch) -> None:
     right = PinocchioOracle.placements
 
     def wrong(*args: object) -> object:
@@ -116,15 +96,15 @@ def test_what_must_agree_exactly_and_does_not_can_still_be_written(monkeypatch: 
 # -- commands that repeat --------------------------------------------------------------------------
 
 
-#: A link is called as a joint elsewhere, so that a replay line has to say which it means.
+#: A link and another joint have the same name.
 TEXT = robot_of(
     joint("turn", "revolute", "base", "b", 'xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"', "0 1 1", limit()),
     joint("slide", "prismatic", "b", "turn", 'xyz="0 0.7 0"', "1 2 0", limit()),
 )
 
 
-def replayed(report: RobotReport, stdin: str = "") -> int:
-    """Run every line of a robot's report; how many there were."""
+def replay_all(report: RobotReport, stdin: str = "") -> int:
+    """Run each command in a robot's report, and return the number of commands."""
     lines = [line for key in report.tallies if (line := report.replay(key)) is not None]
     for line in lines:
         words = shlex.split(line)
@@ -136,14 +116,14 @@ def replayed(report: RobotReport, stdin: str = "") -> int:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("root_joint", [None, "planar"])
-def test_every_line_of_a_text_works_with_the_text_on_standard_input(root_joint: str | None) -> None:
+def test_the_commands_for_a_text_read_the_text_from_standard_input(root_joint: str | None) -> None:
     report = validate(TEXT, samples=2, root_joint=root_joint).robots[0]
     assert report.source == "<text>"
-    assert replayed(report, TEXT) > 10
+    assert replay_all(report, TEXT) > 10
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_a_line_computes_the_joint_that_was_compared_and_not_the_link_of_its_name() -> None:
+def test_a_command_computes_the_compared_joint_and_not_a_link_with_the_same_name() -> None:
     robot = urdfkin.load(TEXT)
     report = validate(robot, samples=2).robots[0]
     for (quantity, reference), tally in report.tallies.items():
@@ -160,7 +140,7 @@ def test_a_line_computes_the_joint_that_was_compared_and_not_the_link_of_its_nam
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("loaded", [False, True])
-def test_a_file_called_as_a_robot_of_the_catalogue_stays_a_file(
+def test_a_path_is_a_file_even_if_a_catalogue_robot_has_this_name(
     loaded: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -169,13 +149,14 @@ def test_a_file_called_as_a_robot_of_the_catalogue_stays_a_file(
     report = validate(source, samples=0)
     assert report.robots[0].name == "r"
     assert report.command == "urdfkin validate ./panda --samples 0 --seed 0"
-    assert replayed(report.robots[0]) > 10
+    assert replay_all(report.robots[0]) > 10
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_a_command_repeats_the_run_for_robots_with_the_same_options_and_for_a_text(tmp_path: Path) -> None:
+def test_the_command_of_a_report_repeats_the_run_with_a_line_for_each_set_of_options(tmp_path: Path) -> None:
     floating, texts = urdfkin.load("ur5", root_joint="floating"), map(urdf_of, ("single_link", "odd_names"))
     report = validate(["planar_two_link", floating, "ur3", *texts], samples=0)
+    assert report.passed
     assert report.command.splitlines() == [
         "urdfkin validate planar_two_link ur3 - --samples 0 --seed 0",
         "urdfkin validate ur5 --samples 0 --seed 0 --root-joint floating",

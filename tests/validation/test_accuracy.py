@@ -1,4 +1,4 @@
-"""The judge reads decimals, is right to fifty digits, and finds an error of a few units in the last place."""
+"""The accuracy study reads decimals exactly, has fifty right digits, and finds errors of a few units."""
 
 import re
 from collections.abc import Iterator
@@ -22,17 +22,17 @@ from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.words import judged_on, nearer, nearer_counts
+from urdfkin.report.words import accuracy_words, more_accurate, more_accurate_counts
 from urdfkin.system.documents import plain
 from urdfkin.validation import accuracy
-from urdfkin.validation.accuracy import AccuracyLine, Errors, Judgement, exact_quaternion, judge
+from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, Errors, accuracy_study, exact_quaternion
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 from urdfkin.verify.exact import recursion as exact_recursion
 from urdfkin.verify.exact.numbers import exact, precision, read_exact
 from urdfkin.verify.oracle import BaseRows
 from urdfkin.verify.quantities import QUANTITIES
 
-#: One of each kind: arms, a hand with followers, humanoids, a quadruped, a mobile base, CAD exports.
+#: Arms, a hand with mimic joints, humanoids, a quadruped, a mobile base, CAD exports.
 ROBOTS = (
     "panda", "ur5", "xarm7", "kinova", "allegro_left_hand", "tiago_pro", "talos", "icub", "anymal", "so100",
     "polar",
@@ -45,29 +45,29 @@ def many_digits() -> Iterator[None]:
         yield
 
 
-def demand_few_units(judged: Judgement) -> None:
-    for line in judged.lines:
+def check_errors(study: AccuracyStudy) -> None:
+    for line in study.lines:
         assert max(line.urdfkin.worst, line.pinocchio.worst) < 40.0, line
 
 
 def slightly_larger(monkeypatch: pytest.MonkeyPatch, name: str, units: float) -> None:
-    """Let a function return results that are too large by some units in the last place."""
+    """Multiply the results of a function by 1 + units * eps."""
     right = getattr(evaluate, name)
     factor = 1.0 + units * np.finfo(np.float64).eps
-    monkeypatch.setattr(evaluate, name, lambda *asked, **how: right(*asked, **how) * factor)
+    monkeypatch.setattr(evaluate, name, lambda *args, **kwargs: right(*args, **kwargs) * factor)
 
 
-def test_decimals_are_read_as_they_are_written_and_as_many_bases_are_needed_as_samples() -> None:
+def test_decimals_are_read_exactly_and_a_wrong_number_of_bases_is_refused() -> None:
     robot = urdfkin.load("planar_two_link")
     joints = read_exact(robot.urdf, robot.tree)
     assert abs(5 * joints[2].p[0] - 2) < 1e-78
     assert not joints[2].p[0].contains(0.4)
     with pytest.raises(InputError, match="base: wrong batch shape; give one motion, or 2"):
-        judge(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
+        accuracy_study(urdfkin.load("polar"), samples=2, base=draw_base(3, np.random.default_rng(1)))
 
 
-def test_it_agrees_to_far_more_digits_than_a_double_has_with_derivatives_of_the_elbow() -> None:
-    # The elbow's decimals are doubles in the other source: 0.6, 0.5 and 0.45 are put in as such here too.
+def test_exact_velocity_and_acceleration_of_the_elbow_are_derivatives_to_many_digits() -> None:
+    # The independent computation has the doubles 0.6, 0.5 and 0.45, so the text gets these doubles, too.
     moving = motion("elbow", 12)
     text = urdfkin.load("elbow").urdf
     for word in ("0.6", "0.5", "0.45"):
@@ -76,7 +76,7 @@ def test_it_agrees_to_far_more_digits_than_a_double_has_with_derivatives_of_the_
     tree = urdfkin.load("elbow").tree
     motion_of = exact_recursion.move(tree, read_exact(text, tree), moving.q, moving.v, moving.a)
     state = motion_of.states[tree.link_index("wrist")]
-    # The other source differentiates with a step of 1e-18 at 60 digits.
+    # The independent computation differentiates with a step of 1e-18 at 60 digits.
     for found, derivative, room in (
         (state.p, moving.d(6)(0), 1e-45),
         (state.vel, rate(moving.d(6), 0.0), 1e-33),
@@ -86,7 +86,7 @@ def test_it_agrees_to_far_more_digits_than_a_double_has_with_derivatives_of_the_
             assert abs(found[row] - derivative[row]) < room
 
 
-def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() -> None:
+def test_the_exact_jacobian_rate_is_the_difference_quotient_of_the_jacobian() -> None:
     moving = motion("polar", 13)
     step = 2.0**-50
     robot = urdfkin.load("polar")
@@ -108,15 +108,15 @@ def test_the_rate_of_the_jacobian_is_its_difference_quotient_to_many_digits() ->
 @pytest.mark.parametrize(
     ("name", "root_joint"), [("ur3_gripper", None), ("anymal", "floating"), ("solo8", "planar")]
 )
-def test_it_judges_followers_and_free_joints_too(name: str, root_joint: str | None) -> None:
-    demand_few_units(judge(urdfkin.load(name, root_joint=root_joint), samples=1))
+def test_errors_are_small_with_mimic_joints_and_free_joints(name: str, root_joint: str | None) -> None:
+    check_errors(accuracy_study(urdfkin.load(name, root_joint=root_joint), samples=1))
 
 
 @pytest.mark.long
 def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
+    right = {line.quantity: line for line in accuracy_study(urdfkin.load("ur5"), samples=2).lines}
     slightly_larger(monkeypatch, "placements", 16.0)
-    found = {line.quantity: line for line in judge(urdfkin.load("ur5"), samples=2).lines}
+    found = {line.quantity: line for line in accuracy_study(urdfkin.load("ur5"), samples=2).lines}
     assert not right["placement"].ours_is_worse
     assert found["placement"].ours_is_worse
     assert found["placement"].urdfkin.worst == pytest.approx(16.0, rel=0.2)
@@ -124,20 +124,20 @@ def test_an_error_of_sixteen_units_in_the_last_place_is_found(monkeypatch: pytes
 
 
 @pytest.mark.long
-def test_the_same_seed_gives_the_same_judgement() -> None:
-    first, again = (judge(urdfkin.load("polar"), samples=3, seed=4) for _ in range(2))
+def test_equal_seeds_give_equal_studies() -> None:
+    first, again = (accuracy_study(urdfkin.load("polar"), samples=3, seed=4) for _ in range(2))
     assert first == again
-    assert first != judge(urdfkin.load("polar"), samples=3, seed=5)
+    assert first != accuracy_study(urdfkin.load("polar"), samples=3, seed=5)
 
 
 def test_the_digits_of_true_values_grow_with_joints_before_a_link(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(accuracy, "DIGITS", 15)  # too few for 20 joints, as 50 are for 200
-    demand_few_units(judge(urdfkin.load(make_pages.askew(20), verify=False), samples=1))
+    monkeypatch.setattr(accuracy, "DIGITS", 15)  # too few for 20 joints, as 50 digits are for 200 joints
+    check_errors(accuracy_study(urdfkin.load(make_pages.askew(20), verify=False), samples=1))
 
 
 @pytest.mark.parametrize(("name", "samples"), [("fixed_only", 1), ("single_link", 1), ("one_joint", 0)])
-def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: str, samples: int) -> None:
-    lines = judge(robot_of(name), samples=samples).lines
+def test_a_robot_without_moving_joints_or_samples_has_the_same_lines(name: str, samples: int) -> None:
+    lines = accuracy_study(robot_of(name), samples=samples).lines
     assert len(lines) == 15
     assert all(line.numbers == 0 for line in lines if "jacobian" in line.quantity)
 
@@ -150,7 +150,7 @@ def test_where_nothing_moves_or_nothing_is_drawn_there_are_the_same_lines(name: 
         ((1.9, 1.9), (1.0, 1.0), False),
     ],
 )  # fmt: skip
-def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
+def test_the_worst_and_the_typical_errors_are_compared_separately(
     ours: tuple[float, float], theirs: tuple[float, float], worse: bool
 ) -> None:
     line = AccuracyLine("velocity", "local", 1, Errors(*ours), Errors(*theirs))
@@ -159,16 +159,16 @@ def test_the_worst_and_the_typical_error_are_each_held_against_their_own(
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ROBOTS)
-def test_urdfkin_is_never_the_worse_of_the_two_by_more_than_a_factor_of_two(name: str) -> None:
-    for line in judge(urdfkin.load(name), samples=5).lines:
+def test_the_errors_of_urdfkin_are_at_most_twice_those_of_pinocchio(name: str) -> None:
+    for line in accuracy_study(urdfkin.load(name), samples=5).lines:
         assert not line.ours_is_worse, line
 
 
 # -- a base that moves ---------------------------------------------------------------------------------
 
 
-def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
-    # The floating joint's rates are in its own axes: u = R^T vel, o = R^T w, and their rates.
+def test_a_moving_base_equals_a_floating_joint_with_the_same_motion() -> None:
+    # The velocities of the floating joint are in the child link's axes: u = R^T vel, o = R^T w.
     base, robot = draw_base(1, np.random.default_rng(3)), robot_of("tree_3")
     hung = robot_of("tree_3", root_joint="floating")
     generator = np.random.default_rng(4)
@@ -199,19 +199,19 @@ def test_a_moving_base_is_a_floating_joint_that_moves_alike() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "root_joint"), [("ur3_gripper", None), ("polar", "planar")])
-def test_it_judges_a_moving_base_too(name: str, root_joint: str | None) -> None:
+def test_errors_are_small_on_a_moving_base(name: str, root_joint: str | None) -> None:
     robot = urdfkin.load(name, root_joint=root_joint)
-    still = judge(robot, samples=2)
+    still = accuracy_study(robot, samples=2)
     for base in (draw_base(2, np.random.default_rng(1)), BaseMotion(velocity=np.arange(6.0))):
-        moving = judge(robot, samples=2, base=base)
+        moving = accuracy_study(robot, samples=2, base=base)
         assert moving.moving_base
         assert len(moving.lines) == len(still.lines)
         assert moving.lines != still.lines
-        demand_few_units(moving)
+        check_errors(moving)
 
 
 @pytest.mark.long
-def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_base_motion_that_differs_slightly_in_one_library_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, base = urdfkin.load("ur5"), draw_base(2, np.random.default_rng(1))
     original = recursion_base.BaseMotion.state
 
@@ -219,7 +219,7 @@ def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.Mon
         return original(self, batch_shape) * (1.0 + 1e-13)
 
     monkeypatch.setattr(recursion_base.BaseMotion, "state", off)
-    lines = judge(robot, samples=2, base=base).lines
+    lines = accuracy_study(robot, samples=2, base=base).lines
     assert all(line.ours_is_worse for line in lines if line.quantity != "analytical jacobian")
     assert max(line.pinocchio.worst for line in lines) < 40.0
 
@@ -228,7 +228,7 @@ def test_a_base_that_one_side_takes_for_another_is_found(monkeypatch: pytest.Mon
 
 
 def angles(name: str, R: object) -> list[object]:
-    """The angles of a rotation, as the chapter's text and a URDF's rpy define them, at 50 digits."""
+    """Return the angles of a rotation at 50 digits, as the textbook (ZYZ) and URDF (xyz) define them."""
     x, y, z = (tuple(row) for row in R)  # type: ignore[attr-defined]
     if name == "ZYZ":  # Rz(phi) Ry(theta) Rz(psi)
         return [arb.atan2(y[2], x[2]), z[2].acos(), arb.atan2(z[1], -z[0])]
@@ -237,7 +237,7 @@ def angles(name: str, R: object) -> list[object]:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["ZYZ", "xyz", "quaternion"])
-def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_its_numbers(name: str) -> None:
+def test_the_exact_analytical_jacobian_is_the_difference_quotient_of_the_pose(name: str) -> None:
     robot = urdfkin.load("panda")
     joints, link = read_exact(robot.urdf, robot.tree), robot.tree.frame_link("panda_hand")
     q, zeros, step = robot.sample(1, 5)[0], [0] * robot.nv, 2.0**-60
@@ -266,23 +266,23 @@ def test_the_analytical_jacobian_at_fifty_digits_is_the_difference_quotient_of_i
 
 
 @pytest.mark.parametrize("name", [name for name in SEQUENCES if name.islower()])
-def test_about_fixed_axes_the_numbers_are_those_about_turning_ones_last_row_first(name: str) -> None:
+def test_angles_about_fixed_axes_have_the_rows_of_euler_angles_in_reverse_order(name: str) -> None:
     robot = urdfkin.load("panda", verify=False)
     q = robot.sample(5, 0)
     both = (name, name.upper()[::-1])
-    fixed, turning = (robot.analytical_jacobian(q, "panda_hand", each) for each in both)
-    assert (fixed[:, :3] == turning[:, :3]).all()
-    assert (fixed[:, 3:] == turning[:, :2:-1]).all()
+    fixed, euler = (robot.analytical_jacobian(q, "panda_hand", each) for each in both)
+    assert (fixed[:, :3] == euler[:, :3]).all()
+    assert (fixed[:, 3:] == euler[:, :2:-1]).all()
 
 
 @pytest.mark.long
-def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_of_its_own_found(
+def test_an_error_of_the_analytical_jacobians_is_found_in_every_representation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     robot = urdfkin.load("ur5")
 
     def lines() -> dict[str | None, AccuracyLine]:
-        return {x.reference: x for x in judge(robot, samples=2).lines if x.quantity == quantity}
+        return {x.reference: x for x in accuracy_study(robot, samples=2).lines if x.quantity == quantity}
 
     quantity = "analytical jacobian"
     right = lines()
@@ -294,25 +294,25 @@ def test_an_analytical_jacobian_is_judged_in_every_representation_and_an_error_o
         assert line.pinocchio.worst < 5.0
         assert found[name].ours_is_worse
         assert found[name].pinocchio == line.pinocchio
-    # Two samples of eleven links of up to six columns, in twelve sequences; singular ones are left out.
+    # Two samples of eleven links with up to six columns, in twelve sequences; singular samples are left out.
     assert 1000 < right["euler angles"].numbers < 2 * 11 * 6 * 6 * 12
 
 
-def test_errors_that_are_the_same_double_are_equal_as_the_page_says() -> None:
+def test_errors_are_equal_only_if_they_are_the_same_double() -> None:
     def line(ours: float, theirs: float) -> AccuracyLine:
         return AccuracyLine("placement", "", 9, Errors(1.0, ours), Errors(1.0, theirs))
 
-    judged = Judgement("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
-    lines = plain(judged)["lines"]
-    assert [nearer(one) for one in lines] == ["urdfkin", "equal", "Pinocchio", "equal"]
+    study = AccuracyStudy("arm", 1, 0, (line(0.1, 0.2), line(0.2, 0.2), line(0.3, 0.2), line(0.1, 0.1)))
+    lines = plain(study)["lines"]
+    assert [more_accurate(one) for one in lines] == ["urdfkin", "equal", "Pinocchio", "equal"]
     counts = "urdfkin is more accurate in 1 of 4 lines, equal in 2, less accurate in 1"
-    assert nearer_counts(lines) == counts
-    assert judged_on(plain(judged)) == f"1 sample; {counts}"
-    assert f"\n{counts}. " in make_pages.study_parts({"arm": judged})["counts"]
+    assert more_accurate_counts(lines) == counts
+    assert accuracy_words(plain(study)) == f"1 sample; {counts}"
+    assert f"\n{counts}. " in make_pages.study_parts({"arm": study})["counts"]
 
 
-def test_polar_has_as_many_equal_lines_as_its_page_says() -> None:
-    lines = plain(judge(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
+def test_the_page_has_the_equal_lines_of_polar() -> None:
+    lines = plain(accuracy_study(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
     table = make_pages.path_of("judge").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)
-    assert [ours == theirs for ours, theirs in rows] == [nearer(line) == "equal" for line in lines]
+    assert [ours == theirs for ours, theirs in rows] == [more_accurate(line) == "equal" for line in lines]

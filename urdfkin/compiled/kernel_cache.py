@@ -1,4 +1,4 @@
-"""Find the cache folder of compiled kernels, and send messages about compilations, without importing Numba.
+"""Find the cache folder of compiled kernels, and report compilations to listeners, without importing Numba.
 
 Compiling a kernel takes seconds, and reading it from disk takes almost no time. Functions called listeners
 receive an event for each compilation that this process waits for.
@@ -19,16 +19,13 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: This lock protects the import of Numba and the compilations.
+#: Lock of the import of Numba and of compilations.
 #: A fork of the process waits for this lock, because the child could not finish an import or a compilation.
 #: Before a fork, Python acquires the locks in the reverse order of their creation.
 #: The import of Numba uses the lock of the module `logging`, so `compiling` must be created after that lock.
-#: The lock `compiling` exists before the import of Numba begins.
 compiling = lock_over_forks()
 
-#: A listener receives the events of compilations.
-#: When a compilation begins, the function is called with the kernel's name and None.
-#: When the kernel is ready, the function is called with the kernel's name and the duration in seconds.
+#: A function of the kernel's name and the duration in seconds (None when the compilation begins).
 Listener = Callable[[str, float | None], None]
 
 
@@ -62,26 +59,26 @@ def compile_event(name: str) -> Iterator[Callable[[], None]]:
 
     The context yields a function, which the caller must call before it compiles the kernel.
     """
-    begun: list[float] = []
+    starts: list[float] = []
 
-    def missed() -> None:
-        begun.append(time.perf_counter())
+    def begin() -> None:
+        starts.append(time.perf_counter())
         _listeners[-1](name, None)
 
-    yield missed
-    if begun:
-        _listeners[-1](name, time.perf_counter() - begun[0])
+    yield begin
+    if starts:
+        _listeners[-1](name, time.perf_counter() - starts[0])
 
 
 @cache
 def cache_folder() -> Path | None:
     """Return the cache folder of compiled kernels; None if no folder is writable."""
     with importing:
-        from urdfkin.system.cache import kept_folder
+        from urdfkin.system.cache import cache_folder
 
     numba = sys.modules.get("numba")
     chosen = numba.config.CACHE_DIR if numba else os.environ.get("NUMBA_CACHE_DIR")
     python = sys.implementation.cache_tag + sys.abiflags
     versions = installed_version("numba") or "", installed_version("llvmlite") or "", python
     sources = [*Path(__file__).parent.rglob("*.py"), *Path(equations.__file__).parent.glob("*.py")]
-    return kept_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)
+    return cache_folder("kernels", sorted(sources), *versions, root=Path(chosen) if chosen else None)
