@@ -44,8 +44,6 @@ from urdfkin.errors import InputError, SourceError, UnknownNameError, UrdfkinErr
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot.loading import load
 
-ROWS = [[0.0, "pi/2", 0.3, 0.0, "R"], [0.4, 0.0, 0.0, -1.0, "P"]]
-
 
 @pytest.mark.slow
 @given(trees(), st.sampled_from(CONVENTIONS), st.sampled_from(["toml", "json", "csv"]))
@@ -58,14 +56,6 @@ def test_a_written_table_reads_back_to_the_bit(tree: KinematicTree, convention: 
     assert (again.robot, again.base_frame, again.tip_frame) == (table.robot, "l0", "tip")
     np.testing.assert_array_equal(again.base, table.base)
     np.testing.assert_array_equal(again.tool, table.tool)
-
-
-def test_a_file_is_read_by_its_ending(tmp_path: Path) -> None:
-    path = tmp_path / "arm.json"
-    path.write_text(json.dumps({"convention": "standard", "rows": ROWS}))
-    table = read_table(path)
-    assert [row.kind.value for row in table.rows] == ["revolute", "prismatic"]
-    assert table.joint_names == ("joint_1", "joint_2")
 
 
 def test_a_broken_or_missing_file_is_named(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""All frames at once, J-dot, the breakdown and the manipulator Jacobian, on a still and on a moving base."""
+"""J-dot, the breakdown and the manipulator Jacobian, on a still and on a moving base."""
 
 import numpy as np
 import pytest
@@ -37,18 +37,6 @@ def test_everything_agrees_with_pinocchio_also_on_a_free_flyer(
     certificate = robot.certificate()
     assert certificate.verified
     assert {line.quantity for line in certificate.lines} >= {"jacobian rate", "acceleration"}
-
-
-def test_all_frames_are_those_asked_for_one_by_one() -> None:
-    robot = urdfkin.load("panda")
-    q = robot.sample(3, 4)
-    v, a = np.random.default_rng(5).normal(size=(2, 3, robot.nv))
-    frames = ["panda_hand", "panda_link3", "panda_joint5"]
-    together = robot.acceleration(q, v, a, frames)
-    assert together.shape == (3, 3, 6)
-    for i, frame in enumerate(frames):
-        assert np.abs(together[:, i] - robot.acceleration(q, v, a, frame)).max() <= 1e-14
-    assert robot.jacobian(q[0], robot.link_frames).shape == (len(robot.link_names), 6, robot.nv)
 
 
 def test_a_wrong_rate_of_the_jacobian_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,8 +94,7 @@ class ProductOfExponentials(Displayable):
         """(n, 6) screws in the tip frame: B = Ad(M^-1) S.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.body[1].tolist()
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").body[1].tolist()
         [0.0, 0.0, 1.0, 0.0, 0.4, 0.0]
         """
         R, p = self.M[:3, :3], self.M[:3, 3]
@@ -107,8 +106,7 @@ class ProductOfExponentials(Displayable):
         """The map from the path's coordinates to its joints' values.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.coupling.names
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").coupling.names
         ('joint_1', 'joint_2')
         """
         return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
@@ -120,8 +118,7 @@ class ProductOfExponentials(Displayable):
         A prismatic joint has the point of the previous joint.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.points.tolist()
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").points.tolist()
         [[0.0, 0.0, 0.0], [0.5, 0.0, -0.0]]
         """
         here, found = np.zeros(3), []
@@ -139,8 +136,7 @@ class ProductOfExponentials(Displayable):
             InputError: `q` has the wrong length.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.placement([0.0, 0.0])[:3, 3].tolist()
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").placement([0.0, 0.0])[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
         return self.path.poses(self.coupling.values(q))
@@ -154,8 +150,7 @@ class ProductOfExponentials(Displayable):
         A_{i+1}. The last constant pose is A_n^-1 M.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.path.poses(np.zeros(2))[:3, 3].tolist()
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").path.poses(np.zeros(2))[:3, 3].tolist()
         [0.9, 0.0, 0.0]
         """
         steps, R, p = list[FloatArray | ElementaryMotion](), np.eye(3), np.zeros(3)
@@ -173,8 +168,7 @@ class ProductOfExponentials(Displayable):
         effect of rounding in q.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.roundings < 1000
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000
         True
         """
         return 2.0 * of_rows(len(self.joints))
@@ -183,8 +177,7 @@ class ProductOfExponentials(Displayable):
         """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> bool(screws.rounding([0.0, 0.0]) < 1e-13)
+        >>> bool(urdfkin.load("planar_two_link").screws("tip", "base").rounding([0.0, 0.0]) < 1e-13)
         True
         """
         values = np.abs(self.coupling.values(q))
@@ -201,8 +194,7 @@ class ProductOfExponentials(Displayable):
         of the link's joint.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.to_tree().links
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").to_tree().links
         ('base', 'joint_1_link', 'joint_2_link', 'tip')
         """
         links = [self.base_frame, *(f"{joint.name}_link" for joint in self.joints), self.tip_frame]
@@ -221,8 +213,7 @@ class ProductOfExponentials(Displayable):
         """Return the screws as plain data for `screws_of_mapping`, without mimic rules and limits.
 
         >>> import urdfkin
-        >>> screws = urdfkin.load("planar_two_link").screws("tip", "base")
-        >>> screws.as_mapping()["joints"]
+        >>> urdfkin.load("planar_two_link").screws("tip", "base").as_mapping()["joints"]
         ['joint_1', 'joint_2']
         """
         return {

@@ -113,8 +113,7 @@ class DHRow:
         """The numbers of the row: (a, alpha, d, theta, beta).
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.rows[0].cells
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].cells
         (0.5, 0.0, 0.0, 0.0, 0.0)
         """
         return (self.a, self.alpha, self.d, self.theta, self.beta)
@@ -127,8 +126,7 @@ class DHRow:
         distance from this intersection to the common normal is |a sin(beta)| / sin^2(tilt).
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.rows[0].foot
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].foot
         0.0
         """
         across, along = math.sin(self.alpha) * math.cos(self.beta), math.sin(self.beta)
@@ -139,8 +137,7 @@ class DHRow:
         """The (4, 4) transform Tx(a) Rx(alpha) Ry(beta).
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.rows[0].X[:3, 3].tolist()
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].X[:3, 3].tolist()
         [0.5, 0.0, 0.0]
         """
         return between_axes(self.a, self.alpha, self.beta)
@@ -150,8 +147,7 @@ class DHRow:
         """The (4, 4) transform Rz(theta) Tz(d), with the joint at zero.
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.rows[0].S[0].tolist()
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].S[0].tolist()
         [1.0, -0.0, 0.0, 0.0]
         """
         return along_axis(self.theta, self.d)
@@ -327,8 +323,7 @@ class DHTable(Displayable):
         InputError: two rows name the same joint, or base or tool is not a rigid transform.
 
     >>> import urdfkin
-    >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-    >>> print(table)
+    >>> print(urdfkin.load("planar_two_link").dh("tip", "base"))
     planar_two_link: base to tip, standard Denavit-Hartenberg parameters
     T(i-1, i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)
     <BLANKLINE>
@@ -394,8 +389,7 @@ class DHTable(Displayable):
         """Return the table in LaTeX (amsmath, booktabs, graphicx); arguments as in `to_markdown`.
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> "tabular" in table.to_latex()
+        >>> "tabular" in urdfkin.load("planar_two_link").dh("tip", "base").to_latex()
         True
         """
         return self._in_form("latex", units_of(angles, lengths, digits))
@@ -429,8 +423,7 @@ class DHTable(Displayable):
         """The map from the table's coordinates to its joints' values.
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.coupling.names
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").coupling.names
         ('joint_1', 'joint_2')
         """
         return coupling_of([(row.joint, row.mimic, row.kind) for row in self.rows])
@@ -440,8 +433,7 @@ class DHTable(Displayable):
         """Names of the table's coordinates, in row order: the independent and the mimicked joints.
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.joint_names
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").joint_names
         ('joint_1', 'joint_2')
         """
         return self.coupling.names
@@ -453,8 +445,7 @@ class DHTable(Displayable):
         """Whether any row has a fifth parameter, beta.
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.has_hayati_rows
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").has_hayati_rows
         False
         """
         return any(row.beta != 0.0 for row in self.rows)
@@ -464,8 +455,7 @@ class DHTable(Displayable):
         """Sum (metres) of all |a|, all |d| and the length of the tool, with all joints at zero.
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> table.span
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").span
         0.9
         """
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
@@ -479,8 +469,7 @@ class DHTable(Displayable):
         error in radians.
 
         >>> import urdfkin
-        >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
-        >>> bool(table.rounding([0.0, 0.0]) < 1e-13)
+        >>> bool(urdfkin.load("planar_two_link").dh("tip", "base").rounding([0.0, 0.0]) < 1e-13)
         True
         """
         values = np.abs(self.coupling.values(q))

@@ -31,7 +31,7 @@ from urdfkin.dh.common_normals import (
     tilt_of,
 )
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
-from urdfkin.dh.export.text import added
+from urdfkin.dh.export.text import format_sum
 from urdfkin.dh.table import along_axis, between_axes, cleaned_angle
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
@@ -83,7 +83,7 @@ class TreeParameters:
     """The table of a whole robot, with a row for each joint, including fixed joints.
 
     Attributes:
-        ways: (joints,) path length (metres) from the root to each joint: the sum of the URDF's offsets.
+        path_lengths: (joints,) sum of the URDF's offsets (metres) from the root to each joint.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
         left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero as
             rounding errors (`urdfkin.dh.common_normals`).
@@ -92,7 +92,7 @@ class TreeParameters:
     robot: str
     root: str
     rows: tuple[TreeRow, ...]
-    ways: FloatArray
+    path_lengths: FloatArray
     T_frame_link: FloatArray
     left_out: float = 0.0
 
@@ -119,7 +119,7 @@ class TreeParameters:
         reach = np.zeros((*q.shape[:-1], len(self.rows)))
         for j in range(len(self.rows)):
             path = self._path(j)
-            in_urdf = self.ways[j] + travel[..., path].sum(axis=-1)
+            in_urdf = self.path_lengths[j] + travel[..., path].sum(axis=-1)
             reach[..., j] = np.maximum(lengths[..., path].sum(axis=-1), in_urdf)
         return reach
 
@@ -323,9 +323,9 @@ def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
     # The constant in a mimic joint's cell includes the offset of the mimic rule.
     variable = f"q({row.leader})" if row.leader == row.joint else f"{row.multiplier:.10g} q({row.leader})"
     if row.sigma == 0:
-        theta = added(variable, units.angle(row.theta + row.offset))
+        theta = format_sum(variable, units.angle(row.theta + row.offset))
     elif row.sigma == 1:
-        r = added(variable, units.length(row.r + row.offset))
+        r = format_sum(variable, units.length(row.r + row.offset))
     cells = [str(j), row.joint, str(row.antecedent + 1), str(row.sigma), units.angle(row.gamma)]
     cells += [units.length(row.b), units.angle(row.alpha), units.length(row.d), theta, r]
     return [*cells, units.angle(row.beta)]

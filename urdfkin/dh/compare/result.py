@@ -9,7 +9,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from urdfkin.dh.export.text import added, pose_matrix
+from urdfkin.dh.export.text import format_sum, pose_matrix
 from urdfkin.dh.table import DHRow, DHTable, nearest_twelfth
 from urdfkin.dh.units import Units
 from urdfkin.errors import QuestionsSection
@@ -236,7 +236,7 @@ def _fitted(found: TableComparison, units: Units) -> Parts:
     parts: Parts = []
     table, fine = found.reference, found.resolution
     variables = [
-        f"  {row.joint}: {added('-q' if sense < 0 else 'q', _format_offset(offset, row, fine, units))}"
+        f"  {row.joint}: {format_sum('-q' if sense < 0 else 'q', _format_offset(offset, row, fine, units))}"
         for row, sense, offset in zip(table.rows, found.senses, found.offsets, strict=True)
         if sense < 0 or abs(offset) > fine
     ]

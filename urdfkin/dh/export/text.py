@@ -61,7 +61,7 @@ def constant_of(row: DHRow) -> float:
     return cell + row.sense * row.mimic.offset if row.mimic else cell
 
 
-def added(variable: str, constant: str) -> str:
+def format_sum(variable: str, constant: str) -> str:
     """Format `variable + constant` without zero terms and double signs."""
     if constant == "0":
         return variable
@@ -73,25 +73,30 @@ def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any
     q = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
     if row.kind.turns:
-        theta = added(q, units.angle(constant_of(row), pi))
+        theta = format_sum(q, units.angle(constant_of(row), pi))
     else:
-        d = added(q, units.length(constant_of(row)))
-    named = {"a": units.length(row.a), "alpha": units.angle(row.alpha, pi), "d": d, "theta": theta}
-    texts = [named[name] for name in units.columns]
-    return [*texts, units.angle(row.beta, pi)] if table.has_hayati_rows else texts
+        d = format_sum(q, units.length(constant_of(row)))
+    a, alpha, beta = units.length(row.a), units.angle(row.alpha, pi), units.angle(row.beta, pi)
+    texts = {"a": a, "alpha": alpha, "d": d, "theta": theta, "beta": beta}
+    return [texts[name] for name in _columns(table, units)]
+
+
+def _columns(table: DHTable, units: Units) -> list[str]:
+    return [*units.columns, *["beta"] * table.has_hayati_rows]
 
 
 def headings(table: DHTable, units: Units) -> list[str]:
     at = "(i-1)" if table.convention is DHConvention.MODIFIED else ""
-    angle, length = units.angle_name, units.length_name
-    named = {
-        "a": f"a{at} [{length}]",
-        "alpha": f"alpha{at} [{angle}]",
-        "d": f"d [{length}]",
-        "theta": f"theta [{angle}]",
-    }
-    names = [named[name] for name in units.columns]
-    return [*names, f"beta{at} [{angle}]"] if table.has_hayati_rows else names
+    symbols = {"a": f"a{at}", "alpha": f"alpha{at}", "d": "d", "theta": "theta", "beta": f"beta{at}"}
+    return _with_units(table, units, symbols, units.angle_name)
+
+
+def _with_units(table: DHTable, units: Units, symbols: dict[str, str], angle: str) -> list[str]:
+    """Return the symbols of the columns with their units; `angle` is the text for the unit of angles."""
+    return [
+        f"{symbols[name]} [{units.length_name if name in ('a', 'd') else angle}]"
+        for name in _columns(table, units)
+    ]
 
 
 def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
@@ -169,19 +174,11 @@ def write_html(table: DHTable, units: Units) -> str:
 
 def write_latex(table: DHTable, units: Units) -> str:
     """Return a LaTeX table environment; it needs the packages amsmath, booktabs and graphicx."""
-    modified = table.convention is DHConvention.MODIFIED
-    at = "_{i-1}" if modified else "_i"
+    at = "_{i-1}" if table.convention is DHConvention.MODIFIED else "_i"
     angle = "rad" if units.angles is Angles.RADIANS else r"$^\circ$"
-    length = units.length_name
-    named = {
-        "a": f"$a{at}$ [{length}]",
-        "alpha": rf"$\alpha{at}$ [{angle}]",
-        "d": f"$d_i$ [{length}]",
-        "theta": rf"$\theta_i$ [{angle}]",
-    }
-    heads = [r"$i$", "joint", *(named[name] for name in units.columns)]
-    if table.has_hayati_rows:
-        heads.append(rf"$\beta{at}$ [{angle}]")
+    symbols = {"a": f"$a{at}$", "alpha": rf"$\alpha{at}$", "d": "$d_i$", "theta": r"$\theta_i$"}
+    symbols["beta"] = rf"$\beta{at}$"
+    heads = [r"$i$", "joint", *_with_units(table, units, symbols, angle)]
     rows = []
     for i, row in enumerate(table.rows, 1):
         texts = cells(table, row, units, pi=r"\pi", times=r"\,", name="q_{{{}}}")
