@@ -137,7 +137,7 @@ def test_a_tables_data_are_judged_as_a_robots() -> None:
     drawn = table(DHConvention.STANDARD)
     model = table_model(drawn, ("origins",))
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
-    T = model.way.poses(q, model.way.start + 1e-3)
+    T = model.chain.poses(q, model.chain.start + 1e-3)
     calibrate(drawn, q, T)
     with pytest.raises(ImplausibleError, match="q is shifted by one row"):
         calibrate(drawn, np.roll(q, 1, axis=0), T)
@@ -200,7 +200,7 @@ def test_a_refused_fit_is_had_by_force() -> None:
 
 
 def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
-    names = [str(parameter) for parameter in arm("ur5").model.way.parameters]
+    names = [str(parameter) for parameter in arm("ur5").model.chain.parameters]
     truth = np.zeros(len(names))
     truth[names.index("elbow_joint y")] = 1e-3
     true, q = replace(arm("ur5"), truth=truth), arm("ur5").robot.sample(60, 5)
@@ -211,7 +211,7 @@ def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
     assert len(few.written_parameters) <= 4
     assert (present(every.fitted).at == present(few.fitted).at).all()
     # The written parameters move the tip as the true ones do, within the noise.
-    found = few.model.way.poses(true.values(q), present(few.written_fit).at)
+    found = few.model.chain.poses(true.values(q), present(few.written_fit).at)
     assert np.abs(found - true.poses(q)).max() < 1e-4
     assert set(few.origins) == {few.parameters[k].where for k in few.written_parameters}
 

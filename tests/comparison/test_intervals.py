@@ -23,7 +23,14 @@ from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
 from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, FramePair, Gauge, Screw, screw_motion, variables_of
+from urdfkin.model.mechanisms.mechanism import (
+    AS_WRITTEN,
+    AlignmentChoices,
+    FramePair,
+    Screw,
+    screw_motion,
+    variables_of,
+)
 from urdfkin.model.mechanisms.upper_bound import FINE, Grid, curvature, point, relevant_joints, upper_bounds
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.same import where
@@ -109,9 +116,11 @@ def searched_boxes(name: str, what: str, link: str) -> tuple[DistanceSearch, Fra
     return laid(robot(name), present(changed(name, what)), link)
 
 
-def laid(a: Robot, b: Robot, link: str, gauge: Gauge | None = None) -> tuple[DistanceSearch, FramePair]:
+def laid(
+    a: Robot, b: Robot, link: str, choices: AlignmentChoices | None = None
+) -> tuple[DistanceSearch, FramePair]:
     judge = Comparator((a, b), {}, bounds=True)
-    found = align(*judge.mechanisms, {}, gauge)
+    found = align(*judge.mechanisms, {}, choices)
     frame = next(one for one in found.frames if a.tree.links[one.a] == link)
     return judge.search(found, variables_of(found, judge.tolerance)), frame
 

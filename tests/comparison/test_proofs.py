@@ -298,10 +298,10 @@ def test_a_recheck_rejects_the_verdict_differs_if_another_alignment_agrees(
 ) -> None:
     a = reversed_axis[0]
     comparator = Comparator((a, copy.copy(a)), {}, bounds=True)
-    gauge = align(*comparator.mechanisms, {}).gauge
-    moved = gauge.X.copy()
+    choices = align(*comparator.mechanisms, {}).choices
+    moved = choices.X.copy()
     moved[2, 3] = 0.5
-    raised = align(*comparator.mechanisms, {}, replace(gauge, X=moved))
+    raised = align(*comparator.mechanisms, {}, replace(choices, X=moved))
     with monkeypatch.context() as patched:
         patched.setattr(Comparator, "alignment", lambda _: raised)
         found = urdfkin.same(a, copy.copy(a))

@@ -382,10 +382,10 @@ class Tolerance:
     """The largest angle (rad) and the largest distance (m) that rounding errors can explain."""
 
     angle: float
-    way: float
+    distance: float
 
-    def holds(self, angle: float, way: float) -> bool:
-        return angle <= self.angle and way <= self.way
+    def holds(self, angle: float, distance: float) -> bool:
+        return angle <= self.angle and distance <= self.distance
 
 
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
@@ -559,10 +559,10 @@ class Alignment:
         return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
 
     @property
-    def gauge(self) -> Gauge:
+    def choices(self) -> AlignmentChoices:
         """The choices that this alignment made, for example the zero offset of each joint."""
         joints = self.a.tree.joints
-        return Gauge(
+        return AlignmentChoices(
             (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
             self.X,
             {joints[step.a].name: (step.sense, step.offset) for step in self.steps},
@@ -622,7 +622,7 @@ class Alignment:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gauge:
+class AlignmentChoices:
     """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
@@ -642,7 +642,7 @@ class Gauge:
 
 
 #: The choices for a comparison without changes: equal root poses, and equal coordinates for each joint.
-AS_WRITTEN = Gauge()
+AS_WRITTEN = AlignmentChoices()
 
 
 @dataclass(frozen=True, slots=True)
