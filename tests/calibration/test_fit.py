@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
-from tests.calibration.test_way import table
+from tests.calibration.test_parameters import table
 from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, calibrate, doubts
 from urdfkin.calibration.fit import stacked
@@ -195,7 +195,7 @@ def test_an_unknown_set_of_parameters_offers_the_nearest() -> None:
         calibrate("ur5", fit=["offset"])
 
 
-# -- how many numbers poses can tell is known for every arm; what stands still does what others do -----------
+# -- identifiable parameters ----------------------------------------------------------------------
 
 
 ARMS = {"ur5": ("tool0", "base"), "panda": ("panda_hand", "panda_link0"), BRANCHED: ("hand", "b")}

@@ -1,4 +1,4 @@
-"""A fit to wrong data is refused with the mistake that was made; a good one never is."""
+"""A fit to wrong data is refused, and the error names the mistake; a good fit is never refused."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
-from tests.calibration.test_way import table
+from tests.calibration.test_parameters import table
 from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, ImplausibleError, calibrate
 from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.table import DHConvention
 from urdfkin.model.tree import FloatArray
 
-pytestmark = pytest.mark.slow  # a second each, forty of them; those of panda and z1 are long
+pytestmark = pytest.mark.slow
 
 ALL = ["base", "tool", "origins"]
-#: Text or name, tip, base.
+#: URDF text or catalogue name, tip and base of each arm.
 ARMS = {
     "ur5": ("ur5", "tool0", "base"),
     "panda": ("panda", "panda_hand", "panda_link0"),
@@ -103,7 +103,7 @@ def test_the_joint_whose_sign_is_wrong_is_named(name: str, fit: list[str]) -> No
             assert f"likeliest reason: the sign of joint {joint!r} is wrong" in said, said
 
 
-#: Joints whose reversed sign the free base or tool does as well, together with another one's zero.
+#: Joints whose reversed sign has the effect of another joint's zero and a free base or tool.
 _ABSORBED = {"branched": ("three", "four")}
 
 
@@ -118,7 +118,7 @@ def test_a_gain_or_a_tilted_axis_does_not_hide_a_wrong_sign() -> None:
     assert "'elbow_joint' is wrong" in reason("ur5", q, fit=["origins", "gains"])
     q = arm("ur5").q
     assert "degrees" in reason("ur5", np.degrees(q), fit=["origins", "gains"])
-    # Positions alone are met exactly by an axis that is turned about.
+    # A reversed axis fits measured positions exactly.
     q = arm("through the trunk").q.copy()
     q[:, arm("through the trunk").robot.coordinate_names.index("three")] *= -1.0
     said = refused("through the trunk", q, complete=False, fit=["origins"])
@@ -151,7 +151,7 @@ def test_good_data_are_never_refused(name: str, complete: bool) -> None:
     text, tip, base = ARMS[name]
     for error, noise, poses, seed in [
         (2e-3, 0.0, 20, 0),
-        (0.0, 1e-3, 40, 1),  # calibrated already: nothing is left but noise
+        (0.0, 1e-3, 40, 1),  # calibrated already: the residuals are only noise
         (1e-3, 5e-3, 60, 2),
         (1e-2, 1e-4, 15, 3),
         (3e-2, 1e-5, 30, 4),
@@ -186,7 +186,7 @@ def test_few_distinct_configurations_are_refused() -> None:
 def test_values_beyond_a_turn_are_taken_for_degrees_unless_they_are_said_to_be_radians() -> None:
     true = arm("branched")
     q = true.q.copy()
-    q[:, true.robot.coordinate_names.index("four")] += 4.0 * np.pi  # a continuous joint, wound up
+    q[:, true.robot.coordinate_names.index("four")] += 4.0 * np.pi  # a continuous joint after two full turns
     said = refused("branched", q, fit=["origins"])
     assert "joint values of more than one turn look like degrees: joint 'four'" in said
     found = fitted("branched", q, fit=["origins"], radians=True)

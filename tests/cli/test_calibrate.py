@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tests.calibration.arms import BRANCHED, bench
-from tests.calibration.test_way import table
+from tests.calibration.test_parameters import table
 from tests.cli.running import good, urdfkin
 from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.export import export

@@ -1,4 +1,4 @@
-"""How the tip moves with each parameter, against difference quotients at fifty digits."""
+"""Derivatives of the tip's pose by each parameter, compared with difference quotients at fifty digits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from urdfkin.robot.loading import load
 from urdfkin.verify.exact.numbers import ExactJoint, about, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 
-#: Small enough that its square is no digit of a double, large enough to keep thirty of fifty digits.
+#: Step of the difference quotients: its square is below the precision of a double, and thirty digits remain.
 STEP = exact(2.0**-66)
 Pose = tuple[Matrix, Vector]
 
@@ -55,7 +55,7 @@ def elementary(turns: bool, axis: int, value: Number) -> Pose:
 
 
 def quotients(model: CalibrationModel, tip: Callable[[dict[int, Number]], Pose]) -> FloatArray:
-    """(6, p) twists of the tip for each parameter, of poses at fifty digits."""
+    """Return the twists (6, p) of the tip by each parameter, from poses at fifty digits."""
     found = np.zeros((6, len(model.chain.parameters)))
     here = tip({})
     for k in range(len(model.chain.parameters)):
@@ -69,7 +69,7 @@ def quotients(model: CalibrationModel, tip: Callable[[dict[int, Number]], Pose])
 
 
 def six(model: CalibrationModel, where: str, moved: dict[int, Number]) -> Pose:
-    """What the six of a place do."""
+    """Return the motion by the six parameters of a joint, the base or the tool."""
     push: Pose = IDENTITY, ZERO
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.where == where and parameter.what != "gain":
