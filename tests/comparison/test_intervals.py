@@ -123,7 +123,7 @@ def search_of(
 
 def bounds_of(search: DistanceSearch, frame: FramePair) -> tuple[Sequence[str], FloatArray]:
     """Return the variables' names, and bounds on the second derivatives by the variables."""
-    steps, some = relevant_joints(search.found, search.variables, frame)
+    steps, some = relevant_joints(search.alignment, search.variables, frame)
     return curvature(steps, [one for one in some if one is not None], search.variables, frame)
 
 
@@ -181,7 +181,7 @@ def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() 
         )
 
     search, frame = search_of(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
-    upper = upper_bounds(search.found, search.variables, frame, FINE)[0]
+    upper = upper_bounds(search.alignment, search.variables, frame, FINE)[0]
     attained = s * np.sqrt(2.0)
     assert search.largest_distances([frame])[0][0] == pytest.approx(attained, rel=0.01)
     # A proven bound is not below the attained distance, even if the target is.
@@ -239,7 +239,7 @@ def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, lin
 def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> None:
     search, frame = search_of(robot("panda"), present(changed("panda", "rounded")), "panda_hand_tcp")
     lower, _ = search.largest_distances([frame])[0]
-    upper, _ = upper_bounds(search.found, search.variables, frame, FINE)
+    upper, _ = upper_bounds(search.alignment, search.variables, frame, FINE)
     assert upper > 1.6 * lower
     assert tighten(search, frame, 1.05 * lower, upper) == 1.05 * lower
     assert tighten(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"

@@ -436,7 +436,7 @@ def _interval_errors(
     for grid in (COARSE, FINE):
         proven = math.inf, math.inf
         if not search.unbounded:
-            proven = upper_bounds(search.found, search.variables, frame, grid)
+            proven = upper_bounds(search.alignment, search.variables, frame, grid)
         if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
             break
     if holds:

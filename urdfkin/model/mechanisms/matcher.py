@@ -312,7 +312,7 @@ class MechanismMatcher:
     def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
         """Return two links of matched bodies that can be different end-effector frames.
 
-        The result is None if links of the bodies match, or if a body has only links of the other model.
+        The result is None if links of the bodies match, or if a body has only link names of the other model.
         """
         ours, theirs = self._own_links(place)
         if matched or not ours or not theirs:
@@ -794,10 +794,10 @@ class _Rule:
         return self.free or abs(difference) <= LEVER * tolerance.angle * max(1.0, abs(offset))
 
 
-def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
+def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
     """Return {name in A: (sign, zero offset)} for joints whose zero offset the mimic rules determine."""
     zeros = dict[str, tuple[int, float]]()
-    for rules in _groups(found):
+    for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
         # Only joint pairs with the most frequent quotient alpha get a new zero offset.
         alpha = max(
@@ -813,8 +813,8 @@ def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple
         for rule in fit:
             wanted = rule.wanted(beta)
             if rule.allows(wanted, tolerance) and not _near(wanted, rule.offset, tolerance):
-                step = found.steps[rule.step]
-                zeros[found.a.tree.joints[step.a].name] = step.sense, wanted
+                step = alignment.steps[rule.step]
+                zeros[alignment.a.tree.joints[step.a].name] = step.sense, wanted
     return zeros
 
 
@@ -822,16 +822,16 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
     return abs(x - y) <= 0.5 * tolerance.angle * max(1.0, abs(x), abs(y))
 
 
-def _groups(found: Alignment) -> Iterator[list[_Rule]]:
+def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
     """Yield groups of joint pairs that depend on one coordinate of A and one coordinate of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
-    for i, step in enumerate(found.steps):
+    for i, step in enumerate(alignment.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):
             continue
-        x, m, c = _as_rule(found.a.tree.joints[step.a])
-        y, n, d = _as_rule(found.b.tree.joints[step.b])
+        x, m, c = _as_rule(alignment.a.tree.joints[step.a])
+        y, n, d = _as_rule(alignment.b.tree.joints[step.b])
         slope, constant = step.sense * m, step.sense * c
-        determined, meets = _is_determined(found, i)
+        determined, meets = _is_determined(alignment, i)
         rule = _Rule(i, slope, constant, n, d, step.offset, step.kind == "turns", not determined, meets)
         groups.setdefault((x, y), []).append(rule)
     yield from (rules for rules in groups.values() if len(rules) > 1)
@@ -843,17 +843,17 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
     return (joint.name, 1.0, 0.0) if rule is None else (rule.leader, rule.multiplier, rule.offset)
 
 
-def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
+def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
     """Return whether axes or links with equal names determine a joint's zero offset, and `_Rule.meets`."""
-    names = set(found.a.labels) & set(found.b.labels)
+    names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
-    for k, step in enumerate(found.steps):
+    for k, step in enumerate(alignment.steps):
         if step.previous in behind:
-            if step.differs or step.unlike or step.conversion or not _keeps_axis(found.steps[i], step):
+            if step.differs or step.unlike or step.conversion or not _keeps_axis(alignment.steps[i], step):
                 return True, True
             behind.add(k)
-    carried = [frame for frame in found.frames if frame.previous in behind]
-    determined = any(found.a.labels[frame.a] in names for frame in carried)
+    carried = [frame for frame in alignment.frames if frame.previous in behind]
+    determined = any(alignment.a.labels[frame.a] in names for frame in carried)
     return determined, any(frame.tool is IDENTITY for frame in carried)
 
 
