@@ -4,11 +4,11 @@
     python scripts/check_same.py --keep pairs.jsonl panda    # only some robots
 
 There are twenty-one changes. After eleven of these changes, a robot is still the same
-(`tests/comparison/pairs.py`). If `same` reports two robots as the same, all links must have the placements
-that `same` predicts, at random configurations. If the robots differ, an independent global search looks for
-the largest distance between a frame of A and the same frame of B. This distance is computed with fifty digits
-from the decimals in the texts of the two robots, and must lie in the interval of `same`. Exit 1: a distance
-is outside its interval, or a verdict is wrong.
+(`tests/comparison/pairs.py`): all links must then have the poses that `same` predicts, at random
+configurations. After the other changes, the robot differs. An independent global search then looks for the
+largest distance between a frame of the robot and the frame of the changed robot. This distance is computed
+with fifty digits from the decimals in the texts of the two robots, and must lie in the interval of `same`.
+Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
 
 import argparse
@@ -26,10 +26,9 @@ from typing import Any
 import numpy as np
 
 import urdfkin
-from tests.comparison.pairs import ALIKE, UNLIKE, changed, robot
+from tests.comparison.pairs import ALIKE, UNLIKE, changed, moves_alike, robot
 from tests.comparison.searching import far, searched
-from urdfkin.comparison.result import Sameness, Verdict
-from urdfkin.robot import Robot
+from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
 #: Maximum rounding error of a placement in a robot of a few metres (m, and entries of a rotation matrix).
@@ -44,35 +43,20 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     began = time.process_time()
     found = urdfkin.same(a, b, bounds=what in UNLIKE)
     seconds = round(time.process_time() - began, 2)
-    said = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
+    result = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
-        return said | {"right": bool(found) and _places_agree(found, a, b)}
+        return result | {"right": bool(found) and moves_alike(found, a, b, ROUNDING)}
     # Rounding to four digits may not change a file, so both verdicts are correct.
-    said["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
-    # The frame with the largest distance, without frames that moved on their bodies
-    frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
+    result["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
+    tools = {tool.b for tool in found.tools}
+    frames = [frame for frame in found.frames if frame.frame_b not in tools and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
     if worst is None or not math.isfinite(worst.upper) or not np.array_equal(found.base, np.eye(4)):
-        return said
+        return result
     attained = far(a, b, np.array(worst.q_a), np.array(worst.q_b), worst)
     truth = max(attained, searched(a, b, found.to_b, worst))
-    said |= {"frame": worst.frame, "lower": worst.lower, "upper": worst.upper, "truth": truth}
-    return said | {"holds": worst.lower <= attained and truth <= worst.upper}
-
-
-def _tools(found: Sameness) -> set[str]:
-    """Return the frames of B that `same` reports as moved on their bodies."""
-    return {line.split()[1] for line in found.after if line.startswith("frame ")}
-
-
-def _places_agree(found: Sameness, a: Robot, b: Robot) -> bool:
-    """Return whether each link has the same placement in A and B, at corresponding random configurations."""
-    q, base = a.sample(5, 1), f"link:{found.base_links[1]}"
-    links = [pair for pair in found.links if pair[1] not in _tools(found)]
-    T_a = a.placement(q, [f"link:{ours}" for ours, _ in links])
-    T_b = b.placement(found.to_b(q), [base, *(f"link:{theirs}" for _, theirs in links)])
-    home = found.base @ b.placement(b.neutral(), base)
-    return bool(np.abs(T_a - home @ np.linalg.inv(T_b[:, :1]) @ T_b[:, 1:]).max(initial=0.0) <= ROUNDING)
+    result |= {"frame": worst.frame, "lower": worst.lower, "upper": worst.upper, "truth": truth}
+    return result | {"holds": worst.lower <= attained and truth <= worst.upper}
 
 
 def summary(some: list[dict[str, Any]]) -> Iterator[str]:
@@ -103,9 +87,9 @@ if __name__ == "__main__":
     warnings.simplefilter("ignore", urdfkin.UrdfWarning)
     lines = options.keep.read_text().splitlines() if options.keep.exists() else []
     some = [json.loads(line) for line in lines]
-    there = {(one["robot"], one["change"]) for one in some}
+    known = {(one["robot"], one["change"]) for one in some}
     for name, what in product(options.robots or sorted(catalogue()), (*ALIKE, *UNLIKE)):
-        if (name, what) not in there and (one := pair(name, what)) is not None:
+        if (name, what) not in known and (one := pair(name, what)) is not None:
             some.append(one)
             with options.keep.open("a") as file:
                 print(json.dumps(one), file=file)

@@ -58,7 +58,7 @@ class Bench:
 
     def poses(self, q: FloatArray) -> FloatArray:
         """Return the true poses (s, 4, 4) at configurations."""
-        return self.model.way.poses(self.values(q), self.truth)
+        return self.model.chain.poses(self.values(q), self.truth)
 
     def noisy(self, metres: float, radians: float, seed: int) -> FloatArray:
         """Return the poses (s, 4, 4) that an instrument with this noise measures."""
@@ -91,11 +91,11 @@ def bench(
     robot = load(name, verify=False)
     model = urdf_model(robot.tree, tip, base, fit)
     rng = np.random.default_rng(seed)
-    truth = error * rng.standard_normal(len(model.way.parameters))
-    truth[[p.end for p in model.way.parameters]] = 0.0
+    truth = error * rng.standard_normal(len(model.chain.parameters))
+    truth[[p.end for p in model.chain.parameters]] = 0.0
     q = robot.sample(poses, seed)
     values = model.coupling.values(model.coupling.select(robot.tree, q))
-    return Bench(robot, model, truth, q, model.way.poses(values, truth))
+    return Bench(robot, model, truth, q, model.chain.poses(values, truth))
 
 
 def pose(seed: int, distance: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Files of a calibration: measured poses, the factory's numbers of a Universal Robots arm, the new URDF."""
+"""Files of a calibration: measured poses, the factory calibration of a Universal Robots arm, the new URDF."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_what_placement_writes_is_read(tmp_path: Path) -> None:
 # The factory's calibration of a Universal Robots arm, from the driver's YAML or the controller's table.
 
 
-#: theta, d, a, alpha of a real UR10e, from the driver's documentation: the upper arm is 439 m out.
+#: theta, d, a, alpha of a real UR10e, from the driver's documentation; d of the upper arm is 439 m.
 CONTROLLER = np.array(
     [
         [-2.4147806894359e-07, 0.180539811714259, 2.12234865571206e-05, 1.57014608044242],
@@ -126,9 +126,9 @@ CONTROLLER = np.array(
         [3.91986209186124e-08, 0.115670917257426, 0.0, 0.0],
     ]
 )
-#: What a product with lengths of 446 m leaves, ten times over.
+#: Ten times the rounding error (m) of a product with lengths of 446 m.
 ROUNDING = 10.0 * 446.0 * np.finfo(float).eps
-#: Nine lines that are a billion words.
+#: Nine lines of YAML that expand to a billion words.
 BOMB = "\n".join(
     [
         "a0: &a0 [lol]",
@@ -147,7 +147,7 @@ NOMINAL = {
 
 
 def drawn_in() -> list[FloatArray]:
-    """The links drawn in along their axes, as the driver does it."""
+    """Return the origins of the links, shifted along their axes as the driver does it."""
     S = [elementary(2, True, theta) @ elementary(2, False, d) for theta, d, _, _ in CONTROLLER]
     X = [elementary(0, False, a) @ elementary(0, True, alpha) for _, _, a, alpha in CONTROLLER]
     for i in (1, 2):
@@ -167,7 +167,7 @@ def as_yaml(origins: list[FloatArray]) -> str:
     for link, T in zip(LINKS, origins, strict=True):
         six = [*T[:3, 3], *euler_of("XYZ", T[:3, :3])]
         named = zip(("x", "y", "z", "roll", "pitch", "yaw"), six, strict=True)
-        # The driver writes the shortest digits: 1e-05 is a word to YAML 1.1.
+        # The driver writes the shortest digits; YAML 1.1 reads 1e-05 as a string.
         lines += [f"  {link}:", *(f"    {name}: {float(value):.16g}" for name, value in named)]
     return "\n".join([*lines, "  hash: calib_12788084448423163542", ""])
 
@@ -184,7 +184,7 @@ def controller() -> DHTable:
 
 
 def description(prefix: str) -> str:
-    """The joints of the ROS description, as its xacro expands."""
+    """Return the joints of the ROS description as a URDF."""
     lines = [f'<robot name="ur10e"><link name="{prefix}base_link"/>']
     parent, named = f"{prefix}base_link_inertia", zip(LINKS.items(), NOMINAL.values(), strict=True)
 
@@ -218,7 +218,7 @@ def test_the_drivers_angles_turn_about_x_y_and_z_in_that_order_and_a_urdfs_do_no
     )
     assert np.abs(driver - true).max() < ROUNDING
     assert np.abs(urdf - true).max() > 1e-7
-    # Some angles are exactly zero in the one order alone.
+    # Some angles are exactly zero only in the driver's order.
     assert "pitch: 0\n" in file.read_text().replace("-0\n", "0\n")
     metres, _ = distance(read_calibration(file), read_calibration(file, "urdf"))
     assert 1e-7 < metres < 1e-4
@@ -250,7 +250,7 @@ def test_the_older_descriptions_frames_stay_near_where_they_were(file: Path) -> 
     q = written.sample(20)
     T = written.placement(q, ["base", "tool0"])
     assert np.abs(np.linalg.solve(T[:, 0], T[:, 1]) - controller().placement(q)).max() < ROUNDING
-    # A UR10 is no UR10e: their shoulders and wrists are 5 cm apart, and no frame is 439 m away.
+    # The shoulders and wrists of a UR10 and a UR10e are 5 cm apart; no frame moves by 439 m.
     assert max(shift for shift, _ in found.moved.values()) < 0.06
 
 
@@ -292,14 +292,14 @@ def test_another_robot_and_another_order_are_told(file: Path) -> None:
         universal_robots("ur5", file, "drivers")
 
 
-# -- a URDF gets new origins, and keeps every other byte -----------------------------------------------------
+# -- new origins in a URDF ------------------------------------------------------------------------
 
 
 ORIGINS = {name: pose(k, 0.5) for k, name in enumerate(["one", "two", "three", "fix"])}
 
 
 def blank(data: bytes) -> bytes:
-    """A text without its origins' values."""
+    """Return a text without the values of its origins."""
     return re.sub(rb"""(<origin\b[^>]*?)((?:\s+\w+\s*=\s*(?:"[^"]*"|'[^']*'))+)""", rb"\1", data)
 
 
@@ -313,7 +313,7 @@ def origins(data: bytes) -> dict[str, FloatArray]:
 def test_every_other_byte_stays_and_the_new_origins_are_read(end: str, mark: bytes) -> None:
     old = mark + BRANCHED.replace("\n", end).encode()
     new = with_origins(old, ORIGINS)
-    # The joint that had no origin has one before its parent.
+    # The joint without an origin gets one before its parent.
     assert blank(new).replace(b'type="prismatic"><origin/>', b'type="prismatic">') == blank(old)
     found = origins(new)
     for name, T in ORIGINS.items():

@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
-from tests.calibration.test_way import table
+from tests.calibration.test_parameters import table
 from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, calibrate, doubts
 from urdfkin.calibration.fit import stacked
@@ -28,7 +28,7 @@ ENDS = ("base", "tool")
 
 def elsewhere(arm: Bench, at: FloatArray, n: int = 20) -> FloatArray:
     """Return poses (n, 4, 4) at configurations that were not measured."""
-    return arm.model.way.poses(arm.values(arm.robot.sample(n, 99)), at)
+    return arm.model.chain.poses(arm.values(arm.robot.sample(n, 99)), at)
 
 
 @pytest.mark.slow
@@ -96,12 +96,12 @@ def test_gains_are_found_and_not_written() -> None:
 def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(convention: DHConvention) -> None:
     drawn = table(convention)
     model = table_model(drawn, ("origins",))
-    truth = model.way.start + 2e-3 * np.random.default_rng(4).standard_normal(len(model.way.start))
+    truth = model.chain.start + 2e-3 * np.random.default_rng(4).standard_normal(len(model.chain.start))
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
-    found = calibrate(drawn, q, model.way.poses(q, truth))
+    found = calibrate(drawn, q, model.chain.poses(q, truth))
     assert found.table is not None
     assert present(found.fitted).rms()[0] < 1e-14
-    np.testing.assert_allclose(found.table.placement(q), model.way.poses(q, truth), atol=1e-13)
+    np.testing.assert_allclose(found.table.placement(q), model.chain.poses(q, truth), atol=1e-13)
     assert found.table.convention is convention
     assert max(abs(row.d) for row in found.table.rows) < 0.5
 
@@ -109,7 +109,7 @@ def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(conventio
 def whitened(true: Bench, found: Calibration) -> float:
     """Return chi^2, of 6 numbers, of the tip's pose error at a configuration that was not measured."""
     fitted, q = present(found.fitted), true.robot.sample(1, 99)
-    T, columns = found.model.way.columns(true.values(q), fitted.at)
+    T, columns = found.model.chain.columns(true.values(q), fitted.at)
     J = columns[0][:, list(found.identification.kept)]
     S = true.poses(q)
     error = np.hstack([S[0, :3, 3] - T[0, :3, 3], log_rotation(S[0, :3, :3] @ T[0, :3, :3].T)])
@@ -195,7 +195,7 @@ def test_an_unknown_set_of_parameters_offers_the_nearest() -> None:
         calibrate("ur5", fit=["offset"])
 
 
-# -- how many numbers poses can tell is known for every arm; what stands still does what others do -----------
+# -- identifiable parameters ----------------------------------------------------------------------
 
 
 ARMS = {"ur5": ("tool0", "base"), "panda": ("panda_hand", "panda_link0"), BRANCHED: ("hand", "b")}

@@ -1,4 +1,4 @@
-"""A fit to wrong data is refused with the mistake that was made; a good one never is."""
+"""A fit to wrong data is refused, and the error names the mistake; a good fit is never refused."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 
 import urdfkin
 from tests.calibration.arms import BRANCHED, Bench, bench, pose
-from tests.calibration.test_way import table
+from tests.calibration.test_parameters import table
 from tests.reading import present
 from urdfkin.calibration.calibrate import Calibration, ImplausibleError, calibrate
 from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.table import DHConvention
 from urdfkin.model.tree import FloatArray
 
-pytestmark = pytest.mark.slow  # a second each, forty of them; those of panda and z1 are long
+pytestmark = pytest.mark.slow
 
 ALL = ["base", "tool", "origins"]
-#: Text or name, tip, base.
+#: URDF text or catalogue name, tip and base of each arm.
 ARMS = {
     "ur5": ("ur5", "tool0", "base"),
     "panda": ("panda", "panda_hand", "panda_link0"),
@@ -103,7 +103,7 @@ def test_the_joint_whose_sign_is_wrong_is_named(name: str, fit: list[str]) -> No
             assert f"likeliest reason: the sign of joint {joint!r} is wrong" in said, said
 
 
-#: Joints whose reversed sign the free base or tool does as well, together with another one's zero.
+#: Joints whose reversed sign has the effect of another joint's zero and a free base or tool.
 _ABSORBED = {"branched": ("three", "four")}
 
 
@@ -118,7 +118,7 @@ def test_a_gain_or_a_tilted_axis_does_not_hide_a_wrong_sign() -> None:
     assert "'elbow_joint' is wrong" in reason("ur5", q, fit=["origins", "gains"])
     q = arm("ur5").q
     assert "degrees" in reason("ur5", np.degrees(q), fit=["origins", "gains"])
-    # Positions alone are met exactly by an axis that is turned about.
+    # A reversed axis fits measured positions exactly.
     q = arm("through the trunk").q.copy()
     q[:, arm("through the trunk").robot.coordinate_names.index("three")] *= -1.0
     said = refused("through the trunk", q, complete=False, fit=["origins"])
@@ -137,7 +137,7 @@ def test_a_tables_data_are_judged_as_a_robots() -> None:
     drawn = table(DHConvention.STANDARD)
     model = table_model(drawn, ("origins",))
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
-    T = model.way.poses(q, model.way.start + 1e-3)
+    T = model.chain.poses(q, model.chain.start + 1e-3)
     calibrate(drawn, q, T)
     with pytest.raises(ImplausibleError, match="q is shifted by one row"):
         calibrate(drawn, np.roll(q, 1, axis=0), T)
@@ -151,7 +151,7 @@ def test_good_data_are_never_refused(name: str, complete: bool) -> None:
     text, tip, base = ARMS[name]
     for error, noise, poses, seed in [
         (2e-3, 0.0, 20, 0),
-        (0.0, 1e-3, 40, 1),  # calibrated already: nothing is left but noise
+        (0.0, 1e-3, 40, 1),  # calibrated already: the residuals are only noise
         (1e-3, 5e-3, 60, 2),
         (1e-2, 1e-4, 15, 3),
         (3e-2, 1e-5, 30, 4),
@@ -186,7 +186,7 @@ def test_few_distinct_configurations_are_refused() -> None:
 def test_values_beyond_a_turn_are_taken_for_degrees_unless_they_are_said_to_be_radians() -> None:
     true = arm("branched")
     q = true.q.copy()
-    q[:, true.robot.coordinate_names.index("four")] += 4.0 * np.pi  # a continuous joint, wound up
+    q[:, true.robot.coordinate_names.index("four")] += 4.0 * np.pi  # a continuous joint after two full turns
     said = refused("branched", q, fit=["origins"])
     assert "joint values of more than one turn look like degrees: joint 'four'" in said
     found = fitted("branched", q, fit=["origins"], radians=True)
@@ -200,7 +200,7 @@ def test_a_refused_fit_is_had_by_force() -> None:
 
 
 def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
-    names = [str(parameter) for parameter in arm("ur5").model.way.parameters]
+    names = [str(parameter) for parameter in arm("ur5").model.chain.parameters]
     truth = np.zeros(len(names))
     truth[names.index("elbow_joint y")] = 1e-3
     true, q = replace(arm("ur5"), truth=truth), arm("ur5").robot.sample(60, 5)
@@ -211,7 +211,7 @@ def test_only_parameters_beyond_two_standard_deviations_are_written() -> None:
     assert len(few.written_parameters) <= 4
     assert (present(every.fitted).at == present(few.fitted).at).all()
     # The written parameters move the tip as the true ones do, within the noise.
-    found = few.model.way.poses(true.values(q), present(few.written_fit).at)
+    found = few.model.chain.poses(true.values(q), present(few.written_fit).at)
     assert np.abs(found - true.poses(q)).max() < 1e-4
     assert set(few.origins) == {few.parameters[k].where for k in few.written_parameters}
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tests.calibration.arms import BRANCHED, bench
-from tests.calibration.test_way import table
+from tests.calibration.test_parameters import table
 from tests.cli.running import good, urdfkin
 from urdfkin.calibration.parameters import table_model
 from urdfkin.dh.export import export
@@ -53,10 +53,10 @@ def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path:
 def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
     drawn = table(DHConvention.STANDARD)
     model = table_model(drawn, ("origins",))
-    truth = model.way.start + 1e-3
+    truth = model.chain.start + 1e-3
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 4))
     (tmp_path / "arm.toml").write_text(export(drawn, "toml"))
-    np.savez(tmp_path / "poses.npz", q=q, T=model.way.poses(q, truth))
+    np.savez(tmp_path / "poses.npz", q=q, T=model.chain.poses(q, truth))
     out = tmp_path / "new.toml"
     good("calibrate", f"{tmp_path}/arm.toml", "--poses", f"{tmp_path}/poses.npz", "-o", str(out))
-    assert np.abs(read_table(out).placement(q) - model.way.poses(q, truth)).max() < 1e-13
+    assert np.abs(read_table(out).placement(q) - model.chain.poses(q, truth)).max() < 1e-13

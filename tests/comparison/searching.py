@@ -1,4 +1,4 @@
-"""The largest distance of a frame by another way: a global search, whose best is computed at fifty digits."""
+"""Find the largest distance of a frame by a global search, and compute this distance at fifty digits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from urdfkin.verify.quantities import PLACEMENT
 
 
 def placed(robot: Robot, q: FloatArray, frame: str) -> list[Any]:
-    """A frame's place at fifty digits, from the decimals of the text."""
+    """Return a frame's position at fifty digits, from the decimals of the text."""
     tree, link = robot.tree, robot.tree.link_index(frame)
     zeros = [0.0] * tree.nv
     motion = move(tree, read_exact(robot.urdf, tree, tree.path(link)), q, zeros, zeros)
@@ -29,14 +29,14 @@ def placed(robot: Robot, q: FloatArray, frame: str) -> list[Any]:
 
 
 def far(a: Robot, b: Robot, q_a: FloatArray, q_b: FloatArray, interval: Interval) -> float:
-    """How far a frame is off at a configuration, at fifty digits."""
+    """Return the distance (m) between a frame's positions in A and B, at fifty digits."""
     with precision(DIGITS):
         places = placed(a, q_a, interval.frame), placed(b, q_b, interval.frame_b)
         return math.hypot(*(float(x - y) for x, y in zip(*places, strict=True)))
 
 
 def within(robot: Robot, q: FloatArray) -> NDArray[np.bool_]:
-    """(n,) whether all joints, followers too, keep their limits."""
+    """Return (n,) whether all joints, also mimic joints, are within their limits."""
     keeps = np.ones(len(q), dtype=bool)
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         if joint.kind.has_axis and joint.limit is not None and joint.kind is not JointKind.CONTINUOUS:
@@ -47,7 +47,7 @@ def within(robot: Robot, q: FloatArray) -> NDArray[np.bool_]:
 
 
 def searched(a: Robot, b: Robot, at_b: Callable[[FloatArray], FloatArray], interval: Interval) -> float:
-    """The largest distance that a global search finds, computed at fifty digits."""
+    """Return the largest distance (m) that a global search finds, computed at fifty digits."""
     path = a.tree.path(a.tree.link_index(interval.frame))
     along = (a.tree.joints[i] for i in path)
     leaders = {joint.mimic.leader if joint.mimic else joint.name for joint in along if joint.kind.nv}
@@ -70,7 +70,7 @@ def searched(a: Robot, b: Robot, at_b: Callable[[FloatArray], FloatArray], inter
         metres = np.linalg.norm(T_a[:, :3, 3] - T_b[:, :3, 3], axis=-1)
         return -np.where(within(a, q) & within(b, at_b(q)), metres, 0.0)
 
-    if not joints:  # nothing moves it
+    if not joints:  # no joint moves the frame
         return far(a, b, a.neutral(), at_b(a.neutral()), interval)
     best = differential_evolution(
         off, ends, seed=3, popsize=20, maxiter=60, vectorized=True, polish=False, updating="deferred"

@@ -1,4 +1,4 @@
-"""`diff`: what a reviewer would say of two versions, and what each change moves."""
+"""`diff`: the changes between two versions of a robot, and the effect of each change."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_joints_effect_is_its_own_and_the_total_is_of_all() -> None:
     assert effect.element == "joint elbow"
     assert effect.interval.frame == "lower"
     assert effect.interval.lower == pytest.approx(0.025, rel=1e-9)
-    # What is moved and not turned is as far off everywhere: the bound is the length itself.
+    # A translation has the same distance in all configurations, so the bound is this distance.
     assert effect.interval.lower <= effect.interval.upper == pytest.approx(0.025, rel=1e-9)
     assert present(found.total).lower == pytest.approx(0.025, rel=1e-9)
 
@@ -59,7 +59,7 @@ def test_two_changes_that_undo_each_other_move_less_together() -> None:
     bent = bent.replace('xyz="0.3 0 0"', 'xyz="0.3 0 0" rpy="0 0 -0.5"')
     found = urdfkin.diff(three, bent)
     assert str(found.effects[1]).startswith("alone turns tip by up to 500 mrad")
-    chord = 2 * 0.3 * 0.24740395925452294  # of 0.5 rad
+    chord = 2 * 0.3 * 0.24740395925452294  # chord of 0.5 rad at 0.3 m
     assert present(found.total).lower == pytest.approx(chord, rel=1e-6)
 
 
@@ -100,7 +100,7 @@ def test_between_two_formats_each_difference_is_told_at_its_joint(tmp_path: Path
     assert said[:2] == ["joint elbow: origin 25 mm off", "joint elbow: axis turned by 99.67 mrad"]
     assert "joint shoulder: limits -2 to 2 -> -2 to 1.5" in said
     assert "joint shoulder: velocity 1 -> none" in said
-    assert "link world: new" not in said  # it is the link base, at the same place
+    assert "link world: new" not in said  # the link world of MJCF is the link base
     [effect] = found.effects
     assert effect.element == "joint elbow"
     assert effect.interval.lower == pytest.approx(0.025, rel=1e-6)
@@ -117,7 +117,7 @@ def test_between_two_formats_each_difference_is_told_at_its_joint(tmp_path: Path
 @pytest.mark.filterwarnings("ignore")
 def test_between_two_formats_limits_are_compared_as_they_are_written() -> None:
     pytest.importorskip("mujoco", reason="MuJoCo reads MJCF")
-    # The zero of the elbow is 0.5 rad off. `same` converts its limits; `diff` lists what the files state.
+    # The elbows have different zeros. `same` converts the limits; `diff` lists the limits of the files.
     turned = MJCF.replace('pos="0.425 0 0"', 'pos="0.4 0 0" euler="0 0 0.5"').replace("0 0.1 1", "0 0 1")
     three = OLD.replace("</robot>", FIXED.format("wrist", "tip", 0.3))
     site = '<site name="tip" pos="0.3 0 0"/>'

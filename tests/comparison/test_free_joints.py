@@ -1,4 +1,4 @@
-"""Planar and floating joints that count from another place, and joints whose order does not matter."""
+"""Planar and floating joints with other frames, and joints whose order does not matter."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_free_joint_may_count_from_another_place(kind: str, also: str) -> None
     tree = pairs.counted_elsewhere(a.tree)
     assert tree is not a.tree
     b = loaded(pairs.renamed(tree) if also == "renamed" else tree, verify=True)
-    if also == "rerooted":  # stands on its foot, and the free joint runs back to the ground
+    if also == "rerooted":  # the foot is the root, and the free joint is reversed
         b = loaded(pairs.counted_elsewhere(pairs.rerooted(a.tree)), verify=True)
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.SAME_AFTER
@@ -61,7 +61,7 @@ def test_a_plane_that_is_tilted_is_no_matter_of_coordinates() -> None:
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.DIFFERS
     assert found.differences[0].words.startswith("joint free: its plane is tilted by")
-    assert np.isinf(present(found.worst).upper)  # it slides without limits
+    assert np.isinf(present(found.worst).upper)  # a planar joint has no limits
     assert certified(found, a, b)
 
 
@@ -71,7 +71,7 @@ AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
 
 def gantry(order: str, wrist: str = "turn", tilt: str = "0") -> Robot:
-    """Slides in an order, then a turn about z, and a slide along it: what hangs on them is the same."""
+    """Return three prismatic joints in an order, then a revolute joint about z and a prismatic joint."""
     joints, parent = list[str](), "base"
     for i, name in enumerate([*order, *(["turn", "quill"] if wrist == "turn" else ["quill", "turn"])]):
         child = f"{order}{i}" if i < 3 else f"{wrist}{i}" if i < 4 else "tool"

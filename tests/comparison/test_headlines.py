@@ -1,4 +1,4 @@
-"""The headline, the exit status and the page of `same` answer the question that was asked."""
+"""The headline, the exit code and the page of `same` answer the user's question."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def arm(
     limits: tuple[float, float] = (-1.0, 1.0),
     shoulder: str = "0 0 0",
 ) -> str:
-    """A world, a base that is mounted in it, two joints and a tool."""
+    """Return a robot with a world, a base that is fixed to the world, two joints and a tool."""
     return urdfs.robot(
         f'<joint name="mount" type="fixed"><parent link="world"/><child link="base"/>{mount}</joint>',
         joint("turn", "revolute", "base", "upper", f'xyz="0 0 0.1" rpy="{shoulder}"', more=limit(*limits)),
@@ -40,7 +40,7 @@ def arm(
 
 
 def finger(multiplier: float) -> str:
-    """Two fingers with the same limits, of which the second mirrors the first."""
+    """Return two fingers with equal limits; the second finger mimics the first."""
     ends = limit(-0.005, 0.055)
     return urdfs.robot(
         joint("ja", "prismatic", "palm", "a", axis="0 0 -1", more=ends),
@@ -100,7 +100,9 @@ def test_a_joint_of_another_kind_is_searched() -> None:
     a, b = arm(), arm(second="prismatic")
     found = urdfkin.same(a, b)
     worst = present(found.worst)
-    far = math.hypot(1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0)))  # a bend of 1 rad, a slide of 1 m
+    far = math.hypot(
+        1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0))
+    )  # the joint turns by 1 rad in A and moves by 1 m in B
     assert worst.lower == pytest.approx(far, rel=1e-3)
     assert math.isinf(worst.upper)
     assert headline(a, b).startswith("DIFFERS by 1.005 m or more and 1 rad or more (no bound is proven)")

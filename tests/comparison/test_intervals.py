@@ -1,4 +1,4 @@
-"""The interval of the largest distance holds the truth, and is narrow."""
+"""The interval of the largest distance contains the largest distance, and is narrow."""
 
 from __future__ import annotations
 
@@ -23,7 +23,14 @@ from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Verdict
 from urdfkin.comparison.verdict import Comparator
 from urdfkin.model.mechanisms.matcher import align
-from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, FramePair, Gauge, Screw, screw_motion, variables_of
+from urdfkin.model.mechanisms.mechanism import (
+    AS_WRITTEN,
+    AlignmentChoices,
+    FramePair,
+    Screw,
+    screw_motion,
+    variables_of,
+)
 from urdfkin.model.mechanisms.upper_bound import FINE, Grid, curvature, point, relevant_joints, upper_bounds
 from urdfkin.model.tree import FloatArray
 from urdfkin.report.same import where
@@ -38,7 +45,7 @@ CASES: dict[str, tuple[str, Callable[[Robot], str]]] = {
     "panda, a follower": ("panda", lambda r: to_urdf(pairs.with_another_rule(r.tree))),
     "ur5 and ur10": ("ur5", lambda r: to_urdf(pairs.bounded(urdfkin.load("ur10", verify=False).tree))),
 }
-#: How wide an interval may be: one thing differs, or many do, each with its own worst configuration.
+#: Largest quotient of the bounds of an interval, for models with many differences; otherwise 1.02.
 WIDTH = {"panda, rounded": 2.0}
 
 
@@ -94,10 +101,10 @@ def test_a_frame_that_slides_without_end_has_no_bound() -> None:
     assert math.isinf(worst.upper)
 
 
-# -- branch and bound: its second derivatives are bounds, and it proves what no sum of differences can -------
+# -- branch and bound ---------------------------------------------------------------------------------
 
 
-#: Robots, changes, frames: turns alone, a slide, followers, an axis that alone is bent.
+#: Robots, changes and frames: revolute joints, a prismatic joint, mimic joints, a tilted axis.
 BOXES = [
     ("panda", "rounded", "panda_hand_tcp"), ("panda", "rounded", "panda_leftfinger"),
     ("ur3_gripper", "tilted by 0.01", "wrist_3_link"), ("elbow", "axis bent", "tool"),
@@ -105,27 +112,25 @@ BOXES = [
 ]  # fmt: skip
 
 
-def searched_boxes(name: str, what: str, link: str) -> tuple[DistanceSearch, FramePair]:
-    return laid(robot(name), present(changed(name, what)), link)
-
-
-def laid(a: Robot, b: Robot, link: str, gauge: Gauge | None = None) -> tuple[DistanceSearch, FramePair]:
-    judge = Comparator((a, b), {}, bounds=True)
-    found = align(*judge.mechanisms, {}, gauge)
+def search_of(
+    a: Robot, b: Robot, link: str, choices: AlignmentChoices | None = None
+) -> tuple[DistanceSearch, FramePair]:
+    comparator = Comparator((a, b), {}, bounds=True)
+    found = align(*comparator.mechanisms, {}, choices)
     frame = next(one for one in found.frames if a.tree.links[one.a] == link)
-    return judge.search(found, variables_of(found, judge.tolerance)), frame
+    return comparator.search(found, variables_of(found, comparator.tolerance)), frame
 
 
 def bounds_of(search: DistanceSearch, frame: FramePair) -> tuple[Sequence[str], FloatArray]:
-    """Variables, and bounds on second derivatives by them."""
-    steps, some = relevant_joints(search.found, search.variables, frame)
+    """Return the variables' names, and bounds on the second derivatives by the variables."""
+    steps, some = relevant_joints(search.alignment, search.variables, frame)
     return curvature(steps, [one for one in some if one is not None], search.variables, frame)
 
 
-def hold_against_differences(
+def compare_with_difference_quotients(
     search: DistanceSearch, frame: FramePair, names: Sequence[str], M: FloatArray
 ) -> None:
-    """Bounds M on second derivatives against difference quotients of the first ones."""
+    """Compare bounds M on second derivatives with difference quotients of first derivatives."""
     boxes = Boxes(search, frame, names)
     c, step = search.random_values(200)[:, boxes.at], 1e-3
     largest = np.zeros_like(M)
@@ -142,7 +147,7 @@ def hold_against_differences(
 
 
 def two_joints(elbow: str, multiplier: float | None) -> urdfkin.Robot:
-    """An arm whose second joint stands at an origin, and follows the first one if there is a multiplier."""
+    """Return an arm whose second joint has an origin, and mimics the first joint if there is a multiplier."""
     reach = 3.0 * max(1.0, abs(multiplier or 0.0))
     more = limit(-reach, reach) + ("" if multiplier is None else mimic("j1", multiplier))
     first = joint("j1", "revolute", "base", "upper", more=limit(-3, 3))
@@ -159,10 +164,10 @@ def test_second_derivatives_are_bounded_for_tilted_and_for_parallel_axes_and_fol
     elbow: str, multiplier: float | None
 ) -> None:
     a, b = two_joints('xyz="1 0 0"', multiplier), two_joints(elbow, multiplier)
-    search, frame = laid(a, b, "tool")
+    search, frame = search_of(a, b, "tool")
     names, M = bounds_of(search, frame)
     assert np.isfinite(M).all()
-    hold_against_differences(search, frame, names, M)
+    compare_with_difference_quotients(search, frame, names, M)
 
 
 def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() -> None:
@@ -175,16 +180,16 @@ def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() 
             urdf(first, second, joint("j3", "revolute", "fore", "tool", "", "0 1 0", limit()))
         )
 
-    search, frame = laid(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
-    upper = upper_bounds(search.found, search.variables, frame, FINE)[0]
+    search, frame = search_of(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
+    upper = upper_bounds(search.alignment, search.variables, frame, FINE)[0]
     attained = s * np.sqrt(2.0)
     assert search.largest_distances([frame])[0][0] == pytest.approx(attained, rel=0.01)
-    # What boxes prove is no less than what is attained, also where less would be enough.
+    # A proven bound is not below the attained distance, even if the target is.
     assert tighten(search, frame, 1.01 * s, upper) >= 0.99 * attained
 
 
 def test_joints_that_follow_by_other_multipliers_have_no_bound_on_second_derivatives() -> None:
-    _, M = bounds_of(*laid(two_joints('xyz="1 0 0"', 0.5), two_joints('xyz="1 0 0"', 0.6), "tool"))
+    _, M = bounds_of(*search_of(two_joints('xyz="1 0 0"', 0.5), two_joints('xyz="1 0 0"', 0.6), "tool"))
     assert np.isinf(M).all()
 
 
@@ -222,19 +227,19 @@ def test_a_tools_point_moves_as_its_jacobian_says(tool: tuple[float, float, floa
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "what", "link"), BOXES)
 def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
-    search, frame = searched_boxes(name, what, link)
+    search, frame = search_of(robot(name), present(changed(name, what)), link)
     names, M = bounds_of(search, frame)
     if not np.isfinite(M).all():
         assert what == "other rule"
         return
-    hold_against_differences(search, frame, names, M)
+    compare_with_difference_quotients(search, frame, names, M)
 
 
 @pytest.mark.slow
 def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> None:
-    search, frame = searched_boxes("panda", "rounded", "panda_hand_tcp")
+    search, frame = search_of(robot("panda"), present(changed("panda", "rounded")), "panda_hand_tcp")
     lower, _ = search.largest_distances([frame])[0]
-    upper, _ = upper_bounds(search.found, search.variables, frame, FINE)
+    upper, _ = upper_bounds(search.alignment, search.variables, frame, FINE)
     assert upper > 1.6 * lower
     assert tighten(search, frame, 1.05 * lower, upper) == 1.05 * lower
     assert tighten(search, frame, 0.99 * lower, upper, most=2**14) > lower, "what is wrong is not proven"
@@ -242,7 +247,7 @@ def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> Non
 
 
 def two_turns(place: str, inside: str) -> Robot:
-    """An arm with two joints about z; the text `inside` stands in the second joint."""
+    """Return an arm with two joints about z; the second joint contains the text `inside`."""
     first = joint("j1", "revolute", "base", "upper", f'xyz="{place} 0 0"', more=limit())
     second = joint("j2", "revolute", "upper", "fore", more=limit() + inside)
     return loaded(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
@@ -250,7 +255,7 @@ def two_turns(place: str, inside: str) -> Robot:
 
 def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable_moved_both() -> None:
     a, b = two_turns("0", mimic("j1")), two_turns("-5", "")
-    search, frame = laid(a, b, "tool", AS_WRITTEN)
+    search, frame = search_of(a, b, "tool", AS_WRITTEN)
     q = a.sample(500, seed=0)
     apart = b.placement(np.hstack([q, np.ones_like(q)]), "tool") - a.placement(q, "tool")
     attained = float(np.linalg.norm(apart[:, :3, 3], axis=1).max())
@@ -282,7 +287,9 @@ def test_what_boxes_prove_is_proven_again() -> None:
 def test_of_robots_that_nothing_moves_the_distance_is_told_too() -> None:
     text = urdf(joint("j", "fixed", "base", "mount", 'xyz="0.3 {} 0"', axis=""))
     found = urdfkin.same(text.format(0), text.format(0.004))
-    assert found.verdict is Verdict.SAME_AFTER  # as a tool frame it may lie elsewhere; as written it does
+    assert (
+        found.verdict is Verdict.SAME_AFTER
+    )  # another tool is no difference; the distance counts as written
     worst = present(found.worst_as_written)
     assert worst.lower == pytest.approx(0.004, rel=1e-9)
     assert 0.004 <= worst.upper <= 0.00402

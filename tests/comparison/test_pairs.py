@@ -1,6 +1,6 @@
-"""Pairs made of the catalogue's robots by known changes: the verdict is right on every one.
+"""Robots of the catalogue and known changes of these robots: every verdict is right.
 
-`python scripts/check_same.py` tries all changes on all robots; the tests take turns.
+`python scripts/check_same.py` tries all changes on all robots; the tests try one change for each robot.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MOVED = [what for what in pairs.UNLIKE if what not in ("other rule", "rounded")]
 def test_what_is_the_same_robot_is_found_to_be_so(turn: int) -> None:
     what = list(pairs.ALIKE)[turn % len(pairs.ALIKE)]
     other = changed(ROBOTS[turn], what)
-    if other is None:  # nothing to turn over
+    if other is None:  # the change changes nothing
         return
     found = urdfkin.same(robot(ROBOTS[turn]), other, bounds=False)
     assert found, (what, found.differences[:3])
@@ -121,7 +121,6 @@ def test_a_vendors_table_off_by_its_last_digit_is_off_by_no_more() -> None:
 @pytest.mark.slow
 def test_arms_that_mirror_each_other_are_told_apart_though_no_name_is_left() -> None:
     def arm(side: str, y: float) -> str:
-        """An arm whose first axis lies on the other arm's: which is which shows behind it."""
         a, b, c = (f"{side}_{name}" for name in "abc")
         first = joint(a, "continuous", "trunk", f"{a}_link", axis="0 1 0")
         second = joint(b, "continuous", f"{a}_link", f"{b}_link", f'xyz="0 {y} 0.2"', "1 0 0")
@@ -141,7 +140,7 @@ def test_standard_and_modified_rows_of_one_robot_are_the_same() -> None:
     assert all(line.startswith("frame ") for line in found.after)
 
 
-#: A joint that follows another one; multiplier and offset are to be filled in.
+#: A robot with a mimic joint, whose multiplier and offset are placeholders.
 FOLLOWING = urdfs.robot(
     joint("j", "revolute", "a", "b", more=limit()),
     joint("k", "revolute", "b", "c", 'xyz="0.3 0 0"', more=limit() + mimic("j", "{}", "{}")),

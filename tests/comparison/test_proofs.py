@@ -1,4 +1,4 @@
-"""No proof of `same` covers more than it states: brute force over random pairs, and forged certificates."""
+"""The proofs of `same` hold for random pairs of arms, and forged certificates are rejected."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ AXES = ("0 0 1", "0 1 0", "1 0 0", "0.6 0 0.8", "0 -0.6 0.8")
 
 
 def arm(kinds: list[str], numbers: FloatArray, rules: dict[int, tuple[int, float]]) -> str:
-    """A chain of joints; `rules` has the mimicked joint and the multiplier of each mimic joint."""
+    """Return a chain of joints; `rules` has the mimicked joint and the multiplier of each mimic joint."""
     parts = []
     for i, (kind, row) in enumerate(zip(kinds, numbers, strict=True)):
         inside = limit(round(-0.3 - row[6], 3), round(0.4 + row[7], 3)) * (kind in ("revolute", "prismatic"))
@@ -39,7 +39,7 @@ def arm(kinds: list[str], numbers: FloatArray, rules: dict[int, tuple[int, float
 
 
 def random_pair(seed: int) -> tuple[Robot, Robot]:
-    """Two arms that differ in numbers, limits, kinds and mimic rules."""
+    """Return two arms that differ in numbers, limits, kinds and mimic rules."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 6))
     kinds = [str(kind) for kind in rng.choice(["revolute"] * 4 + ["prismatic"] * 2 + ["continuous"], n)]
@@ -69,7 +69,7 @@ def random_pair(seed: int) -> tuple[Robot, Robot]:
 
 
 def largest_distance(a: Robot, b: Robot, links: list[str]) -> tuple[float, float]:
-    """The largest distance and angle of links at samples of all independent joints of A and of B, by name."""
+    """Return the largest distance and angle of links at samples of all independent joints of A and B."""
     rng = np.random.default_rng(0)
     ends: dict[str, tuple[float, float]] = {}
     for robot in (a, b):
@@ -298,10 +298,10 @@ def test_a_recheck_rejects_the_verdict_differs_if_another_alignment_agrees(
 ) -> None:
     a = reversed_axis[0]
     comparator = Comparator((a, copy.copy(a)), {}, bounds=True)
-    gauge = align(*comparator.mechanisms, {}).gauge
-    moved = gauge.X.copy()
+    choices = align(*comparator.mechanisms, {}).choices
+    moved = choices.X.copy()
     moved[2, 3] = 0.5
-    raised = align(*comparator.mechanisms, {}, replace(gauge, X=moved))
+    raised = align(*comparator.mechanisms, {}, replace(choices, X=moved))
     with monkeypatch.context() as patched:
         patched.setattr(Comparator, "alignment", lambda _: raised)
         found = urdfkin.same(a, copy.copy(a))

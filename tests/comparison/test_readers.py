@@ -1,4 +1,4 @@
-"""How other libraries read a file: each planted difference is explained by its element."""
+"""How other libraries read a file: the element that causes a difference is named."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def test_newton_reads_a_usd_file_like_urdfkin(tmp_path: Path, monkeypatch: pytes
     assert found.worst == pytest.approx(1e-3, rel=1e-2)
 
 
-#: A hand that follows the shoulder. The axis does not pass through its origin, so that urdfkin adds a link.
+#: A hand whose joint mimics the shoulder. The axis misses the hand's origin, so urdfkin adds a link.
 _HAND = """
   def Xform "hand" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
     double3 xformOp:translate = (0.3, 0, 0.4)

@@ -1,4 +1,4 @@
-"""`same`: verdicts, what has to be done, what is only remarked upon, and certificates."""
+"""`same`: verdicts, changes of B, remarks and certificates."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def test_it_is_quick(name: str, seconds: float) -> None:
 
 
 def fingers(names: str, tilt: float, multiplier: float, offset: float) -> Robot:
-    """A palm with two fingers, the second of which follows the first."""
+    """Return a palm with two fingers; the second finger mimics the first."""
     palm, a, b, leader, follower = names.split()
     rule = limit() + mimic(leader, multiplier, offset)
     first = joint(leader, "revolute", palm, a, f'xyz="-0.03 0 0.05" rpy="0 {tilt} 0"', "0 -1 0", limit())
@@ -187,7 +187,7 @@ def test_links_of_one_name_fix_the_zero_that_a_mimic_rule_may_give(multiplier: f
 
 
 def telescope(names: str, x: float) -> Robot:
-    """Four slides along one axis; x: metres that the third one is off."""
+    """Return four prismatic joints along one axis; the third joint is shifted by x (m)."""
     joints = []
     for i, name in enumerate(names):
         origin = f'xyz="{x if i == 2 else 0} 0 0.2"'
@@ -208,7 +208,7 @@ def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytes
     assert found.verdict is Verdict.DIFFERS
     assert tried == []
     urdfkin.same(telescope("abcd", 0.0), telescope("badc", 0.001), bounds=False)
-    assert tried == [tuple("abcd"), tuple("dcba")]  # as A has them, from its root or from its tip
+    assert tried == [tuple("abcd"), tuple("dcba")]  # the order in A, and the reverse order
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
@@ -309,7 +309,7 @@ def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
     forged["base"][0][3] += 0.25
     assert recheck(forged, a, b)
     forged = copy.deepcopy(document)
-    for frame in forged["frames"]:  # less than some configurations attain, and a lower bound to match
+    for frame in forged["frames"]:  # bounds below the distance at some configurations
         frame["lower"], frame["upper"] = 0.1 * frame["lower"], 0.5 * frame["upper"]
     assert any("its upper bound is wrong" in line for line in recheck(forged, a, b))
     assert asked == []

@@ -117,7 +117,7 @@ class Calibration:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return self.model.way.parameters
+        return self.model.chain.parameters
 
     @cached_property
     def values(self) -> FloatArray:
@@ -125,7 +125,7 @@ class Calibration:
         return self._change(self.fitted)
 
     def _change(self, fit: Fit | None) -> FloatArray:
-        return np.zeros(len(self.parameters)) if fit is None else fit.at - self.model.way.start
+        return np.zeros(len(self.parameters)) if fit is None else fit.at - self.model.chain.start
 
     @cached_property
     def writable(self) -> frozenset[int]:
@@ -322,10 +322,10 @@ def fitted_model(
 
 def _general_target(model: CalibrationModel) -> FloatArray:
     """Return the model's parameters (p,), with a fitted target position that is on no joint axis."""
-    at = model.way.start.copy()
-    for k, parameter in enumerate(model.way.parameters):
+    at = model.chain.start.copy()
+    for k, parameter in enumerate(model.chain.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
-            at[k] = model.way.size / _TARGET_DIVISORS[parameter.what]
+            at[k] = model.chain.size / _TARGET_DIVISORS[parameter.what]
     return at
 
 
@@ -367,7 +367,7 @@ def _fit(
 ) -> tuple[FitWithData, Calibration]:
     stated, start = None if noise is None else _parse_noise(noise), start_values(model, measured)
     identification = identify(model, measured.values, complete=measured.complete, at=start)
-    ends = [k for k in identification.kept if model.way.parameters[k].end]
+    ends = [k for k in identification.kept if model.chain.parameters[k].end]
     before = best_fit(model, measured, ends, stated, start)
     found = best_fit(model, measured, identification.kept, stated, before.at)
     identification, found = _add_identifiable(model, measured, identification, stated, found)
@@ -400,14 +400,14 @@ def _fit(
 def _significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
     """Return the parameters to write, which always include base and tool, and their fit."""
     model, kept, found = fit.model, fit.identification.kept, fit.fitted
-    is_end = [model.way.parameters[k].end for k in kept]
-    change = found.at[list(kept)] - model.way.start[list(kept)]
+    is_end = [model.chain.parameters[k].end for k in kept]
+    change = found.at[list(kept)] - model.chain.start[list(kept)]
     chosen = tuple(np.array(kept, dtype=int)[significant(change, found.covariance, is_end)].tolist())
     if chosen == kept:
         return kept, found
     at = found.at.copy()
     out = [k for k in kept if k not in chosen]
-    at[out] = model.way.start[out]
+    at[out] = model.chain.start[out]
     return chosen, best_fit(model, fit.measured, chosen, stated, at)
 
 
@@ -480,9 +480,9 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
             return robot.certificate()
         T = found.written.loaded.placement(q, [model.base, model.tip])
     theirs = np.linalg.solve(T[:, 0], T[:, 1])
-    error = np.abs(theirs - model.way.poses(measured.values, at))
-    bound = _READ_BACK * model.way.rounding(measured.values)
-    if error[:, :3, 3].max() > bound or error[:, :3, :3].max() > bound / model.way.size:
+    error = np.abs(theirs - model.chain.poses(measured.values, at))
+    bound = _READ_BACK * model.chain.rounding(measured.values)
+    if error[:, :3, 3].max() > bound or error[:, :3, :3].max() > bound / model.chain.size:
         raise UrdfkinError(
             "the written URDF disagrees with the fit",
             where=f"{found.robot.name}, {model.base} to {model.tip}",

@@ -99,12 +99,12 @@ def stacked(
 ) -> FloatArray:
     """Return the Jacobian (rows, p) of all measured coordinates, for the arguments of `identify`.
 
-    All entries are in metres: the rows for rotations are multiplied by the length `way.size`.
+    All entries are in metres: the rows for rotations are multiplied by the length `chain.size`.
     """
-    L = model.way.size
-    _, columns = model.way.columns(values, at)
+    L = model.chain.size
+    _, columns = model.chain.columns(values, at)
     columns[:, 3:] *= L
-    lengths = np.array([1.0 if parameter.unit == "m" else 1.0 / L for parameter in model.way.parameters])
+    lengths = np.array([1.0 if parameter.unit == "m" else 1.0 / L for parameter in model.chain.parameters])
     J = columns[:, : 6 if complete else 3] * lengths
     return J.reshape(-1, len(lengths)) if len(lengths) else np.empty((J.size, 0))
 
@@ -118,7 +118,7 @@ def identify(
     computed at the parameters `at` (p,), by default at the model's start values.
     """
     J = stacked(model, values, complete=complete, at=at)
-    error = np.full_like(J, model.way.rounding(values))
+    error = np.full_like(J, model.chain.rounding(values))
     kept = list[int]()
     for group in model.groups:
         columns = [*kept, *group]
@@ -155,7 +155,7 @@ def _reason(model: CalibrationModel, J: FloatArray, error: FloatArray, kept: Seq
     shares = np.linalg.lstsq(others, column, rcond=None)[0] * np.linalg.norm(others, axis=0)
     shares = np.abs(shares) / np.linalg.norm(column)
     order = [i for i in np.argsort(-shares, kind="stable") if shares[i] > _SHARE]
-    names = first_names((str(model.way.parameters[kept[i]]) for i in order), _NAMED)
+    names = first_names((str(model.chain.parameters[kept[i]]) for i in order), _NAMED)
     return f"same effect as {names}{' together' if len(order) > 1 else ''}"
 
 
@@ -275,7 +275,7 @@ def errors(model: CalibrationModel, measured: Measured, at: FloatArray) -> Float
     Each row contains the position error (m) and, for full poses, the rotation error (rad), along the axes of
     the base frame.
     """
-    return _residuals(measured, model.way.poses(measured.values, at))
+    return _residuals(measured, model.chain.poses(measured.values, at))
 
 
 def _residuals(measured: Measured, T: FloatArray) -> FloatArray:
@@ -292,7 +292,7 @@ def best_fit(
 
     If `noise` is None, the noise is estimated from the residuals.
     """
-    problem = _LeastSquares(model, measured, list(kept), noise or Noise(1.0, 1.0 / model.way.size))
+    problem = _LeastSquares(model, measured, list(kept), noise or Noise(1.0, 1.0 / model.chain.size))
     for _ in range(1 if noise else _ESTIMATES):
         at = problem.minimum(at)
         found = problem.fit(at)
@@ -313,7 +313,7 @@ def best_fit(
 
 def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> Noise:
     """Estimate the noise from the residuals; the noise is a divisor, so it is at least the rounding error."""
-    rounding = model.way.rounding(measured.values)
+    rounding = model.chain.rounding(measured.values)
 
     def of(part: slice, least: float, former: float) -> float:
         redundancy = float(found.redundancies[:, part].sum())
@@ -322,7 +322,7 @@ def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> 
 
     return Noise(
         of(slice(0, 3), rounding, found.noise.metres),
-        of(slice(3, 6), rounding / model.way.size, found.noise.radians),
+        of(slice(3, 6), rounding / model.chain.size, found.noise.radians),
     )
 
 
@@ -337,14 +337,14 @@ class _LeastSquares:
 
     def residuals(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the residuals (rows,) divided by the noise, and the poses along the path."""
-        frames = self.model.way.frames(self.measured.values, at)
+        frames = self.model.chain.frames(self.measured.values, at)
         errors = _residuals(self.measured, frames[:, -1])
         return (errors / self.noise.of(self.measured.complete)).ravel(), frames
 
     def jacobian(self, at: FloatArray, frames: FloatArray) -> FloatArray:
         """Return the Jacobian (rows, k) of the fitted parameters, divided by the noise."""
         scale = self.noise.of(self.measured.complete)
-        _, columns = self.model.way.columns(self.measured.values, at, frames)
+        _, columns = self.model.chain.columns(self.measured.values, at, frames)
         J = columns[:, : len(scale), self.kept] / scale[:, np.newaxis]
         return J.reshape(len(self.measured) * len(scale), len(self.kept))
 
@@ -446,11 +446,11 @@ _LARGEST_SPREAD = 100.0
 
 def start_values(model: CalibrationModel, measured: Measured) -> FloatArray:
     """Return start values (p,): base and tool from the measured poses, other parameters from the model."""
-    at = model.way.start.copy()
-    ends = {parameter.where for parameter in model.way.parameters if parameter.end}
+    at = model.chain.start.copy()
+    ends = {parameter.where for parameter in model.chain.parameters if parameter.end}
     if not ends:
         return at
-    T = model.way.poses(measured.values)
+    T = model.chain.poses(measured.values)
     free = "base" in ends, "tool" in ends
     if measured.R is None:
         B, X = _from_positions(T, measured.p, *free)
@@ -458,7 +458,7 @@ def start_values(model: CalibrationModel, measured: Measured) -> FloatArray:
         B, X = _from_poses(T, measured.p, measured.R, *free)
     poses = {"base": B, "tool": X}
     six = {end: [*pose[:3, 3], *euler_of("XYZ", pose[:3, :3])] for end, pose in poses.items()}
-    for k, parameter in enumerate(model.way.parameters):
+    for k, parameter in enumerate(model.chain.parameters):
         if parameter.end:
             at[k] = six[parameter.where][("x", "y", "z", "rx", "ry", "rz").index(parameter.what)]
     return at
@@ -523,7 +523,7 @@ def _translations(
 
 def demand_metres(model: CalibrationModel, measured: Measured) -> None:
     """Raise InputError if measured positions spread 100 times more than the positions of the robot's tip."""
-    T = model.way.poses(measured.values)
+    T = model.chain.poses(measured.values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)
     )

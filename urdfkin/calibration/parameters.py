@@ -170,7 +170,7 @@ class CalibrationModel:
     """A parametric chain, with its parameters grouped by joint.
 
     Attributes:
-        way: The chain from base to tip.
+        chain: The chain from base to tip.
         groups: Indices of the parameters of each joint, base or tool, in order of preference.
         coupling: The map from the path's coordinates to joint values.
         base: Name of the base frame.
@@ -178,7 +178,7 @@ class CalibrationModel:
         source: The tree or table of the model.
     """
 
-    way: ParametricChain
+    chain: ParametricChain
     groups: tuple[tuple[int, ...], ...]
     coupling: Coupling
     base: str
@@ -187,7 +187,7 @@ class CalibrationModel:
 
     def end(self, which: str, at: FloatArray) -> FloatArray | None:
         """Return the pose (4, 4) of the base or tool at parameters (p,), or None if it is not fitted."""
-        if not any(parameter.end and parameter.where == which for parameter in self.way.parameters):
+        if not any(parameter.end and parameter.where == which for parameter in self.chain.parameters):
             return None
         return self._change(which, at, end=True)
 
@@ -199,7 +199,7 @@ class CalibrationModel:
         found: dict[str, FloatArray] = {}
         if not isinstance(self.source, KinematicTree):
             return found
-        for name in dict.fromkeys(p.where for p in self.way.parameters if not p.end):
+        for name in dict.fromkeys(p.where for p in self.chain.parameters if not p.end):
             change = self._change(name, at)
             if (change != np.eye(4)).any():
                 joint = self.source.joints[self.source.joint_index(name)]
@@ -212,7 +212,7 @@ class CalibrationModel:
         """Return the table with the parameters `at`; None if the model describes a URDF."""
         if not isinstance(self.source, DHTable):
             return None
-        cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.way.parameters) if not p.end}
+        cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.chain.parameters) if not p.end}
 
         def moved(row: DHRow) -> DHRow:
             theta, d, a, alpha, beta = (cells.get((row.joint, cell), getattr(row, cell)) for cell, *_ in _ROW)
@@ -225,7 +225,7 @@ class CalibrationModel:
 
     def _change(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
         """Return the (4, 4) motion by the six parameters of a joint, the base or the tool."""
-        parameters = enumerate(self.way.parameters)
+        parameters = enumerate(self.chain.parameters)
         values = {p.what: float(at[k]) for k, p in parameters if (p.where, p.end) == (where, end)}
         motion = np.eye(4)
         for what, turns, axis in SIX:
@@ -284,8 +284,8 @@ class _ModelBuilder:
             tuple(at[*owner, what] for what in kept.get(owner[0], _KEPT[True]) if (*owner, what) in at)
             for owner in owners
         )
-        way = ParametricChain(Path(tuple(self.steps)), tuple(self.parameters), np.array(self.start))
-        return CalibrationModel(way, groups, path.coupling, *ends, source)
+        chain = ParametricChain(Path(tuple(self.steps)), tuple(self.parameters), np.array(self.start))
+        return CalibrationModel(chain, groups, path.coupling, *ends, source)
 
 
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:

@@ -97,12 +97,12 @@ class FitWithData:
     @cached_property
     def reach(self) -> float:
         """The largest distance (m) of the tip from the base or any joint axis, in the original model."""
-        way = self.model.way
-        T, columns = way.columns(self.measured.values)
-        turning = [k for k, p in enumerate(way.parameters) if p.what in ("rz", "theta")]
+        chain = self.model.chain
+        T, columns = chain.columns(self.measured.values)
+        turning = [k for k, p in enumerate(chain.parameters) if p.what in ("rz", "theta")]
         levers = np.linalg.norm(columns[:, :3, turning], axis=1).max(initial=0.0)
         distance = np.linalg.norm(T[:, :3, 3], axis=1).max(initial=0.0)
-        return min(way.size, float(max(levers, distance))) or way.size
+        return min(chain.size, float(max(levers, distance))) or chain.size
 
     def deviation(self, reach: float) -> float:
         """Return the standard deviation (m) of the residuals; angles are multiplied by the reach."""
@@ -173,16 +173,16 @@ class FitWithData:
         model, fitted = self.model, self.fitted
         near = set[str]()
         if not self.measured.complete:
-            _, columns = model.way.columns(self.measured.values)
+            _, columns = model.chain.columns(self.measured.values)
             levers = np.linalg.norm(columns[:, :3], axis=1).max(axis=0, initial=0.0)
             least = _LARGE_ERROR * self.reach
-            parameters = zip(model.way.parameters, levers.tolist(), strict=True)
+            parameters = zip(model.chain.parameters, levers.tolist(), strict=True)
             near = {p.where for p, lever in parameters if p.what in ("rz", "theta") and lever < least}
         deviations = np.sqrt(np.diag(fitted.covariance))
         for k, deviation in zip(self.identification.kept, deviations.tolist(), strict=True):
-            parameter = model.way.parameters[k]
+            parameter = model.chain.parameters[k]
             if not parameter.end and parameter.where in model.coupling.joints and parameter.where not in near:
-                change = float(fitted.at[k] - model.way.start[k])
+                change = float(fitted.at[k] - model.chain.start[k])
                 yield parameter, change, abs(change) - _UNCERTAIN * deviation
 
 
@@ -347,7 +347,7 @@ class _Trial:
         """The fit of all identifiable parameters."""
         model, measured = self.original.model, self.measured
         noise = Noise(1.0, 1.0 / self.original.reach)
-        ends = [k for k in self.original.identification.kept if model.way.parameters[k].end]
+        ends = [k for k in self.original.identification.kept if model.chain.parameters[k].end]
         before = best_fit(model, measured, ends, noise, self.start)
         identification = identify(model, measured.values, complete=measured.complete, at=self.start)
         fitted = best_fit(model, measured, identification.kept, noise, before.at)

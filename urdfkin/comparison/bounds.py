@@ -66,21 +66,21 @@ class DistanceSearch:
     def __init__(
         self,
         robots: tuple[Robot, Robot],
-        found: Alignment,
+        alignment: Alignment,
         variables: Variables,
         seed: int = 0,
         *,
         as_written: bool = False,
     ) -> None:
-        self.robots, self.found, self.variables = robots, found, variables
+        self.robots, self.alignment, self.variables = robots, alignment, variables
         self.names = list(variables.ranges)
         self.ends = np.array([self._ends(name) for name in self.names]).reshape(-1, 2)
         self.rng = np.random.default_rng(seed)
         #: (4, 4) pose of B's base link in A's root frame, in A's zero configuration.
-        self.T_root_base = found.X @ found.b.homes[found.base[1]]
+        self.T_root_base = alignment.X @ alignment.b.homes[alignment.base[1]]
         #: Whether the base link belongs to the same rigid body as the root link, for each robot.
         self.base_fixed = tuple(
-            m.body_of[link] == 0 for m, link in zip((found.a, found.b), found.base, strict=True)
+            m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
         #: Whether the distances depend on the motion between B's root and the link where the matching begins.
         #: `upper_bounds` and `tighten` do not bound this motion.
@@ -105,7 +105,7 @@ class DistanceSearch:
         tree_a, tree_b = (robot.tree for robot in self.robots)
         q_a = sample(tree_a, len(z), self.rng) if moved else np.tile(neutral(tree_a), (len(z), 1))
         q_b = np.tile(neutral(tree_b), (len(z), 1))
-        for step in self.found.steps:
+        for step in self.alignment.steps:
             joint = tree_a.joints[step.a]
             if joint.kind.nq > 1 and not step.unlike:
                 at, to = tree_a.q_index[step.a], tree_b.q_index[step.b]
@@ -146,16 +146,16 @@ class DistanceSearch:
         """Return the result of `poses` at configurations (n, nq), computed by the function `computed`."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
-        base = b.tree.link_frames[self.found.base[1]]
+        base = b.tree.link_frames[self.alignment.base[1]]
         Ts_b = computed(b, q_b, [base, *(b.tree.link_frames[frame.b] for frame in frames)])
         tools = np.array([inverse(frame.tool) for frame in frames]).reshape(-1, 4, 4)
         if self.unbounded:
-            return Ts_a, self.found.X @ Ts_b[:, 1:] @ tools
+            return Ts_a, self.alignment.X @ Ts_b[:, 1:] @ tools
         T_root_base = self.T_root_base
         if not self.base_fixed[0]:
-            link = self.found.base[0]
+            link = self.alignment.base[0]
             moved = computed(a, q_a, [a.tree.link_frames[link]])
-            T_root_base = moved @ inverse(self.found.a.homes[link]) @ T_root_base
+            T_root_base = moved @ inverse(self.alignment.a.homes[link]) @ T_root_base
         return Ts_a, T_root_base @ np.linalg.inv(Ts_b[:, :1]) @ Ts_b[:, 1:] @ tools
 
     def distances_at(
@@ -239,7 +239,7 @@ class DistanceSearch:
 
     def _variables_of(self, frame: FramePair) -> list[int]:
         """Return the indices of the variables that move a frame in A or in B."""
-        steps = set(self.found.indices(frame.previous))
+        steps = set(self.alignment.indices(frame.previous))
         names = {
             line.variable
             for i, pair in enumerate(self.variables.pairs)
@@ -248,7 +248,7 @@ class DistanceSearch:
             if line.slope
         }
         trees = self.robots[0].tree, self.robots[1].tree
-        for step in (self.found.steps[i] for i in steps):
+        for step in (self.alignment.steps[i] for i in steps):
             if step.unlike == "kind":
                 names |= {f"a:{trees[0].joints[step.a].name}", f"b:{trees[1].joints[step.b].name}"}
         return [i for i, name in enumerate(self.names) if name in names]
@@ -289,7 +289,7 @@ class Boxes:
         trees = [robot.tree for robot in search.robots]
         self.frames = trees[0].link_frames[frame.a], trees[1].link_frames[frame.b]
         q = search.configurations(self.middle[np.newaxis])[1]
-        base = trees[1].link_frames[search.found.base[1]]
+        base = trees[1].link_frames[search.alignment.base[1]]
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
@@ -343,7 +343,7 @@ def tighten(
     The result is `target` if the function proves this bound, and otherwise at most the proven bound `upper`.
     """
     variables = search.variables
-    steps, pairs = relevant_joints(search.found, variables, frame)
+    steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]
     # The search covers one turn of an unlimited revolute joint, but no other unlimited range.
     ranges_are_covered = all(

@@ -16,8 +16,8 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
+    AlignmentChoices,
     FramePair,
-    Gauge,
     JointTransform,
     Variables,
     is_pose,
@@ -241,11 +241,11 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
 
 
 def _errors(document: SameCertificate, comparator: Comparator) -> Iterator[str]:
-    gauge = _gauge(document)
-    if (error := _gauge_error(document, gauge, comparator)) is not None:
+    choices = _choices(document)
+    if (error := _choices_error(document, choices, comparator)) is not None:
         yield error
         return
-    alignment = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, gauge)
+    alignment = align(*comparator.mechanisms, {one["a"]: one["b"] for one in document["joints"]}, choices)
     variables = variables_of(alignment, comparator.tolerance)
     result = comparator.result_without_bounds(alignment, variables)
     wrong = list(_statement_errors(document, comparator, result))
@@ -332,9 +332,9 @@ def _confirmation_errors(
         yield f"`checked`: Pinocchio finds at most {metres:.2g} m, not {claimed['metres']:.2g} m"
 
 
-def _gauge(document: SameCertificate) -> Gauge:
+def _choices(document: SameCertificate) -> AlignmentChoices:
     joints, base = document["joints"], document["base_links"]
-    return Gauge(
+    return AlignmentChoices(
         (base[0], base[1]),
         np.array(document["base"]),
         {one["a"]: (one["sense"], one["offset"]) for one in joints},
@@ -347,18 +347,20 @@ def _gauge(document: SameCertificate) -> Gauge:
     )
 
 
-def _gauge_error(document: SameCertificate, gauge: Gauge, comparator: Comparator) -> str | None:
+def _choices_error(
+    document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
+) -> str | None:
     """Return the reason why the certificate's alignment of B with A is not allowed, or None."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
         b.tree.joint_index(joint["b"])
-    if not is_pose(JointKind.FLOATING, gauge.X):
+    if not is_pose(JointKind.FLOATING, choices.X):
         return "`base`: the matrix is not a rigid motion"
-    for name, conversion in gauge.conversions.items():
+    for name, conversion in choices.conversions.items():
         if not conversion.holds_for(a.tree.joints[a.tree.joint_index(name)].kind):
             return f"joint {name}: its conversion is not possible for a joint of this kind"
-    for names in gauge.orders:
+    for names in choices.orders:
         if not b.allows_order(names, comparator.tolerance):
             return f"`orders`: the axes do not allow the order {', '.join(names)}"
         b = b.reordered(names)
@@ -434,7 +436,7 @@ def _interval_errors(
     for grid in (COARSE, FINE):
         proven = math.inf, math.inf
         if not search.unbounded:
-            proven = upper_bounds(search.found, search.variables, frame, grid)
+            proven = upper_bounds(search.alignment, search.variables, frame, grid)
         if holds := _within(proven[0], metres, rounding[0]) and _within(proven[1], radians, rounding[1]):
             break
     if holds:

@@ -650,7 +650,7 @@ def changes_of_b(
             lines.append(("free joints", _conversion_words(alignment, step, step.conversion, rounding)))
         if step.sense < 0 or step.offset:
             sign = "-" if step.sense < 0 else ""
-            least = rounding.angle if step.kind == "turns" else rounding.way
+            least = rounding.angle if step.kind == "turns" else rounding.distance
             offset = _rounded(step.offset, least)
             twelfth = nearest_twelfth(offset)
             if step.kind == "turns" and abs(offset - twelfth) <= 2.0 * least:
@@ -745,7 +745,7 @@ def pose_words(T: FloatArray, rounding: Tolerance) -> str:
     xyz, rpy = T[:3, 3], rpy_of(T[:3, :3])
     words = (
         " ".join(repr(_rounded(float(x), least)) for x in numbers)
-        for numbers, least in ((xyz, rounding.way), (rpy, rounding.angle))
+        for numbers, least in ((xyz, rounding.distance), (rpy, rounding.angle))
     )
     return 'xyz="{}" rpy="{}"'.format(*words)
 
@@ -839,7 +839,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
     """Return the tilt (rad) and shift (m) of a joint or frame between A and B; 0 if within rounding."""
-    return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.way else 0.0
+    return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 
 
 def remarks(

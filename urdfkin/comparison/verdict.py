@@ -302,8 +302,8 @@ class Comparator:
         poses of the table's other links depend on its convention.
         """
         a, b = self.mechanisms
-        gauge = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
-        written = align(a, b, alignment.names, gauge)
+        choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
+        written = align(a, b, alignment.names, choices)
         written.frames = written.frames_of(self._compared_links(alignment))
         return written
 
@@ -348,7 +348,7 @@ class Comparator:
         reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(travels)
         slides = sum(pair.rounding for kind, pair in pairs if kind == "prismatic")
         turns = sum(pair.rounding for kind, pair in pairs if kind != "prismatic")
-        metres = alignment.deepest * self.tolerance.way
+        metres = alignment.deepest * self.tolerance.distance
         radians = alignment.deepest * self.tolerance.angle + turns
         return metres + slides + radians * reach, radians
 
@@ -360,7 +360,7 @@ class Comparator:
         search = self.search(alignment, variables)
         largest = search.largest_distances([frames[k] for k in different])
         worst = dict(zip(different, largest, strict=True))
-        self._sharpen(uppers, frames, search, NEAR * max((way for way, _ in largest), default=0.0))
+        self._sharpen(uppers, frames, search, NEAR * max((metres for metres, _ in largest), default=0.0))
         return tuple(
             self._interval(
                 alignment, frame, search, worst.get(k), (uppers[k][0] + metres, uppers[k][1] + radians)
@@ -480,7 +480,7 @@ class Comparator:
 
 
 def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    return max((way for way, _ in bounds), default=0.0), max((turn for _, turn in bounds), default=0.0)
+    return max((m for m, _ in bounds), default=0.0), max((r for _, r in bounds), default=0.0)
 
 
 def _reversed(names: Mapping[str, str]) -> dict[str, str]:
@@ -808,7 +808,7 @@ class JointComparison:
     ) -> Iterator[JointDifference]:
         """Yield a difference if the tilt (rad) or the shift (m) exceeds its bound (m, rad)."""
         metres, radians = bound.tolist()
-        far, turned = shift > metres + self.tolerance.way, tilt > radians + self.tolerance.angle
+        far, turned = shift > metres + self.tolerance.distance, tilt > radians + self.tolerance.angle
         if far or turned:
             sizes = size_words(shift if far else 0.0, tilt if turned else 0.0)
             explained = [length(metres)] * far + [angle(radians)] * turned if bound.any() else []

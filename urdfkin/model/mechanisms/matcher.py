@@ -32,9 +32,9 @@ from urdfkin.model.mechanisms.joint_matching import (
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
+    AlignmentChoices,
     Edge,
     FramePair,
-    Gauge,
     JointTransform,
     MatchedJoints,
     Mechanism,
@@ -100,7 +100,7 @@ class MechanismMatcher:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
         pairing: Finds the joints of `a` and `b` that may be matched.
-        gauge: Prescribed choices, for example zero offsets. None: the matcher finds the choices for which
+        choices: Prescribed choices, for example zero offsets. None: the matcher finds the choices for which
             most joints and links agree.
         ahead: Number of joint pairs that the matcher may compare ahead of the current joint.
         tolerance: Tolerance for the comparison of poses and axes.
@@ -113,20 +113,20 @@ class MechanismMatcher:
         a: Mechanism,
         b: Mechanism,
         pairing: Pairing,
-        gauge: Gauge | None,
+        choices: AlignmentChoices | None,
         ahead: LookAhead,
         tolerance: Tolerance,
         base: tuple[int, int] | None,
     ) -> None:
-        self.a, self.b, self.pairing, self.gauge, self.ahead = a, b, pairing, gauge, ahead
+        self.a, self.b, self.pairing, self.choices, self.ahead = a, b, pairing, choices, ahead
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
         self.subtree_sizes = _subtree_sizes(a), _subtree_sizes(b)
         #: Number of joints and links that agree in the best alignment so far.
         self.matched = 0
-        #: Search for exactly matching subtrees; None if `gauge` prescribes the alignment.
+        #: Search for exactly matching subtrees; None if the choices are prescribed.
         self.exact: Congruence | None = None
-        if gauge is None and max(*a.depths, *b.depths) <= DEEPEST:
+        if choices is None and max(*a.depths, *b.depths) <= DEEPEST:
             self.exact = Congruence(a, b, pairing, tolerance, self._poses_after)
 
     # -- first bodies ------------------------------------------------------------------------------
@@ -149,13 +149,13 @@ class MechanismMatcher:
         The most likely pair comes first. A pair is omitted if it allows fewer matches than the best alignment
         so far has.
         """
-        if self.gauge is not None:
-            names = self.gauge.base
+        if self.choices is not None:
+            names = self.choices.base
             base = next(self._start_bodies())
             if names is not None:
                 links = self.a.tree.link_index(names[0]), self.b.tree.link_index(names[1])
                 base = self.a.body_of[links[0]], self.b.body_of[links[1]]
-            X = self.gauge.X
+            X = self.choices.X
             yield base, IDENTITY if self.tolerance.holds(*pose_difference(IDENTITY, X)) else X
             return
         bases = list(self._start_bodies())
@@ -299,20 +299,20 @@ class MechanismMatcher:
         for link_a, link_b in pairs:
             home = self.a.homes[link_a]
             at, seen = place.G @ home, place.XC @ self.b.homes[link_b]
-            angle, way = pose_difference(at, seen)
+            angle, distance = pose_difference(at, seen)
             end = IDENTITY
-            if self.tolerance.holds(angle, way):
-                angle = way = 0.0
+            if self.tolerance.holds(angle, distance):
+                angle = distance = 0.0
                 found.matched += 1
             else:
                 end = inverse(place.G) @ seen @ inverse(home)
-                found.worst = max(found.worst, angle * self.size + way)
-            found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, way))
+                found.worst = max(found.worst, angle * self.size + distance)
+            found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, distance))
 
     def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
         """Return two links of matched bodies that can be different end-effector frames.
 
-        The result is None if links of the bodies match, or if a body has only links of the other model.
+        The result is None if links of the bodies match, or if a body has only link names of the other model.
         """
         ours, theirs = self._own_links(place)
         if matched or not ours or not theirs:
@@ -381,8 +381,8 @@ class MechanismMatcher:
         at, seen = place.G @ homes[0], place.XC @ homes[1]
         axis, back = Screw(homes[0][:3, 2], homes[0][:3, 3]), backwards[0] != backwards[1]
         step = MatchedJoints(e.joint, f.joint, kind, place.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0)
-        given = None if self.gauge is None else self.gauge.conversions.get(self.a.joint(e).name)
-        as_written = self.gauge is not None and given is None
+        given = None if self.choices is None else self.choices.conversions.get(self.a.joint(e).name)
+        as_written = self.choices is not None and given is None
         if as_written:
             K, tilt, shift = seen @ inverse(at), *pose_difference(at, seen)
         else:
@@ -485,8 +485,8 @@ class MechanismMatcher:
     # -- zero offsets ------------------------------------------------------------------------------
 
     def _prescribed(self, joint: str) -> tuple[int, float | None]:
-        """Return the sign and the zero offset that `gauge` prescribes, or (0, None)."""
-        return (0, None) if self.gauge is None else self.gauge.zeros.get(joint, (1, 0.0))
+        """Return the prescribed sign and zero offset of a joint, or (0, None)."""
+        return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
         self, there: BodyPair, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
@@ -632,17 +632,18 @@ LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
 MOST_EXCHANGED = 12
 
 
-def align(a: Mechanism, b: Mechanism, given: Mapping[str, str], gauge: Gauge | None = None) -> Alignment:
+def align(
+    a: Mechanism, b: Mechanism, given: Mapping[str, str], choices: AlignmentChoices | None = None
+) -> Alignment:
     """Align B with A.
 
-    `given` contains names of joints of A, each with the name of the matched joint in B. `gauge` prescribes
-    choices, for example zero offsets. Without a `gauge`, the function finds the choices for which most joints
-    and links agree.
+    `given` contains names of joints of A, each with the name of the matched joint in B. Without prescribed
+    `choices`, such as zero offsets, the function finds the choices for which most joints and links agree.
     """
-    if gauge is not None:
-        for taken in gauge.orders:
+    if choices is not None:
+        for taken in choices.orders:
             b = b.reordered(taken)
-        return _best_alignment(a, b, given, gauge)
+        return _best_alignment(a, b, given, choices)
     best = _best_alignment(a, b, given, None, LookAhead(MOST_AHEAD))
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.complete:
@@ -680,8 +681,8 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
-    gauge = best.gauge
-    found = _best_alignment(best.a, best.b, best.names, replace(gauge, zeros={**gauge.zeros, **zeros}))
+    choices = best.choices
+    found = _best_alignment(best.a, best.b, best.names, replace(choices, zeros={**choices.zeros, **zeros}))
     return found if found.differing <= best.differing and found.worst <= best.worst else best
 
 
@@ -721,7 +722,7 @@ def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignm
         unmatched = [(len(one.only_a), len(one.only_b)) for one in (rough, best)]
         if rough.inner_differences[1] or unmatched[0] != unmatched[1]:
             continue
-        exact = _best_alignment(a, b, rough.names, rough.gauge)
+        exact = _best_alignment(a, b, rough.names, rough.choices)
         return exact if exact.inner_differences[1] < TWICE_AS_WELL * most else best
     return best
 
@@ -730,14 +731,14 @@ def _best_alignment(
     a: Mechanism,
     b: Mechanism,
     given: Mapping[str, str],
-    gauge: Gauge | None,
+    choices: AlignmentChoices | None,
     ahead: LookAhead | None = None,
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
     tolerance = tolerance or tolerance_of(a, b)
     pairing = Pairing(a, b, given, tolerance)
-    return MechanismMatcher(a, b, pairing, gauge, ahead or LookAhead(0), tolerance, base).best()
+    return MechanismMatcher(a, b, pairing, choices, ahead or LookAhead(0), tolerance, base).best()
 
 
 #: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.
@@ -793,10 +794,10 @@ class _Rule:
         return self.free or abs(difference) <= LEVER * tolerance.angle * max(1.0, abs(offset))
 
 
-def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
+def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, tuple[int, float]]:
     """Return {name in A: (sign, zero offset)} for joints whose zero offset the mimic rules determine."""
     zeros = dict[str, tuple[int, float]]()
-    for rules in _groups(found):
+    for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
         # Only joint pairs with the most frequent quotient alpha get a new zero offset.
         alpha = max(
@@ -812,8 +813,8 @@ def zeros_by_rules(found: Alignment, tolerance: Tolerance) -> Mapping[str, tuple
         for rule in fit:
             wanted = rule.wanted(beta)
             if rule.allows(wanted, tolerance) and not _near(wanted, rule.offset, tolerance):
-                step = found.steps[rule.step]
-                zeros[found.a.tree.joints[step.a].name] = step.sense, wanted
+                step = alignment.steps[rule.step]
+                zeros[alignment.a.tree.joints[step.a].name] = step.sense, wanted
     return zeros
 
 
@@ -821,16 +822,16 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
     return abs(x - y) <= 0.5 * tolerance.angle * max(1.0, abs(x), abs(y))
 
 
-def _groups(found: Alignment) -> Iterator[list[_Rule]]:
+def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
     """Yield groups of joint pairs that depend on one coordinate of A and one coordinate of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
-    for i, step in enumerate(found.steps):
+    for i, step in enumerate(alignment.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):
             continue
-        x, m, c = _as_rule(found.a.tree.joints[step.a])
-        y, n, d = _as_rule(found.b.tree.joints[step.b])
+        x, m, c = _as_rule(alignment.a.tree.joints[step.a])
+        y, n, d = _as_rule(alignment.b.tree.joints[step.b])
         slope, constant = step.sense * m, step.sense * c
-        determined, meets = _is_determined(found, i)
+        determined, meets = _is_determined(alignment, i)
         rule = _Rule(i, slope, constant, n, d, step.offset, step.kind == "turns", not determined, meets)
         groups.setdefault((x, y), []).append(rule)
     yield from (rules for rules in groups.values() if len(rules) > 1)
@@ -842,17 +843,17 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
     return (joint.name, 1.0, 0.0) if rule is None else (rule.leader, rule.multiplier, rule.offset)
 
 
-def _is_determined(found: Alignment, i: int) -> tuple[bool, bool]:
+def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
     """Return whether axes or links with equal names determine a joint's zero offset, and `_Rule.meets`."""
-    names = set(found.a.labels) & set(found.b.labels)
+    names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
-    for k, step in enumerate(found.steps):
+    for k, step in enumerate(alignment.steps):
         if step.previous in behind:
-            if step.differs or step.unlike or step.conversion or not _keeps_axis(found.steps[i], step):
+            if step.differs or step.unlike or step.conversion or not _keeps_axis(alignment.steps[i], step):
                 return True, True
             behind.add(k)
-    carried = [frame for frame in found.frames if frame.previous in behind]
-    determined = any(found.a.labels[frame.a] in names for frame in carried)
+    carried = [frame for frame in alignment.frames if frame.previous in behind]
+    determined = any(alignment.a.labels[frame.a] in names for frame in carried)
     return determined, any(frame.tool is IDENTITY for frame in carried)
 
 

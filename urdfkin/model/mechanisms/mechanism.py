@@ -382,10 +382,10 @@ class Tolerance:
     """The largest angle (rad) and the largest distance (m) that rounding errors can explain."""
 
     angle: float
-    way: float
+    distance: float
 
-    def holds(self, angle: float, way: float) -> bool:
-        return angle <= self.angle and way <= self.way
+    def holds(self, angle: float, distance: float) -> bool:
+        return angle <= self.angle and distance <= self.distance
 
 
 def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
@@ -524,7 +524,7 @@ class Alignment:
 
     @property
     def complete(self) -> bool:
-        """Whether all joints and links of A and B are matched, and agree."""
+        """Whether all joints of A and B are matched, and all matched joints and links agree."""
         alike = not any(step.unlike for step in self.steps)
         return alike and not (self.worst or self.only_a or self.only_b)
 
@@ -559,10 +559,10 @@ class Alignment:
         return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
 
     @property
-    def gauge(self) -> Gauge:
+    def choices(self) -> AlignmentChoices:
         """The choices that this alignment made, for example the zero offset of each joint."""
         joints = self.a.tree.joints
-        return Gauge(
+        return AlignmentChoices(
             (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
             self.X,
             {joints[step.a].name: (step.sense, step.offset) for step in self.steps},
@@ -622,7 +622,7 @@ class Alignment:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Gauge:
+class AlignmentChoices:
     """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
@@ -642,7 +642,7 @@ class Gauge:
 
 
 #: The choices for a comparison without changes: equal root poses, and equal coordinates for each joint.
-AS_WRITTEN = Gauge()
+AS_WRITTEN = AlignmentChoices()
 
 
 @dataclass(frozen=True, slots=True)
@@ -716,18 +716,18 @@ class Variables:
         return max(abs(low), abs(high))
 
 
-def variables_of(found: Alignment, tolerance: Tolerance) -> Variables:
+def variables_of(alignment: Alignment, tolerance: Tolerance) -> Variables:
     """Return the values of all matched joints of an alignment, and the ranges of their variables."""
-    return _VariablesBuilder(found, tolerance).variables()
+    return _VariablesBuilder(alignment, tolerance).variables()
 
 
 class _VariablesBuilder:
-    def __init__(self, found: Alignment, tolerance: Tolerance) -> None:
-        self.found, self.tolerance = found, tolerance
-        self.trees = found.a.tree, found.b.tree
-        self.step_of_b = {step.b: step for step in found.steps}
+    def __init__(self, alignment: Alignment, tolerance: Tolerance) -> None:
+        self.alignment, self.tolerance = alignment, tolerance
+        self.trees = alignment.a.tree, alignment.b.tree
+        self.step_of_b = {step.b: step for step in alignment.steps}
         self.leaders = self._leaders()
-        self.deepest = found.deepest
+        self.deepest = alignment.deepest
 
     def _leaders(self) -> dict[str, LinearFunction]:
         """Return each coordinate of B: a linear function of a coordinate of A, or a new variable.
@@ -771,7 +771,7 @@ class _VariablesBuilder:
 
     def variables(self) -> Variables:
         pairs, rules = list[MatchedValues | None](), list[int]()
-        for i, step in enumerate(self.found.steps):
+        for i, step in enumerate(self.alignment.steps):
             if step.kind in ("planar", "floating") or step.unlike == "kind":
                 pairs.append(None)
                 continue
@@ -816,7 +816,7 @@ class _VariablesBuilder:
             if k == 0 or name not in first:
                 first[name] = ends
 
-        for step, pair in zip(self.found.steps, pairs, strict=True):
+        for step, pair in zip(self.alignment.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
                 if pair is None:  # each of two joints of different kinds has its own coordinate
@@ -831,7 +831,7 @@ class _VariablesBuilder:
                 else:
                     mimic.add(line.variable)
         # A joint that only one model has can be mimicked by a joint that both models have.
-        for k, unpaired in enumerate((self.found.only_a, self.found.only_b)):
+        for k, unpaired in enumerate((self.alignment.only_a, self.alignment.only_b)):
             for joint in (self.trees[k].joints[j] for j in unpaired):
                 if joint.nq == 1 and (name := f"{'ab'[k]}:{joint.name}") in mimic:
                     restrict(k, name, limits(joint))

@@ -220,7 +220,7 @@ MOST_VALUES = 1024
 
 
 def upper_bounds(
-    found: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE
+    alignment: Alignment, variables: Variables, frame: FramePair, grid: Grid = COARSE
 ) -> tuple[float, float]:
     """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
@@ -228,7 +228,7 @@ def upper_bounds(
     They are inf if the difference grows without bound with the value of an unlimited joint, or if two matched
     joints are of different kinds.
     """
-    steps, pairs = from_first_difference(found, variables, frame)
+    steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
         return 0.0, 0.0
     if any(step.unlike and pair is None for step, pair in zip(steps, pairs, strict=True)):
@@ -241,11 +241,11 @@ def upper_bounds(
 
 
 def from_first_difference(
-    found: Alignment, variables: Variables, frame: FramePair
+    alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the steps and joint values on the path to a frame, starting with the first step that differs."""
-    steps = found.path(frame.previous)
-    pairs = [variables.pairs[i] for i in found.indices(frame.previous)]
+    steps = alignment.path(frame.previous)
+    pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
     return steps[first:], pairs[first:]
 
@@ -551,7 +551,7 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 
 
 def relevant_joints(
-    found: Alignment, variables: Variables, frame: FramePair
+    alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
 
@@ -559,8 +559,11 @@ def relevant_joints(
     length of D if a joint after the first difference mimics it. So the result begins with the first joint
     that differs, or whose variable also moves a joint after the first difference.
     """
-    steps, pairs = found.path(frame.previous), [variables.pairs[i] for i in found.indices(frame.previous)]
-    first = len(steps) - len(from_first_difference(found, variables, frame)[0])
+    steps, pairs = (
+        alignment.path(frame.previous),
+        [variables.pairs[i] for i in alignment.indices(frame.previous)],
+    )
+    first = len(steps) - len(from_first_difference(alignment, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
             first = i  # all joints from joint i to the first difference are included

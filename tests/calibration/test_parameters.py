@@ -1,4 +1,4 @@
-"""How the tip moves with each parameter, against difference quotients at fifty digits."""
+"""Derivatives of the tip's pose by each parameter, compared with difference quotients at fifty digits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from urdfkin.robot.loading import load
 from urdfkin.verify.exact.numbers import ExactJoint, about, exact, precision, read_exact
 from urdfkin.verify.exact.recursion import move
 
-#: Small enough that its square is no digit of a double, large enough to keep thirty of fifty digits.
+#: Step of the difference quotients: its square is below the precision of a double, and thirty digits remain.
 STEP = exact(2.0**-66)
 Pose = tuple[Matrix, Vector]
 
@@ -55,10 +55,10 @@ def elementary(turns: bool, axis: int, value: Number) -> Pose:
 
 
 def quotients(model: CalibrationModel, tip: Callable[[dict[int, Number]], Pose]) -> FloatArray:
-    """(6, p) twists of the tip for each parameter, of poses at fifty digits."""
-    found = np.zeros((6, len(model.way.parameters)))
+    """Return the twists (6, p) of the tip by each parameter, from poses at fifty digits."""
+    found = np.zeros((6, len(model.chain.parameters)))
     here = tip({})
-    for k in range(len(model.way.parameters)):
+    for k in range(len(model.chain.parameters)):
         (R_1, p_1), (R_2, p_2) = tip({k: -STEP}), tip({k: STEP})
         rate = [eq.times(1 / (2 * STEP), eq.minus(y, x)) for x, y in zip(R_1, R_2, strict=True)]
         W = eq.product(tuple(rate), eq.transposed(here[0]))
@@ -69,9 +69,9 @@ def quotients(model: CalibrationModel, tip: Callable[[dict[int, Number]], Pose])
 
 
 def six(model: CalibrationModel, where: str, moved: dict[int, Number]) -> Pose:
-    """What the six of a place do."""
+    """Return the motion by the six parameters of a joint, the base or the tool."""
     push: Pose = IDENTITY, ZERO
-    for k, parameter in enumerate(model.way.parameters):
+    for k, parameter in enumerate(model.chain.parameters):
         if parameter.where == where and parameter.what != "gain":
             axis = "xyz".index(parameter.what[-1])
             push = joined(push, elementary(parameter.what[0] == "r", axis, moved.get(k, 0)))
@@ -87,7 +87,7 @@ def test_a_urdfs_columns_are_the_difference_quotients_of_its_text_at_fifty_digit
     model = urdf_model(robot.tree, tip, base, ("base", "tool", "origins", "gains"))
     q = robot.sample(1, 3)[0]
     joints = read_exact(robot.urdf, robot.tree)
-    numbers = {(p.where, p.what): k for k, p in enumerate(model.way.parameters)}
+    numbers = {(p.where, p.what): k for k, p in enumerate(model.chain.parameters)}
 
     def moved_joint(name: str, own: ExactJoint, moved: dict[int, Number]) -> ExactJoint:
         joint = robot.tree.joints[robot.tree.joint_index(name)]
@@ -106,11 +106,11 @@ def test_a_urdfs_columns_are_the_difference_quotients_of_its_text_at_fifty_digit
         return joined(joined(six(model, "base", moved), way), six(model, "tool", moved))
 
     values = model.coupling.values(model.coupling.select(robot.tree, q[np.newaxis]))
-    columns = model.way.columns(values)[1][0]
-    bound = model.way.rounding(values)
+    columns = model.chain.columns(values)[1][0]
+    bound = model.chain.rounding(values)
     difference = np.abs(columns - quotients(model, place))
     assert difference[:3].max() < bound
-    assert difference[3:].max() < bound / model.way.size
+    assert difference[3:].max() < bound / model.chain.size
 
 
 def table(convention: DHConvention) -> DHTable:
@@ -132,7 +132,7 @@ def test_a_tables_columns_are_the_difference_quotients_of_its_product_at_fifty_d
 ) -> None:
     dh = table(convention)
     model = table_model(dh, ("base", "tool", "origins", "gains"))
-    names = [(p.where, p.what) for p in model.way.parameters]
+    names = [(p.where, p.what) for p in model.chain.parameters]
     assert [where for where, what in names if what == "beta"] == ["two", "four"]
     numbers, q = {name: k for k, name in enumerate(names)}, np.array([[0.3, -0.5, 0.2, 1.1]])
 
@@ -154,7 +154,7 @@ def test_a_tables_columns_are_the_difference_quotients_of_its_product_at_fifty_d
         return joined(T, six(model, "tool", moved))
 
     values = dh.coupling.values(q)
-    poses, columns = model.way.columns(values)
+    poses, columns = model.chain.columns(values)
     np.testing.assert_allclose(poses, dh.placement(q), atol=1e-14)
     difference = np.abs(columns[0] - quotients(model, place))
-    assert difference.max() < model.way.rounding(values)
+    assert difference.max() < model.chain.rounding(values)
