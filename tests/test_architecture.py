@@ -94,7 +94,7 @@ def test_every_path_on_the_page_exists() -> None:
     assert [path for path in paths if not (root / path).exists()] == []
 
 
-def test_importing_the_package_or_asking_for_help_loads_nothing_heavy() -> None:
+def test_import_and_help_load_no_heavy_module() -> None:
     heavy = "{'numpy', 'numba', 'pinocchio', 'yourdfpy', 'rich', 'matplotlib', 'lxml'}"
     for code in ("import urdfkin", "import urdfkin.cli as c; c.cli(['--help'], standalone_mode=False)"):
         script = f"import sys; {code}; print(sorted({heavy} & set(sys.modules)))"
@@ -106,7 +106,7 @@ def test_importing_the_package_or_asking_for_help_loads_nothing_heavy() -> None:
 TWICE = {"Known", "Product"}
 
 
-def test_a_class_name_stands_for_one_thing() -> None:
+def test_each_class_has_its_own_name() -> None:
     found = [
         node.name
         for path in Path(urdfkin.__file__).parent.rglob("*.py")

@@ -54,7 +54,7 @@ def test_the_quick_benchmark_finds_equal_results_and_writes_every_section(tmp_pa
     xml.dom.minidom.parse(str(picture))
 
 
-def test_a_wrong_number_fails_the_run_and_names_who_has_it(
+def test_a_wrong_number_fails_the_run_and_names_the_contender(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     right: Any = Robot.jacobian
@@ -66,7 +66,7 @@ def test_a_wrong_number_fails_the_run_and_names_who_has_it(
 
 
 @pytest.mark.parametrize("theirs", [np.ones((3, 6)) + 2e-9, np.full((3, 6), np.nan), np.ones((3, 6, 1))])
-def test_another_number_no_number_and_another_shape_are_differences(theirs: FloatArray) -> None:
+def test_a_different_number_nan_and_a_different_shape_are_differences(theirs: FloatArray) -> None:
     reference = Work("reference", 3, lambda: None, lambda: np.ones((3, 6)))
     agree([reference, Work("floor", 3, lambda: None)], reference, "ones")
     with pytest.raises(DifferenceError, match="ones: other"):
@@ -89,7 +89,7 @@ def test_each_contender_computes_once_untimed_and_once_timed_in_each_round() -> 
     assert fast.median_ns < slow.minimum_ns
 
 
-def test_a_library_or_a_program_that_is_missing_is_listed_and_left_out() -> None:
+def test_a_missing_library_or_program_is_listed_and_not_measured() -> None:
     def never(subject: Subject, quantity: str) -> Iterator[Work]:
         raise AssertionError
 
@@ -104,7 +104,7 @@ def test_a_library_or_a_program_that_is_missing_is_listed_and_left_out() -> None
 
 
 @pytest.mark.parametrize(("name", "frame"), [*SUBJECTS, ("polar", "slider")])
-def test_the_path_written_out_for_a_robot_has_its_jacobian_and_acceleration(name: str, frame: str) -> None:
+def test_the_equations_of_a_path_give_the_robots_jacobian_and_acceleration(name: str, frame: str) -> None:
     with Subject(name, frame, 1) as subject:
         q, v, a = subject.q[0], subject.v[0], subject.a[0]
         of_q, of_v = (subject.plan.steps[:, place] for place in (StepField.Q, StepField.V))
@@ -120,7 +120,7 @@ def test_the_path_written_out_for_a_robot_has_its_jacobian_and_acceleration(name
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which(generated.COMPILER) is None, reason="no C compiler")
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_code_generated_for_a_robot_computes_what_it_does_and_writes_nothing_else(quantity: str) -> None:
+def test_generated_code_computes_the_robots_results_and_writes_only_the_output(quantity: str) -> None:
     pytest.importorskip("casadi")
     with Subject("polar", "slider", 17) as subject:
         compute = generated.compiled(subject, quantity)
@@ -134,7 +134,7 @@ def test_code_generated_for_a_robot_computes_what_it_does_and_writes_nothing_els
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_a_batch_taken_apart_is_whole_when_nothing_is_left_out(quantity: str) -> None:
+def test_a_batch_with_all_its_steps_gives_the_complete_result(quantity: str) -> None:
     with Subject(*SUBJECTS[0], 9) as subject:
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
         sizes = [sections.cut(program, end) for end in range(1, len(sections.PARTS) + 1)]
@@ -148,7 +148,7 @@ def test_a_batch_taken_apart_is_whole_when_nothing_is_left_out(quantity: str) ->
         assert sum(entry["parts"].values()) == pytest.approx(entry["ns"], abs=0.05)
 
 
-def test_a_first_use_is_one_of_what_a_robot_computes() -> None:
+def test_each_measured_first_call_is_a_quantity_of_the_robot() -> None:
     robot = urdfkin.load("one_link", verify=False)
     for use, count in USES.items():
         inputs = [np.zeros(robot.nq)] * count
@@ -171,7 +171,7 @@ def test_the_bare_urdf_is_the_same_robot(name: str, frame: str) -> None:
 
 
 @pytest.mark.parametrize("joints", [1, 12, 100])
-def test_a_chain_has_its_joints_in_a_row_about_axes_of_all_directions(joints: int) -> None:
+def test_a_chain_has_ordered_joints_with_oblique_axes(joints: int) -> None:
     robot = urdfkin.load(chain_urdf(joints), verify=False)
     assert robot.joint_names == tuple(f"joint{i:03}" for i in range(joints))
     assert len([i for i in robot.tree.path(robot.tree.frame_link(TIP)) if robot.tree.joints[i].nv]) == joints
@@ -180,7 +180,7 @@ def test_a_chain_has_its_joints_in_a_row_about_axes_of_all_directions(joints: in
     assert joints == 1 or np.linalg.matrix_rank(axes) == 3
 
 
-def test_a_loop_stores_what_single_calls_return_and_turns_the_order_round() -> None:
+def test_a_loop_stores_the_results_of_single_calls_in_urdfkins_order() -> None:
     with Subject(chain_urdf(3), TIP, 4) as subject:
         calls = Calls("sum", {"f": np.outer}, ("x = q + v", "f(a, x)[:, :1] * [[1.0]]"), order=[2, 0, 1])
         loop, order = calls.loop(), [2, 0, 1]
@@ -194,13 +194,13 @@ def test_a_loop_stores_what_single_calls_return_and_turns_the_order_round() -> N
         single.compute()
 
 
-def test_breadth_first_goes_link_after_link_in_the_files_order() -> None:
+def test_breadth_first_visits_the_links_in_the_files_order() -> None:
     rows = ("shoulder", "base", "upper"), ("wrist", "upper", "hand"), ("neck", "base", "head")
     text = robot(*(joint(name, "revolute", *links) for name, *links in rows))
     assert breadth_first(text) == ["shoulder", "neck", "wrist"]
 
 
-def test_columns_come_to_their_places_by_name() -> None:
+def test_columns_are_placed_by_joint_name() -> None:
     assert positions(("a", "b", "c"), ("c", "a")) == [2, 0]
     full = spread(np.ones((1, 6, 2)) * [3.0, 5.0], [2, 0], 3)
     np.testing.assert_array_equal(full[0, 0], [5.0, 0.0, 3.0])

@@ -50,7 +50,7 @@ def test_a_line_in_the_changelog_in_any_commit_of_the_branch_is_enough(branch: P
 
 
 @pytest.mark.parametrize(("reason", "status"), [(" the same results", 0), ("", 1)])
-def test_what_no_user_notices_is_argued_in_a_commit(reason: str, status: int, branch: Path) -> None:
+def test_a_commit_message_can_state_that_users_notice_nothing(reason: str, status: int, branch: Path) -> None:
     commit(branch, f"Say it shorter\n\nNo-changelog:{reason}", module="two = 2\n")
     assert main(branch) == status
 
@@ -61,13 +61,13 @@ def test_pages_and_moves_need_no_line(branch: Path) -> None:
     assert main(branch) == 0
 
 
-def test_what_is_deleted_is_a_change(branch: Path) -> None:
+def test_a_deletion_is_a_change(branch: Path) -> None:
     git(branch, "rm", "urdfkin/module.py")
     git(branch, "commit", "-m", "Delete")
     assert main(branch) == 1
 
 
-def test_what_main_did_meanwhile_is_not_the_branchs(branch: Path) -> None:
+def test_later_changes_on_main_do_not_count_for_the_branch(branch: Path) -> None:
     commit(branch, "Write", docs="# Denavit-Hartenberg tables\n")
     git(branch, "switch", "main")
     commit(branch, "Change", module="two = 2\n")
@@ -76,7 +76,7 @@ def test_what_main_did_meanwhile_is_not_the_branchs(branch: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["main", "shallow", "archive"])
-def test_where_nothing_can_be_compared_the_gate_says_so_and_passes(
+def test_without_a_commit_to_compare_with_the_gate_reports_this_and_passes(
     branch: Path, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     commit(branch, "Change", module="two = 2\n")

@@ -18,7 +18,7 @@ def last_bit_changed(x: FloatArray) -> FloatArray:
 
 
 @pytest.mark.slow
-def test_results_are_equal_single_in_batches_and_to_those_that_were_kept(
+def test_results_are_equal_in_single_calls_in_batches_and_to_stored_results(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "kept.npz"
@@ -47,7 +47,7 @@ def test_a_row_of_a_batch_that_differs_in_its_last_bit_is_named(
 
 
 @pytest.mark.slow
-def test_a_change_is_told_as_a_share_of_the_bound_and_allowed_within_what_is_given(
+def test_a_change_is_reported_and_limited_as_a_fraction_of_the_bound(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "kept.npz"
@@ -61,7 +61,7 @@ def test_a_change_is_told_as_a_share_of_the_bound_and_allowed_within_what_is_giv
     assert check_bits.main(["--against", str(file), "--within", "1"]) == 0
 
 
-def test_a_zero_of_the_other_sign_is_another_bit_and_no_difference() -> None:
+def test_zeros_of_different_signs_have_different_bits_and_the_difference_zero() -> None:
     kept = {"r/x/LOCAL": np.zeros(1), "r/x/LOCAL/bound": np.zeros(1)}
     assert check_bits.share("r/x/LOCAL", {"r/x/LOCAL": np.zeros(1)}, kept) == 0.0
     assert 0.0 < check_bits.share("r/x/LOCAL", {"r/x/LOCAL": -np.zeros(1)}, kept) < 1e-300

@@ -36,7 +36,7 @@ def environment(folder: Path, share: float) -> Path:
 
 
 @pytest.mark.slow
-def test_a_stopped_run_in_a_library_continues_with_the_files_that_are_left(
+def test_a_stopped_run_in_a_library_continues_with_the_remaining_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, keep = urdfkin.load("planar_two_link"), tmp_path / "jax.jsonl"

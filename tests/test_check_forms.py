@@ -30,7 +30,7 @@ def elbow() -> Subject:
 
 
 @pytest.mark.parametrize("form", sorted(set(RUN) - {"matlab-symbolic"}))
-def test_a_catalogue_robot_goes_through_every_form(form: str, tmp_path: Path) -> None:
+def test_a_catalogue_robot_is_exported_in_every_format(form: str, tmp_path: Path) -> None:
     one = elbow() if form in ("roboticstoolbox", "ets", "matlab-rst") else talos_thumb()
     try:
         (found,) = RUN[form]([one.job], tmp_path)
@@ -56,7 +56,7 @@ def test_a_latex_table_is_as_wide_as_the_page_at_most(tmp_path: Path) -> None:
     assert min(over[2:]) > 0.0
 
 
-def test_a_table_of_another_robot_is_seen() -> None:
+def test_a_table_of_a_different_robot_is_detected() -> None:
     one = elbow()
     rows = (replace(one.table.rows[0], d=one.table.rows[0].d + 1e-9), *one.table.rows[1:])
     assert one.off(replace(one.table, rows=rows).placement(one.job.q))[1] > 1.0

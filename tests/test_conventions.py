@@ -6,11 +6,11 @@ import pytest
 from scripts import make_conventions as maker
 
 
-def test_the_page_is_what_the_libraries_answer() -> None:
+def test_the_page_contains_the_libraries_results() -> None:
     assert maker.PAGE.read_text("utf-8") == maker.page(), "run python scripts/make_conventions.py"
 
 
-def test_a_number_that_is_no_reading_or_two_is_an_error() -> None:
+def test_a_result_that_matches_no_or_two_definitions_is_an_error() -> None:
     readings = {"one": np.ones(3), "two": 2.0 * np.ones(3)}
     assert maker.which(np.ones(3), readings) == "one"
     with pytest.raises(ValueError, match="none"):
@@ -19,7 +19,7 @@ def test_a_number_that_is_no_reading_or_two_is_an_error() -> None:
         maker.which(np.ones(3), readings | {"the same": np.ones(3)})
 
 
-def test_readings_are_clearly_apart_on_the_motion_that_is_asked_about() -> None:
+def test_the_definitions_differ_clearly_for_the_measured_motion() -> None:
     asked = maker.MeasuredMotion()
     for readings in (asked.velocity_readings(), asked.acceleration_readings(flipped=False)):
         values = list(readings.values())

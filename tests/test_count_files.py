@@ -24,7 +24,7 @@ def test_same_of_two_urdf_files_runs_through_at_most_33_files() -> None:
     assert len(files) <= 33, files
 
 
-def test_a_call_counts_and_code_that_runs_during_an_import_does_not() -> None:
+def test_code_that_runs_during_an_import_does_not_count() -> None:
     names: dict[str, Callable[[], None]] = {}
     imported = compile("def f(): pass\nf()", ROOT / "invented.py", "exec")
     assert files_run(lambda: exec(imported, names)) == []

@@ -29,7 +29,7 @@ DOCS = [f"docs/{page}" for page in pages()]
 PAGES = [*DOCS, "docs/examples/robots.yml", "README.md"]
 
 
-def test_the_layout_on_the_page_is_the_schemas() -> None:
+def test_the_layout_on_the_page_is_generated_from_the_schema() -> None:
     page = make_pages.path_of("reports").read_text("utf-8")
     assert page == make_pages.page("reports"), "run python scripts/make_pages.py reports"
 
@@ -48,7 +48,7 @@ def commands() -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(("page", "line"), commands())
-def test_every_command_on_the_pages_is_understood(page: str, line: str) -> None:
+def test_every_command_on_the_pages_can_be_parsed(page: str, line: str) -> None:
     words = shlex.split(line.split(" || ", maxsplit=1)[0].split(" > ", maxsplit=1)[0])[1:]
     group = cli.make_context("urdfkin", ["--help"], resilient_parsing=True)
     command = cli.get_command(group, words[0])
@@ -56,13 +56,13 @@ def test_every_command_on_the_pages_is_understood(page: str, line: str) -> None:
     command.make_context(words[0], words[1:], parent=group)  # raises what the command line would say
 
 
-def test_the_pages_have_commands_to_understand() -> None:
+def test_the_pages_contain_commands() -> None:
     assert len({page for page, _ in commands()}) >= 12
     assert len(commands()) >= 40
 
 
 @pytest.mark.parametrize("page", [*DOCS, "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"])
-def test_links_lead_to_files_and_headings(page: str) -> None:
+def test_links_point_to_existing_files_and_headings(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     for target in re.findall(r"\]\(([^)]+)\)", text) + re.findall(r'src="([^"]+)"', text):
         if target.startswith("https://"):
@@ -119,7 +119,7 @@ def plain(text: str) -> str:
     return " ".join(re.sub(r"<[^>]+>", "", text).split())
 
 
-def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() -> None:
+def test_the_texts_about_validation_list_the_quantities_of_the_table() -> None:
     group = cli.make_context("urdfkin", ["--help"], resilient_parsing=True)
     shown = plain(present(present(cli.get_command(group, "validate")).help))
     template = (ROOT / "urdfkin/report/templates/report.html.j2").read_text("utf-8")
@@ -136,18 +136,18 @@ def test_what_a_validation_compares_is_said_as_the_table_of_quantities_has_it() 
     assert {row.title for row in named} == {*re.split(", | and ", f"{compared()}, {not_compared()}")}
 
 
-def test_no_page_says_that_a_validation_compares_every_quantity() -> None:
+def test_no_page_claims_that_a_validation_compares_every_quantity() -> None:
     texts = [ROOT / page for page in PAGES] + sorted((ROOT / "urdfkin").rglob("*.py"))
     claim = re.compile(r"(?i)every quantity (of every|but the)")
     assert [path for path in texts if claim.search(path.read_text("utf-8"))] == []
 
 
-def test_the_exit_status_without_a_robot_is_the_tables() -> None:
+def test_the_exit_status_without_a_robot_is_the_documented_one() -> None:
     (row,) = re.findall(r"^\| (\d) \|.*no robot was given", (ROOT / "docs/ci.md").read_text("utf-8"), re.M)
     assert run("validate").code == int(row)
 
 
-def test_the_guide_and_the_finding_name_the_same_size() -> None:
+def test_the_guide_and_the_finding_state_the_same_size() -> None:
     (size,) = re.findall(r"URDF604, a robot (smaller than .*):", GUIDE)
     assert size in run("explain", "URDF604").text
 
@@ -162,7 +162,7 @@ def leads_somewhere(name: str) -> bool:
 
 
 @pytest.mark.parametrize("page", [*DOCS, "README.md", "CHANGELOG.md", "CONTRIBUTING.md"])
-def test_every_name_and_file_of_ours_is_there(page: str) -> None:
+def test_every_name_and_file_of_urdfkin_on_a_page_exists(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     names = set(re.findall(r"`(urdfkin(?:\.\w+)+)", text))
     assert {name for name in names if not leads_somewhere(name)} == set()
@@ -178,13 +178,13 @@ HOOKS = (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
 
 
-def test_every_file_that_the_guide_names_is_there() -> None:
+def test_every_file_in_the_guide_exists() -> None:
     named = re.findall(r"(?:urdfkin|tests|scripts|docs)/[\w/.-]*[\w/]", GUIDE)
     assert len(named) > 30
     assert [path for path in named if not (ROOT / path).exists()] == []
 
 
-def test_every_target_that_the_guide_names_is_one() -> None:
+def test_every_make_target_in_the_guide_exists() -> None:
     shown = "\n".join(re.findall(r"^make .*|`make .*?`", GUIDE, re.MULTILINE))
     lines = re.findall(r"`?make ((?:[a-z]+ ?)+)", shown)
     named = {word for line in lines for word in line.split()}
@@ -192,12 +192,12 @@ def test_every_target_that_the_guide_names_is_one() -> None:
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is a convenience")
-def test_make_understands_its_file() -> None:
+def test_make_can_parse_the_makefile() -> None:
     for target in sorted(TARGETS):
         subprocess.run(["make", "--dry-run", target], cwd=ROOT, check=True, capture_output=True)
 
 
-def test_ci_runs_two_commands_that_pass_every_test_between_them() -> None:
+def test_ci_runs_two_commands_that_together_run_every_test() -> None:
     scripts = re.findall(r"^\./(scripts/\S+)$", (ROOT / ".ci/run").read_text("utf-8"), re.MULTILINE)
     assert scripts == ["scripts/test.sh", "scripts/test_long.sh"]
     texts = ((ROOT / name).read_text("utf-8") for name in scripts)
@@ -206,7 +206,7 @@ def test_ci_runs_two_commands_that_pass_every_test_between_them() -> None:
 
 
 @pytest.mark.parametrize("broken", ["", "ruff", "python", "urdfkin", "mypy", "pytest"])
-def test_the_command_of_the_tests_fails_if_one_of_its_parts_does(broken: str, tmp_path: Path) -> None:
+def test_the_test_script_fails_if_one_of_its_steps_fails(broken: str, tmp_path: Path) -> None:
     shutil.copy(ROOT / "scripts/test.sh", tmp_path)
     (tmp_path / "environment.sh").write_text("make_environment() { :; }\n")
     for name in ("ruff", "python", "urdfkin", "mypy", "pytest"):
@@ -273,7 +273,7 @@ def test_every_hook_runs_a_command_of_the_environment_and_needs_no_network() -> 
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "robots").glob("*.urdf")), ids=lambda path: path.stem)
-def test_nothing_can_be_said_against_our_own_robots(path: Path) -> None:
+def test_the_projects_own_robots_have_no_findings(path: Path) -> None:
     assert urdfkin.check(path) == []
 
 
@@ -285,7 +285,7 @@ def counted(name: str, frame: str, quantity: str) -> int:
     return operations(robot.plan([robot.tree.frame_link(frame)]), quantity)
 
 
-def test_one_joint_about_z_at_the_origin_costs_what_one_counts_by_hand() -> None:
+def test_one_joint_about_z_needs_the_operations_counted_by_hand() -> None:
     plan = urdfkin.load(urdfs.robot(urdfs.joint("j", "continuous", "a", "b"))).plan([1])
     # Sine and cosine 51. R Rz: three rows of two numbers, each two products and a sum: 18. The column: p - o
     # 3 and z x d 9, and nothing else.
@@ -296,7 +296,7 @@ def test_one_joint_about_z_at_the_origin_costs_what_one_counts_by_hand() -> None
     assert operations(plan, "acceleration") == 51 + 18 + 6 + 6 + 15
 
 
-def test_what_is_not_asked_for_is_not_counted() -> None:
+def test_operations_of_unused_outputs_are_not_counted() -> None:
     hands = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), ("panda", "panda_leftfinger")
     for name, frame in hands:
         velocity, acceleration = (counted(name, frame, quantity) for quantity in ("velocity", "acceleration"))

@@ -85,7 +85,7 @@ def test_a_picture_follows_the_theme_that_the_reader_chooses(site: Path, tmp_pat
 
 
 @pytest.mark.long
-def test_every_equation_is_mathematics_and_no_formula_is_left_in_the_words_of_latex(site: Path) -> None:
+def test_every_equation_is_mathml_and_no_latex_is_left(site: Path) -> None:
     page = (site / "equations.html").read_text("utf-8")
     assert page.count("<math") == len(equations())
     for path in site.rglob("*.html"):
@@ -94,7 +94,7 @@ def test_every_equation_is_mathematics_and_no_formula_is_left_in_the_words_of_la
 
 @pytest.mark.long
 @pytest.mark.browser
-def test_the_site_opens_from_a_disc_asks_no_network_and_can_be_searched(site: Path, desk: Browser) -> None:
+def test_the_site_works_from_disk_without_network_and_has_a_search(site: Path, desk: Browser) -> None:
     desk.requests()
     for page in ("index", "questions", "lessons/planar-arm", "api"):
         desk.open(site / f"{page}.html")
@@ -131,7 +131,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
         yield browser
 
 
-def test_the_pages_of_commands_and_of_the_library_hold_every_name() -> None:
+def test_the_pages_of_commands_and_library_contain_every_name() -> None:
     page = commands_page()
     assert [name for name in commands() if f"\n## urdfkin {name}\n" not in page] == []
     assert "Usage: urdfkin report merge" in page
@@ -168,7 +168,7 @@ def test_each_name_in_the_reference_has_an_example(path: str) -> None:
 
 
 @pytest.mark.parametrize("page", [page for page in pages() if page.startswith("lessons/")])
-def test_a_lesson_is_a_notebook_with_what_it_prints(page: str) -> None:
+def test_a_lesson_becomes_a_notebook_with_its_outputs(page: str) -> None:
     made = json.loads(json.dumps(notebook((DOCS / page).read_text("utf-8"))))
     code = [cell for cell in made["cells"] if cell["cell_type"] == "code"]
     told = blocks(page)

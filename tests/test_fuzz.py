@@ -32,7 +32,7 @@ def evaluate(text: str) -> Outcome:
     return evaluate_case(Case("by hand", text.encode()))
 
 
-def test_a_mutant_depends_on_seed_and_number_alone() -> None:
+def test_a_mutant_depends_only_on_seed_and_number() -> None:
     files = fuzz.files()
     mutants = [mutant(0, number, files) for number in range(50)]
     assert mutants == [mutant(0, number, files) for number in range(50)]
@@ -41,7 +41,7 @@ def test_a_mutant_depends_on_seed_and_number_alone() -> None:
 
 
 @pytest.mark.parametrize("family", [*robots.FAMILIES, *mjcf.FAMILIES])
-def test_a_robot_depends_on_seed_family_and_number_alone(family: str) -> None:
+def test_a_robot_depends_only_on_seed_family_and_number(family: str) -> None:
     robot = mjcf.robot if family in mjcf.FAMILIES else robots.robot
     made = [robot(0, family, number) for number in range(20)]
     assert made == [fuzz.case(0, family, number) for number in range(20)]
@@ -49,7 +49,7 @@ def test_a_robot_depends_on_seed_family_and_number_alone(family: str) -> None:
     assert made != [robot(1, family, number) for number in range(20)]
 
 
-def test_robots_are_of_every_oddity() -> None:
+def test_the_random_robots_contain_every_unusual_content() -> None:
     made = {family: [robots.robot(3, family, number) for number in range(200)] for family in robots.FAMILIES}
     texts = {family: "".join(each.data.decode() for each in cases) for family, cases in made.items()}
     for name in (*robots.LIKE_OURS, *robots.STRANGE):
@@ -71,13 +71,13 @@ def test_robots_are_of_every_oddity() -> None:
     assert min(x for x in lengths if x) < 1e-310
 
 
-def test_families_share_what_is_asked_for() -> None:
+def test_the_robots_are_distributed_over_the_families() -> None:
     assert fuzz.shares(["mutants"], 3, 5) == [("mutants", 0), ("mutants", 1), ("mutants", 2)]
     assert fuzz.shares(["names", "roots"], 3, 3) == [("names", 0), ("roots", 0), ("names", 1)]
 
 
 @pytest.mark.long
-def test_every_mutator_is_used_and_nearly_all_change_something() -> None:
+def test_every_mutation_is_used_and_nearly_all_change_the_file() -> None:
     files = [path for path in fuzz.files() if path.stat().st_size < 20_000]  # the large are no other
     originals = {path.stem: path.read_bytes() for path in files}
     used, changed = set(), 0
@@ -102,19 +102,19 @@ LARGE = arm(follow='<mimic joint="j1" multiplier="1e300"/>', more=_END)
         (LARGE, "too large to compute, with a finding that states the reason"),
     ],
 )
-def test_the_judge_tells_what_happened(text: str, word: str) -> None:
+def test_the_outcome_of_a_robot_is_reported(text: str, word: str) -> None:
     outcome = evaluate(text)
     assert outcome.word == word, outcome
     assert word in GOOD
 
 
-def test_a_check_that_is_blind_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_check_without_findings_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(urdfkin, "check", lambda data, **options: [], raising=False)
     assert evaluate(arm(axis='<axis xyz="0 0 0"/>')).word == "load refuses a file that check accepts"
     assert evaluate(arm(origin='<origin xyz="0\t0 1"/>')).word not in GOOD
 
 
-def test_a_traceback_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_traceback_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(data: bytes, **options: object) -> None:
         raise KeyError(data)
 
@@ -122,7 +122,7 @@ def test_a_traceback_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert evaluate(arm()).word == "traceback: KeyError"
 
 
-def test_what_only_pinocchio_refuses_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_only_pinocchio_refuses_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuses(*arguments: object, **options: object) -> None:
         raise ValueError("no reason")
 
@@ -134,7 +134,7 @@ def test_what_only_pinocchio_refuses_is_a_finding(monkeypatch: pytest.MonkeyPatc
     assert outcome.word not in GOOD
 
 
-def test_numbers_that_differ_between_two_ways_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_that_differ_between_two_calls_are_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     right: Any = PreparedFrame.velocity
     monkeypatch.setattr(PreparedFrame, "velocity", lambda *asked: np.nextafter(right(*asked), 1.0))
     assert evaluate(arm()).word == "two computations of one result differ"
@@ -156,7 +156,9 @@ def _fails(how: str, pipe: Connection) -> None:
         ("sleeps", "hangs", "no answer in 1 s"),
     ],
 )
-def test_a_worker_that_dies_or_hangs_is_an_outcome_and_is_replaced(how: str, word: str, details: str) -> None:
+def test_a_crash_or_hang_of_a_worker_is_an_outcome_and_the_worker_is_replaced(
+    how: str, word: str, details: str
+) -> None:
     worker = fuzz.Worker(partial(_fails, how), timeout=1.0)
     for _ in range(2):
         assert worker.evaluate("names", 0) == (word, details)
@@ -164,7 +166,7 @@ def test_a_worker_that_dies_or_hangs_is_an_outcome_and_is_replaced(how: str, wor
 
 
 @pytest.mark.long
-def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
+def test_a_short_run_of_mutants_finds_no_failure(tmp_path: Path) -> None:
     counts = fuzz.fuzz(fuzz.shares(["mutants"], 40, 0), seed=20, jobs=1, timeout=60.0, keep=tmp_path)
     assert set(counts) <= set(GOOD), sorted(tmp_path.iterdir())
     assert sum(counts.values()) == 40
@@ -173,7 +175,7 @@ def test_a_short_run_of_mutants_finds_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("family", [*robots.FAMILIES, *mjcf.FAMILIES])
-def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
+def test_a_short_run_of_random_robots_finds_no_failure(family: str) -> None:
     words = Counter(evaluate_case(fuzz.case(20, family, number)).word for number in range(5))
     assert set(words) <= set(GOOD), words
     assert words["verified"] > 2
@@ -182,7 +184,7 @@ def test_a_short_run_of_whole_robots_finds_nothing(family: str) -> None:
 # -- MJCF --------------------------------------------------------------------------------------------------
 
 
-def test_mjcf_files_are_of_every_oddity_and_mujoco_takes_them() -> None:
+def test_the_random_mjcf_files_contain_every_unusual_content_and_mujoco_reads_them() -> None:
     made = {family: [mjcf.robot(3, family, number).data for number in range(100)] for family in mjcf.FAMILIES}
     texts = {family: b"".join(files) for family, files in made.items()}
     for word in (b'align="true"', b'align="auto"', b'alignfree="true"', b'fusestatic="true"', b"<inertial"):
@@ -196,7 +198,7 @@ def test_mjcf_files_are_of_every_oddity_and_mujoco_takes_them() -> None:
     assert sum(model is not None and (model.eq_type == 2).sum() > 2 for model in models) > 20
 
 
-def test_a_reading_of_mjcf_that_is_not_mujocos_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_mjcf_reader_that_differs_from_mujoco_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     text = (
         '<mujoco><worldbody><body name="b"><freejoint name="f" align="true"/><geom size=".1" pos="1 0 0"/>'
         '<site name="s"/></body></worldbody></mujoco>'

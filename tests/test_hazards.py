@@ -22,7 +22,7 @@ def chain(count: int, kind: JointKind = JointKind.FIXED) -> KinematicTree:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("where", ["main thread", "another thread"])
-def test_a_chain_deeper_than_any_stack_is_verified(where: str) -> None:
+def test_a_chain_too_deep_for_the_stack_is_verified(where: str) -> None:
     """Pinocchio's parser kills a process at about 3,800 links, at 480 on a thread with 1 MB of stack."""
     robot = urdfkin.load(to_urdf(chain(5_000)))
     answers = []
@@ -40,7 +40,7 @@ def test_a_chain_deeper_than_any_stack_is_verified(where: str) -> None:
     assert robot.certificate().verified
 
 
-def test_too_many_rates_for_the_memory_are_computed_and_say_why_they_are_not_verified() -> None:
+def test_a_robot_too_large_for_pinocchios_memory_is_computed_with_the_reason_why_it_is_not_verified() -> None:
     tree = chain(500, JointKind.CONTINUOUS)
     robot = urdfkin.load(to_urdf(tree))
     with pytest.warns(NotVerifiedWarning, match="500, which needs 8 GB"):
@@ -49,14 +49,14 @@ def test_too_many_rates_for_the_memory_are_computed_and_say_why_they_are_not_ver
     assert not robot.certificate().verified
 
 
-def test_validate_reports_what_cannot_be_verified() -> None:
+def test_validate_reports_robots_that_cannot_be_verified() -> None:
     report = urdfkin.validate([to_urdf(chain(500, JointKind.CONTINUOUS))], samples=1)
     assert not report.passed
     assert "500, which" in str(report.robots[0].reason)
 
 
 @pytest.mark.parametrize("kind", [JointKind.FLOATING, JointKind.PLANAR])
-def test_a_file_whose_own_root_is_called_universe_is_verified(kind: JointKind) -> None:
+def test_a_file_with_a_root_named_universe_is_verified(kind: JointKind) -> None:
     """The names are those of a hung robot, but nobody hung it."""
     text = to_urdf(with_root_joint(chain(2), kind))
     robot = loaded(text)
@@ -65,7 +65,7 @@ def test_a_file_whose_own_root_is_called_universe_is_verified(kind: JointKind) -
     assert tree_of(text.encode()).links[0] == "universe"
 
 
-def test_a_hung_robot_is_verified() -> None:
+def test_a_robot_with_a_root_joint_is_verified() -> None:
     robot = urdfkin.load(to_urdf(chain(2)), root_joint="planar")
     robot.placement(robot.sample(2, seed=0), "l2")
     assert robot.certificate().verified

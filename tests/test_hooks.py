@@ -127,7 +127,7 @@ def robots(source: Repository) -> Repository:
 
 
 @pytest.mark.long
-def test_a_commit_with_a_finding_is_refused_until_it_is_mended(robots: Repository) -> None:
+def test_a_commit_with_a_finding_is_refused_until_the_file_is_corrected(robots: Repository) -> None:
     arm = robots.folder / "arm.urdf"
     arm.write_text(LONG)
     told = robots.commit(fails=True)
@@ -142,7 +142,7 @@ def test_a_commit_with_a_finding_is_refused_until_it_is_mended(robots: Repositor
 
 
 @pytest.mark.long
-def test_the_hook_obeys_the_settings_of_the_repository(robots: Repository) -> None:
+def test_the_hook_uses_the_settings_of_the_repository(robots: Repository) -> None:
     (robots.folder / "old.urdf").write_text(LONG.replace('"r"', '"old"'))
     assert "URDF503" in robots.commit(fails=True)
     (robots.folder / "pyproject.toml").write_text('[tool.urdfkin]\nignore = ["axis-not-unit"]\n')
@@ -150,7 +150,7 @@ def test_the_hook_obeys_the_settings_of_the_repository(robots: Repository) -> No
 
 
 @pytest.mark.long
-def test_the_hooks_environment_holds_urdfkin_and_click_and_nothing_that_computes(robots: Repository) -> None:
+def test_the_hooks_environment_contains_only_urdfkin_and_click(robots: Repository) -> None:
     home = Path(robots.environ["PRE_COMMIT_HOME"])
     (packages,) = {path.parent for path in home.glob("*/*/lib/python*/site-packages/click")}
     names = {path.name.partition("-")[0] for path in packages.glob("*.dist-info")}
@@ -190,7 +190,7 @@ def act(runner: Repository, *, fails: bool, **inputs: str) -> tuple[str, str]:
 
 
 @pytest.mark.long
-def test_the_action_annotates_the_line_and_summarises(runner: Repository) -> None:
+def test_the_action_annotates_the_line_and_writes_a_summary(runner: Repository) -> None:
     told, summary = act(runner, fails=False)
     assert re.match(r"::warning file=arm\.urdf,line=2,col=\d+,endColumn=\d+,title=URDF503::", told)
     assert re.search(r"^ +1  URDF503  warning", summary, re.M)
@@ -202,7 +202,7 @@ def test_the_action_annotates_the_line_and_summarises(runner: Repository) -> Non
 
 
 @pytest.mark.long
-def test_the_action_tells_what_is_new_and_runs_no_input(runner: Repository) -> None:
+def test_the_action_reports_new_findings_and_executes_no_input(runner: Repository) -> None:
     assert act(runner, fails=False, SINCE="HEAD", OPTIONS="--strict")[0] == ""
     mark = runner.folder / "RUN"
     for name in ("FILES", "SINCE", "OPTIONS"):
@@ -210,7 +210,7 @@ def test_the_action_tells_what_is_new_and_runs_no_input(runner: Repository) -> N
     assert not mark.exists()
 
 
-def test_the_action_fails_where_two_files_of_a_robot_differ(tmp_path: Path) -> None:
+def test_the_action_fails_if_two_files_of_a_robot_differ(tmp_path: Path) -> None:
     (tmp_path / "urdfkin-same").mkdir()
     (tmp_path / "urdfkin-same" / "bin").symlink_to(Path(sys.executable).parent)
     text = (ROOT / "robots/planar_two_link.urdf").read_text()

@@ -50,7 +50,7 @@ def executed(cells: list[Cell], home: Path) -> list[Cell]:
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")  # the client's
-def test_the_lessons_run_in_a_kernel_and_objects_show_themselves_there(
+def test_the_lessons_run_in_a_notebook_and_objects_are_displayed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR"):

@@ -43,7 +43,7 @@ def test_each_library_has_a_cell_for_each_feature_and_the_stated_version() -> No
     assert all(list(column) == list(FEATURES) for column in FIGURES["cells"].values())
 
 
-def test_a_documented_difference_is_one_of_a_cell() -> None:
+def test_each_documented_difference_belongs_to_a_cell() -> None:
     for note in maker.DATA["documented"]:
         for feature in note["features"]:
             assert FIGURES["cells"][note["library"]][feature]["verdict"] == "documented", feature
@@ -60,7 +60,7 @@ def test_the_cells_of_an_installed_library_can_be_measured_again(library: str) -
         assert found["verdict"] == FIGURES["cells"][library][name]["verdict"], name
 
 
-def test_a_library_that_dies_or_prints_does_not_end_the_run(tmp_path: Path) -> None:
+def test_a_library_that_crashes_or_prints_does_not_end_the_run(tmp_path: Path) -> None:
     python = tmp_path / "python"
     python.write_text(
         f"#!{sys.executable}\nimport json, os, sys\n"

@@ -47,12 +47,12 @@ WHAT = {
 }  # fmt: skip
 
 
-def test_every_kind_of_slip_is_made_once_and_nothing_that_does_not_run_is_touched() -> None:
+def test_every_kind_of_mutant_is_made_once_and_only_in_executed_code() -> None:
     found = [slip.what for slip in slips(ast.parse(SOURCE))]
     assert sorted(found) == sorted(WHAT)
 
 
-def test_a_slip_changes_one_place_and_each_changes_another() -> None:
+def test_each_mutant_changes_one_line_and_no_two_are_equal() -> None:
     original = ast.unparse(ast.parse(SOURCE))
     changed = {ast.unparse(mutated(SOURCE, number)) for number in range(len(WHAT))}
     assert len(changed) == len(WHAT)
@@ -67,7 +67,7 @@ def test_the_files_that_numba_compiles_exist_and_no_other_file_is_left_out() -> 
     assert left_out == COMPILED
 
 
-def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
+def test_every_mutant_of_the_package_compiles_and_has_a_test() -> None:
     for path in files([]):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for statement in tree.body:
@@ -82,7 +82,7 @@ def test_every_slip_of_the_package_compiles_and_has_a_test_to_ask() -> None:
 @pytest.mark.parametrize(
     ("what", "word"), [("self.share <= 1.0  ->  self.share < 1.0", "survived"), ("1.0  ->  1.5", "noticed")]
 )
-def test_what_no_test_looks_at_survives_and_what_one_does_is_noticed(
+def test_a_mutant_without_a_test_survives_and_one_with_a_test_is_detected(
     what: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     places = [m for m in mutants(["verify/certificate"]) if m.place.endswith("Comparison.agrees")]
@@ -113,14 +113,14 @@ def drawn(count: int) -> list[Mutant]:
 
 @pytest.mark.long
 @pytest.mark.parametrize("mutant", drawn(6), ids=lambda mutant: str(mutant.name))
-def test_a_slip_drawn_by_a_seed_is_noticed_or_argued(mutant: Mutant) -> None:
+def test_a_random_mutant_is_detected_or_documented_as_harmless(mutant: Mutant) -> None:
     if (mutant.place, mutant.what) not in argued():
         outcome = evaluate(mutant, timeout=300.0, slow=True)
         assert outcome.word != "survived", f"{mutant.place}: {mutant.what}"
 
 
 @pytest.mark.long
-def test_what_is_argued_can_still_be_made_and_stands_on_the_page_once() -> None:
+def test_each_documented_harmless_mutant_exists_and_is_listed_once() -> None:
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     lines = [line for line in page.splitlines() if line.startswith("- `urdfkin.")]
     assert len(lines) == len(argued()) > 0
@@ -138,7 +138,7 @@ def test_a_harmless_mutant_is_one_line_of_the_page() -> None:
 @pytest.mark.parametrize(
     "words", [["verification"], ["validation", "judge", "--count"], ["keeping", "--named"]]
 )
-def test_a_part_that_does_not_exist_is_an_error_and_named(
+def test_an_unknown_part_of_the_package_is_a_named_error(
     words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["mutate.py", *words])
@@ -153,13 +153,15 @@ def test_a_part_that_does_not_exist_is_an_error_and_named(
     "words",
     ["--only urdfkin.validation.error_stats:99999", "cli/__init__ --named", "cli/view --sample 0"],
 )
-def test_no_mutant_at_all_is_a_failure(words: str, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+def test_a_selection_without_mutants_is_a_failure(
+    words: str, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     monkeypatch.setattr(sys, "argv", ["mutate.py", *words.split()])
     assert main() == 1
     assert "no mutant was selected" in capsys.readouterr().err
 
 
-def test_every_part_that_the_page_names_exists() -> None:
+def test_every_part_of_the_package_on_the_page_exists() -> None:
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     measured = re.findall(r"^\| `([\w/]+)` \|", page, re.M)
     commands = [line.split() for line in re.findall(r"scripts/mutate\.py (.*?)  ", page)]
@@ -170,7 +172,7 @@ def test_every_part_that_the_page_names_exists() -> None:
 
 
 @pytest.mark.parametrize(("line", "place"), [(3, "C"), (5, "C.f"), (7, "C.f.g"), (9, "h"), (1, "")])
-def test_a_slip_is_found_again_by_the_function_it_stands_in(line: int, place: str) -> None:
+def test_a_mutant_is_identified_by_its_function(line: int, place: str) -> None:
     source = (
         "x = 1\nclass C:\n  y = 2\n  def f(self):\n    z = 3\n    def g():\n      return 4\n    return g\n"
         "def h(): return 5\n"

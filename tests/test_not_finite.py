@@ -57,7 +57,7 @@ def spoiled(inputs: list[FloatArray], samples: tuple[int, ...]) -> Iterator[tupl
 
 @pytest.mark.parametrize("verify", [True, False, "sample"])
 @pytest.mark.parametrize("method", METHODS)
-def test_in_each_place_of_a_batch(panda: Robot, method: str, verify: bool | str) -> None:
+def test_nan_is_reported_at_each_position_of_a_batch(panda: Robot, method: str, verify: bool | str) -> None:
     count, compute = METHODS[method]
     inputs = list(state(panda, 2 * LANES + 3, 1)[:count])
     names = panda.coordinate_names, panda.rate_names, panda.rate_names
@@ -69,7 +69,7 @@ def test_in_each_place_of_a_batch(panda: Robot, method: str, verify: bool | str)
 
 
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "frame_motion"])
-def test_in_each_place_of_a_single_configuration(panda: Robot, method: str) -> None:
+def test_nan_is_reported_at_each_position_of_a_single_configuration(panda: Robot, method: str) -> None:
     count, compute = METHODS[method]
     inputs = list(state(panda, 1, 2)[:count])
     for which, coordinate, _ in spoiled(inputs, (0,)):
@@ -80,7 +80,7 @@ def test_in_each_place_of_a_single_configuration(panda: Robot, method: str) -> N
 
 
 @pytest.mark.parametrize("row", [0, 100, 2500, 4998, 4999])
-def test_in_the_part_of_any_thread(panda: Robot, row: int) -> None:
+def test_an_invalid_number_is_reported_in_the_rows_of_each_thread(panda: Robot, row: int) -> None:
     q, v, a = state(panda, 5000, 3)
     a[row, 7] = np.nan
     for threads in (1, 2, 3, None):
@@ -93,7 +93,7 @@ def test_in_the_part_of_any_thread(panda: Robot, row: int) -> None:
 
 
 @pytest.mark.parametrize("verify", [True, False])
-def test_among_the_coordinates_of_planar_and_floating_joints(verify: bool) -> None:
+def test_nan_is_reported_in_coordinates_of_planar_and_floating_joints(verify: bool) -> None:
     robot = robot_of("planar_and_floating_in_the_middle")
     inputs = list(state(robot, 2, 4))
     for which, coordinate, _ in spoiled(inputs, (0, 1)):
@@ -104,7 +104,7 @@ def test_among_the_coordinates_of_planar_and_floating_joints(verify: bool) -> No
             robot.acceleration(inputs[0], inputs[1], inputs[2], robot.tip_frame, verify=verify)
 
 
-def test_on_a_moving_base(panda: Robot) -> None:
+def test_nan_is_reported_on_a_moving_base(panda: Robot) -> None:
     q = panda.sample(LANES + 1, 5)
     q[-1, -1] = np.nan
     base = BaseMotion(velocity=np.ones((LANES + 1, 6)))
@@ -113,7 +113,7 @@ def test_on_a_moving_base(panda: Robot) -> None:
             panda.placement(q, FRAME, base=base, verify=verify)
 
 
-def test_one_that_broadcasts(panda: Robot) -> None:
+def test_nan_is_reported_in_an_input_that_is_broadcast(panda: Robot) -> None:
     v = panda.neutral()
     v[3] = np.nan
     with pytest.raises(NotFiniteError) as caught:

@@ -55,7 +55,7 @@ def pattern(shown: str) -> re.Pattern[str]:
 
 
 @pytest.mark.parametrize("page", [pytest.param(page, marks=mark) for page, mark in WITH_FILES.items()])
-def test_every_example_of_a_page_with_files_prints_what_it_shows(
+def test_every_example_with_files_prints_the_shown_output(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -90,7 +90,9 @@ def test_every_example_of_a_page_with_files_prints_what_it_shows(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in pages() if runs(page)])
-def test_each_block_prints_what_is_below(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_block_prints_the_output_below_it(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     with np.printoptions(), warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # examples of what is warned of
@@ -99,7 +101,7 @@ def test_each_block_prints_what_is_below(page: str, tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.parametrize("page", [page for page in ELSEWHERE if page in pages()])
-def test_a_page_that_is_run_elsewhere_is_named_there(page: str) -> None:
+def test_a_page_that_another_test_runs_is_named_in_that_test(page: str) -> None:
     where, name = ELSEWHERE[page], page.removesuffix(".md")
     assert not where.startswith("tests/") or name in (DOCS.parent / where).read_text("utf-8")
 
@@ -127,7 +129,7 @@ def wheel() -> str:
     return present(re.search(r'"""(<robot.*?</robot>)"""', PAGE, re.DOTALL))[1]
 
 
-def test_what_the_page_says_of_pinocchio_is_so() -> None:
+def test_the_statements_about_pinocchio_are_true() -> None:
     model = pin.buildModelFromXML(wheel(), mimic=False)
     q = urdfkin.load(wheel()).to_pinocchio(Q)
     data, frame, aligned = model.createData(), model.getFrameId("bead"), pin.LOCAL_WORLD_ALIGNED
@@ -144,7 +146,7 @@ def test_what_the_page_says_of_pinocchio_is_so() -> None:
     np.testing.assert_allclose(urdfkin.load(wheel()).acceleration(Q, V, A, "bead")[:3], own[1], atol=1e-12)
 
 
-def test_what_the_page_says_of_mujoco_is_so() -> None:
+def test_the_statements_about_mujoco_are_true() -> None:
     mujoco = pytest.importorskip("mujoco")
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
     link = rf'\1><inertial><mass value="1"/>{inertia}</inertial></link>'
@@ -168,7 +170,7 @@ def table_rows(heading: str) -> list[list[str]]:
     return [re.findall(r"`([^`]+)`", line) for line in lines]
 
 
-def test_what_is_said_to_be_pinocchios_and_ours_is_the_same() -> None:
+def test_the_pinocchio_code_and_the_urdfkin_code_give_the_same_result() -> None:
     (setup, *_) = (text for kind, text in blocks("coming-from.md") if kind == "python")
     names: dict[str, object] = {}
     exec(setup, names)
@@ -190,7 +192,7 @@ def own_robot() -> dict[str, object]:
 
 
 @pytest.mark.filterwarnings("ignore")  # the other library's
-def test_what_is_said_to_be_the_robotics_toolboxs_and_ours_is_the_same() -> None:
+def test_the_robotics_toolbox_code_and_the_urdfkin_code_give_the_same_result() -> None:
     rtb = pytest.importorskip("roboticstoolbox")
     ours = own_robot()
     theirs = ours | {"rtb": rtb, "robot": rtb.Robot.URDF(ours["path"])}
@@ -204,7 +206,7 @@ def test_what_is_said_to_be_the_robotics_toolboxs_and_ours_is_the_same() -> None
 
 
 @pytest.mark.parametrize("heading", ["Robotics Toolbox", "MATLAB"])
-def test_what_is_said_to_be_ours_runs(heading: str) -> None:
+def test_the_urdfkin_code_of_the_page_runs(heading: str) -> None:
     (setup, *_) = (text for kind, text in blocks("coming-from.md") if kind == "python")
     names: dict[str, object] = {}
     exec(setup, names)

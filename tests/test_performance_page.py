@@ -16,13 +16,13 @@ def test_the_page_shows_the_figures_of_its_file() -> None:
     assert maker.page("performance") == TEXT, "run python scripts/make_pages.py performance"
 
 
-def test_another_figure_gives_another_page() -> None:
+def test_a_different_figure_gives_a_different_page() -> None:
     first, *others = FIGURES["rows"]
     changed = {**FIGURES, "rows": [{**first, "median_ns": 12_345.0}, *others]}
     assert "| 12,345 |" in page(TEXT, changed)
 
 
-def test_the_first_table_tells_all_threads_from_code_compiled_for_one_robot() -> None:
+def test_the_first_table_separates_all_threads_and_code_compiled_for_one_robot() -> None:
     rows = [row for row in FIGURES["rows"] if row["section"] == "batch"]
     batch = {(f"{row['robot']}, {row['quantity']}", row["who"]): row["ratio"] for row in rows}
     (summary,) = [words for words in tables(FIGURES) if words.section == "summary"]
@@ -34,28 +34,28 @@ def test_the_first_table_tells_all_threads_from_code_compiled_for_one_robot() ->
         assert row[compiled] == number(batch[row[0], "urdfkin, compiled for this robot, 1 thread"])
 
 
-def test_figures_without_a_place_are_refused() -> None:
+def test_figures_without_a_marker_on_the_page_are_refused() -> None:
     with pytest.raises(ValueError, match="places for"):
         page(TEXT.replace("<!-- figures: floor -->", ""), FIGURES)
 
 
-def test_no_figure_is_typed() -> None:
+def test_no_figure_is_written_by_hand() -> None:
     text = re.sub(r"<!-- figures: \w+ -->.*?<!-- end -->", "", TEXT, flags=re.DOTALL)
     assert re.findall(r"\d (?:ns|us|times|GB/s|MB)\b", text) == []
 
 
-def test_the_picture_is_light() -> None:
+def test_the_picture_is_a_small_file() -> None:
     assert maker.PICTURE.is_file()
     assert maker.PICTURE.stat().st_size < 60_000
 
 
-def test_what_was_not_measured_is_said_to_be_missing() -> None:
+def test_figures_that_were_not_measured_are_marked_as_missing() -> None:
     without = {**FIGURES, "rows": [row for row in FIGURES["rows"] if row["section"] != "sizes"]}
     place = page(TEXT, without).partition("<!-- figures: sizes -->\n")[2]
     assert place.startswith(NOT_MEASURED)
 
 
-def test_the_page_shows_where_the_time_of_a_batch_and_of_a_single_call_goes() -> None:
+def test_the_page_shows_the_time_of_each_step_of_a_batch_and_of_a_single_call() -> None:
     where = [
         {
             "kind": kind, "robot": "panda", "quantity": "jacobian", "ns": 40.0,

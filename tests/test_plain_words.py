@@ -33,13 +33,13 @@ def test_a_word_of_the_list_is_reported_with_its_place_and_its_plain_form(
     assert all(one.startswith(f"{name}:{line}: ") and "; write: " in one for one in found)
 
 
-def test_code_in_a_page_is_no_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_code_on_a_page_is_not_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_words, "ROOT", tmp_path)
     (tmp_path / "page.md").write_text("```python\nfollower = 1  # witness\n```\nSee `follower`.\n")
     assert complaints([tmp_path]) == []
 
 
-def test_a_long_sentence_is_listed_and_no_short_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_long_sentences_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain_words, "ROOT", tmp_path)
     (tmp_path / "page.md").write_text("Word " * 31 + ".\n" + "Word " * 20 + ".\n")
     (found,) = long_sentences([tmp_path])

@@ -126,7 +126,7 @@ def _raise(error: Exception) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("question", QuestionsSection, ids=lambda question: question.value)
-def test_what_people_stumble_over_leads_to_a_section_that_stands_on_the_page(
+def test_messages_about_common_mistakes_name_an_existing_section(
     question: QuestionsSection,
 ) -> None:
     for told in ASKED[question]:
@@ -136,13 +136,13 @@ def test_what_people_stumble_over_leads_to_a_section_that_stands_on_the_page(
     assert "](" not in text
 
 
-def test_each_of_the_fifteen_pains_that_has_a_message_is_led_to_from_one() -> None:
+def test_a_message_names_the_section_of_each_common_problem() -> None:
     """Nothing is said where calls come in any order; a file's errors say their codes, which explain takes."""
     led = {question.value for question in ASKED}
     assert set(list(answers())[1:16]) - led == {"stale-data", "errors-in-a-file"}
 
 
-def test_a_word_that_one_question_has_is_enough() -> None:
+def test_one_word_is_enough_to_find_a_question() -> None:
     for words, topic in (("mimic", "mimic-joints"), ("Meshes", "packages-and-meshes"), ("unit axes", AXES)):
         assert answer_to(words) == answers()[topic]
     assert answer_to("frames") is None  # two have it
@@ -153,7 +153,7 @@ def test_a_word_that_one_question_has_is_enough() -> None:
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # one answer is about what is warned of
 @pytest.mark.parametrize("topic", answers())
-def test_an_answer_on_a_terminal_is_filled_and_its_code_runs_after_what_it_says(topic: str) -> None:
+def test_an_answer_on_a_terminal_is_wrapped_and_its_code_runs(topic: str) -> None:
     shown = as_text(answers()[topic])
     assert "`" * 3 not in shown
     assert all(len(line) <= 88 for line in shown.splitlines() if not line.startswith("    "))
@@ -165,13 +165,13 @@ def test_an_answer_on_a_terminal_is_filled_and_its_code_runs_after_what_it_says(
         exec(own, names)
 
 
-def test_every_link_to_a_question_leads_to_one() -> None:
+def test_every_link_to_a_question_points_to_an_existing_one() -> None:
     for path in (*DOCS.rglob("*.md"), DOCS.parent / "README.md"):
         for topic in re.findall(r"questions\.md#([\w-]+)", path.read_text("utf-8")):
             assert topic in answers(), path
 
 
-def test_what_people_ask_most_comes_first() -> None:
+def test_the_most_frequent_questions_come_first() -> None:
     """The fifteen pains that came up most in public trackers, in their order, and what else was asked."""
     assert list(answers())[1:16] == [
         *("reference-frames", "two-accelerations", "joint-order", "continuous-joints", "mimic-joints"),

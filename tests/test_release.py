@@ -56,7 +56,7 @@ def test_the_linter_of_workflows_finds_nothing() -> None:
     assert done.returncode == 0, done.stdout
 
 
-def test_the_linter_of_workflows_finds_a_planted_hole(tmp_path: Path) -> None:
+def test_the_linter_of_workflows_finds_a_planted_vulnerability(tmp_path: Path) -> None:
     text = (ROOT / ".github/workflows/release.yml").read_text("utf-8")
     broken = tmp_path / ".github/workflows/release.yml"
     broken.parent.mkdir(parents=True)

@@ -59,7 +59,7 @@ def disagreement(robot: Robot, quantity: str, **base: BaseMotion) -> urdfkin.Ver
 
 
 @pytest.mark.usefixtures("no_room")
-def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(panda: Robot) -> None:
+def test_a_verification_error_states_quantity_frame_difference_and_bound(panda: Robot) -> None:
     error = disagreement(panda, "acceleration")
     assert error.is_disagreement
     assert (error.quantity, error.frame, error.reference) == ("acceleration", "panda_hand_tcp", "LOCAL")
@@ -78,7 +78,9 @@ def test_a_verification_error_says_what_where_by_how_much_and_what_was_allowed(p
 @pytest.mark.parametrize("quantity", METHODS)
 @pytest.mark.parametrize("root_joint", [None, "floating"])
 @pytest.mark.usefixtures("no_room")
-def test_its_line_repeats_the_case(quantity: str, root_joint: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_replay_line_repeats_the_disagreement(
+    quantity: str, root_joint: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     error = disagreement(urdfkin.load("panda", root_joint=root_joint, mimic=False), quantity)
     words = shlex.split(error.reproduce)
     assert words[:3] == ["urdfkin", quantity.replace("_", "-"), "panda"]
@@ -92,7 +94,7 @@ def test_its_line_repeats_the_case(quantity: str, root_joint: Any, monkeypatch: 
 
 
 @pytest.mark.usefixtures("no_room")
-def test_the_line_of_a_text_takes_it_from_standard_input_and_that_of_a_file_quotes_it(tmp_path: Path) -> None:
+def test_the_replay_line_reads_a_text_from_standard_input_and_quotes_a_path(tmp_path: Path) -> None:
     text = urdf_of("odd_names")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
@@ -109,7 +111,9 @@ def test_the_line_of_a_text_takes_it_from_standard_input_and_that_of_a_file_quot
 @pytest.mark.parametrize("quantity", METHODS)
 @pytest.mark.parametrize("batch", [(), (2, 3)])
 @pytest.mark.usefixtures("no_room")
-def test_on_a_moving_base_the_line_is_python(panda: Robot, quantity: str, batch: tuple[int, ...]) -> None:
+def test_the_replay_line_is_python_for_a_moving_base(
+    panda: Robot, quantity: str, batch: tuple[int, ...]
+) -> None:
     generator = np.random.default_rng(3)
     T = np.tile(np.eye(4), (*batch, 1, 1))
     T[..., :3, :3] = exp_rotation(generator.normal(size=(*batch, 3)))
@@ -123,7 +127,7 @@ def test_on_a_moving_base_the_line_is_python(panda: Robot, quantity: str, batch:
 @pytest.mark.parametrize(
     ("name", "velocity", "reason"), [("universe", 1, "reads another robot"), ("j", -1, "refuses the file")]
 )
-def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_verified(
+def test_results_that_pinocchio_cannot_check_cause_a_warning_and_are_not_verified(
     name: str, velocity: int, reason: str
 ) -> None:
     more = limit().replace('velocity="1"', f'velocity="{velocity}"')
@@ -139,7 +143,7 @@ def test_what_pinocchio_cannot_check_is_handed_out_with_a_warning_and_never_as_v
     assert reason in certificate.not_verified[0]
 
 
-def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.MonkeyPatch, panda: Robot) -> None:
+def test_a_result_that_is_nan_is_a_disagreement(monkeypatch: pytest.MonkeyPatch, panda: Robot) -> None:
     from urdfkin.compiled import evaluate
 
     monkeypatch.setattr(evaluate, "jacobians", lambda plan, q, *_, **__: np.full((len(q), 1, 6, 8), np.nan))
@@ -147,9 +151,7 @@ def test_a_result_that_is_no_number_is_a_disagreement(monkeypatch: pytest.Monkey
         panda.jacobian(panda.neutral()[np.newaxis], "panda_hand")
 
 
-def test_a_disagreement_whose_share_is_no_number_is_raised_too(
-    monkeypatch: pytest.MonkeyPatch, panda: Robot
-) -> None:
+def test_a_disagreement_with_a_nan_ratio_is_raised_too(monkeypatch: pytest.MonkeyPatch, panda: Robot) -> None:
     # An infinite disagreement with an infinite bound has the share NaN, in either part of a check.
     wrong, right = BatchComparison(1, np.inf, np.nan, (0, 0)), BatchComparison(1, 1.0, 0.5, (0, 0))
     for results in ([wrong], [wrong, right], [right, wrong]):
@@ -165,7 +167,7 @@ def test_a_disagreement_whose_share_is_no_number_is_raised_too(
     ["abc", np.ones(8) * 1j, [[1.0], [1.0, 2.0]], None, np.zeros(8, dtype="M8[s]"), ["0"] * 8],
     ids=repr,
 )
-def test_what_is_no_numbers_is_refused(panda: Robot, value: Any) -> None:
+def test_inputs_that_are_not_numbers_are_refused(panda: Robot, value: Any) -> None:
     no_numbers = "must be real numbers|needs 8 numbers"
     with pytest.raises(UrdfkinError, match=f"q ({no_numbers})|unknown pose 'abc'"):
         panda.placement(value, "panda_hand")
@@ -209,7 +211,7 @@ def test_a_frame_that_does_not_exist_offers_the_nearest(panda: Robot) -> None:
     assert caught.value.nearest[0] == HAND
 
 
-def test_a_reference_is_a_member_or_its_name_in_either_case(panda: Robot) -> None:
+def test_a_reference_is_a_member_or_its_name_in_upper_or_lower_case(panda: Robot) -> None:
     q, v = panda.sample(2, 1)
     expected = panda.velocity(q, v, "panda_hand", Reference.LOCAL)
     for name in ("local", "LOCAL", "Local"):
@@ -219,7 +221,7 @@ def test_a_reference_is_a_member_or_its_name_in_either_case(panda: Robot) -> Non
             panda.velocity(q, v, "panda_hand", wrong)  # type: ignore[arg-type]
 
 
-def test_a_quaternion_must_have_norm_one_to_a_millionth_and_is_then_made_exact() -> None:
+def test_a_quaternion_must_have_norm_one_within_a_millionth_and_is_normalised() -> None:
     robot = urdfkin.load("ur5", root_joint="floating")
     q = robot.sample(1, 1)[0]
     exact = robot.placement(q, "tool0")
@@ -232,7 +234,7 @@ def test_a_quaternion_must_have_norm_one_to_a_millionth_and_is_then_made_exact()
             robot.placement(wrong, "tool0")
 
 
-def test_a_base_that_is_none_is_refused() -> None:
+def test_an_invalid_base_is_refused() -> None:
     reflection = np.diag([1.0, 1.0, -1.0, 1.0])
     for words, message in (
         ({"placement": 2.0 * np.eye(4)}, "last row"),
@@ -247,7 +249,7 @@ def test_a_base_that_is_none_is_refused() -> None:
             BaseMotion(**words)
 
 
-def test_a_base_is_read_only_and_comes_back_from_a_pickle() -> None:
+def test_a_base_is_read_only_and_survives_pickling() -> None:
     base = BaseMotion(velocity=np.arange(6.0))
     for motion in (base, pickle.loads(pickle.dumps(base))):
         assert (motion.velocity == np.arange(6.0)).all()
@@ -255,7 +257,7 @@ def test_a_base_is_read_only_and_comes_back_from_a_pickle() -> None:
             motion.velocity[0] = 1.0
 
 
-def test_errors_come_back_from_a_pickle_as_they_were() -> None:
+def test_errors_survive_pickling_unchanged() -> None:
     ur5 = urdfkin.load("ur5")
     attempts: Any = (urdfkin.load, "pnda"), (urdfkin.load, "/nowhere/x.urdf"), (urdfkin.load, "<robot/>")
     for attempt, wrong in (*attempts, (ur5.placement, np.zeros(5))):
@@ -285,7 +287,7 @@ def test_sources_of_every_kind_give_the_same_robot(panda: Robot, tmp_path: Path)
         urdfkin.load(3)  # type: ignore[arg-type]
 
 
-def test_a_sample_lies_within_limits_and_repeats_itself(panda: Robot) -> None:
+def test_a_sample_is_within_limits_and_reproducible(panda: Robot) -> None:
     q = panda.sample(500, 4)
     assert panda.limit_violations(q) == []
     assert (q == panda.sample(500, 4)).all()
@@ -296,7 +298,7 @@ def test_a_sample_lies_within_limits_and_repeats_itself(panda: Robot) -> None:
 
 
 @pytest.mark.slow
-def test_the_oracle_keeps_out_of_what_would_end_the_process() -> None:
+def test_the_oracle_refuses_models_that_would_crash_the_process() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         robot = urdfkin.load(snake(4000, fixed=True))
@@ -313,7 +315,7 @@ def snake(links: int, *, fixed: bool) -> str:
     return urdfs.robot(*joints, name="snake")
 
 
-def test_the_oracle_reads_names_and_layout_from_the_tree_and_nothing_else(panda: Robot) -> None:
+def test_the_oracle_reads_only_names_and_layout_from_the_tree(panda: Robot) -> None:
     # The oracle's results do not depend on the poses and axes in the tree.
     other = urdfkin.load("panda")
     for each in other.tree.joints:

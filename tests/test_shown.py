@@ -62,7 +62,7 @@ SAYS = {
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", SAYS)
-def test_an_object_says_what_there_is_to_say_in_every_form(name: str, form: str, objects: Any) -> None:
+def test_an_object_has_the_same_content_in_every_format(name: str, form: str, objects: Any) -> None:
     if (name, form) in {("certificate", "__str__"), ("table", "_repr_latex_")}:
         pytest.skip("a form of its own, tested elsewhere")
     text = getattr(objects[name], form)()
@@ -78,7 +78,7 @@ def test_its_repr_is_one_short_line(name: str, objects: dict[str, Any]) -> None:
     assert "\n" not in text
 
 
-def test_a_table_writes_itself_as_the_command_line_does(robot: Robot) -> None:
+def test_a_table_has_the_text_of_the_command_line(robot: Robot) -> None:
     table, units = robot.dh(snap=1e-6), units_of("degrees", "millimetres", 6)
     for form in ("markdown", "latex", "html"):
         own = getattr(table, f"to_{form}")("degrees", "mm", 6)
@@ -90,7 +90,7 @@ def test_a_table_writes_itself_as_the_command_line_does(robot: Robot) -> None:
 
 
 @pytest.mark.slow
-def test_a_report_writes_itself_as_the_command_line_does() -> None:
+def test_a_report_has_the_text_of_the_command_line() -> None:
     report = urdfkin.validate("planar_two_link", samples=3)
     document = report.as_dict()
     assert report.to_html() == as_html(document)
@@ -107,7 +107,7 @@ def sheets() -> Iterator[Callable[[str], TextDocument]]:
 
 
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
-def test_a_name_from_a_strangers_file_is_text_in_every_form(name: str) -> None:
+def test_a_name_from_an_untrusted_file_is_escaped_in_every_format(name: str) -> None:
     for made in sheets():
         sheet, tame = made(name), made("tame")
         tags = [tag for tag, _ in Page(sheet.html()).skeleton]
@@ -122,14 +122,14 @@ def test_a_name_from_a_strangers_file_is_text_in_every_form(name: str) -> None:
             assert "\x1b" not in written
 
 
-def test_a_table_of_numbers_hides_rounding_and_lines_up() -> None:
+def test_a_table_of_numbers_hides_rounding_errors_and_is_aligned() -> None:
     table = Table(("name", "x"), [("a", 1.0), ("longer", 1e-17), ("c", -0.25)])
     assert table.text().splitlines() == [
         "name        x", "-------------", "a           1", "longer      0", "c       -0.25"
     ]  # fmt: skip
 
 
-def test_a_robots_view_is_a_page_in_a_frame_of_its_own(robot: Robot) -> None:
+def test_a_robots_view_is_a_page_in_its_own_frame(robot: Robot) -> None:
     cell = robot.view("ready, panda_joint1=30deg", height=300)
     shown = cell._repr_html_()
     assert shown.startswith('<iframe sandbox="allow-scripts"')
@@ -159,7 +159,7 @@ def test_limits_joints_and_frames_are_those_of_the_file(robot: Robot) -> None:
     assert np.isinf(wheel.limits[:, wheel.coordinate_names.index("j2s6s200_joint_1")]).all()
 
 
-def test_a_frame_may_be_left_out_where_there_is_one_tip(robot: Robot) -> None:
+def test_the_frame_is_optional_if_there_is_one_tip(robot: Robot) -> None:
     np.testing.assert_array_equal(robot.jacobian("ready"), robot.jacobian("ready", "panda_hand_tcp"))
     arm = urdfkin.load(urdfkin.load("planar_two_link").urdf, verify=False)
     q, rates = [0.1, 0.2], [1.0, 2.0]
@@ -175,7 +175,7 @@ def test_a_frame_may_be_left_out_where_there_is_one_tip(robot: Robot) -> None:
         two.jacobian("ready")
 
 
-def test_completion_offers_what_people_call_and_no_inner_parts(robot: Robot) -> None:
+def test_completion_offers_public_names_only(robot: Robot) -> None:
     offered = [name for name in dir(robot) if not name.startswith("_")]
     assert {"jacobian", "dh", "view", "limits", "joints", "integrate"} <= set(offered)
     assert {"plan", "verifier"}.isdisjoint(offered)
@@ -188,13 +188,13 @@ def test_robots_are_the_names_that_load_knows() -> None:
         urdfkin.robots("arms")
 
 
-def test_findings_are_a_list_like_any_other() -> None:
+def test_findings_are_an_ordinary_list() -> None:
     found = urdfkin.load("planar_two_link").findings
     assert isinstance(found, Findings)
     assert found == []
 
 
-def test_a_table_shows_itself_whatever_was_imported_first() -> None:
+def test_a_table_is_displayed_independently_of_the_order_of_imports() -> None:
     code = "from urdfkin.dh.rows import table_from_rows as t; print(t([[1, 0, 0, 0]], 'standard'))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "standard Denavit-Hartenberg parameters" in done.stdout
@@ -230,7 +230,7 @@ def printed(name: str) -> dict[str, str]:
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("kind", ACTING)
-def test_nothing_that_an_object_prints_acts_on_a_terminal_or_a_log(kind: str) -> None:
+def test_printed_objects_contain_no_control_sequences(kind: str) -> None:
     tame = printed("tame")
     for where, text in printed(NAMES[kind]).items():
         for line in text.split("\n"):

@@ -49,7 +49,7 @@ def test_the_readme_links_to_the_start_and_to_the_questions() -> None:
     assert "(docs/questions.md)" in README
 
 
-def test_nothing_is_wrong_with_their_file(own: Path) -> None:
+def test_the_start_pages_file_has_no_findings(own: Path) -> None:
     good("check", str(own))
 
 
@@ -101,7 +101,7 @@ def masked(text: str) -> str:
     return re.sub(varying, "", text).strip()
 
 
-def test_the_smallest_example_runs_and_is_verified() -> None:
+def test_the_readmes_example_runs_and_is_verified() -> None:
     names: dict[str, Any] = {}
     exec(compile(block("python"), "README.md", "exec"), names)
     assert names["J"].shape == (1000, 6, 8)
@@ -123,7 +123,7 @@ def test_every_command_has_a_row_on_the_page_of_commands() -> None:
     assert list(dict.fromkeys(rows)) == list(commands())
 
 
-def test_the_front_page_names_a_command_for_each_of_its_four_people() -> None:
+def test_the_readme_shows_a_command_for_each_of_four_users() -> None:
     shown = [words[0] for words, _ in transcripts()]
     assert shown == ["dh", "acceleration", "check", "export", "export"]
 
@@ -162,7 +162,7 @@ def mine(tmp_path: Path) -> Path:
     return path
 
 
-def test_minute_one_the_jacobian_at_a_pose_in_degrees_by_joint_names(mine: Path) -> None:
+def test_a_new_user_computes_the_jacobian_at_a_pose_in_degrees_by_joint_names(mine: Path) -> None:
     done = good("jacobian", str(mine), "--q", POSE_BY_NAME)
     assert all(name in done.text for name in ("jacobian of tool", "turntable", "shoulder", "elbow"))
     assert "verified by Pinocchio" in done.text
@@ -171,7 +171,7 @@ def test_minute_one_the_jacobian_at_a_pose_in_degrees_by_joint_names(mine: Path)
     np.testing.assert_allclose(data["result"][0], pinocchios_jacobian(mine, q), atol=1e-15)
 
 
-def test_minute_three_the_table_in_a_notebook(mine: Path) -> None:
+def test_a_new_user_displays_the_table_in_a_notebook(mine: Path) -> None:
     robot = urdfkin.load(mine)
     table = robot.dh()
     cell = table._repr_html_()
@@ -181,7 +181,7 @@ def test_minute_three_the_table_in_a_notebook(mine: Path) -> None:
     np.testing.assert_allclose(table.placement(POSE_BY_NAME), T, atol=1e-15)
 
 
-def test_minute_five_why_pinocchios_numbers_differ(mine: Path) -> None:
+def test_a_new_user_finds_why_pinocchios_numbers_differ(mine: Path) -> None:
     robot = urdfkin.load(mine)
     q = pin.neutral(pin.buildModelFromUrdf(str(mine)))
     words = r"Pinocchio's q has that length: robot.from_pinocchio\(q\)"
@@ -201,7 +201,7 @@ def test_minute_five_why_pinocchios_numbers_differ(mine: Path) -> None:
 TOUR = (DOCS / "tour.md").read_text(encoding="utf-8")
 
 
-def test_every_picture_is_there_and_described() -> None:
+def test_every_picture_exists_and_has_a_description() -> None:
     pictures = re.findall(r"!\[(.+?)\]\((.+?)\)", TOUR)
     assert len(pictures) >= 8
     for described, file in pictures:
@@ -209,7 +209,7 @@ def test_every_picture_is_there_and_described() -> None:
         assert (DOCS / file).read_text(encoding="utf-8").lstrip().startswith("<?xml")
 
 
-def test_every_section_of_the_chapter_has_its_place() -> None:
+def test_the_tour_covers_every_section_of_the_chapter() -> None:
     for section in ("7.1", "7.2", "7.3", "7.4", "7.5", "7.6", "7.7"):
         assert re.search(rf"^## .*{re.escape(section)}\b", TOUR, re.MULTILINE), section
 

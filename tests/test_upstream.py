@@ -47,7 +47,7 @@ def outcome(at: int) -> tuple[np.ndarray, np.ndarray]:
     raises=AssertionError, strict=True, reason="a defect of the library; once it is gone, its entry goes"
 )
 @pytest.mark.parametrize("title", PROGRAMS)
-def test_the_library_has_no_defect_any_more(title: str) -> None:
+def test_the_library_no_longer_has_the_defect(title: str) -> None:
     if title.startswith("Robotics Toolbox"):
         pytest.importorskip("roboticstoolbox")
     found, expected = outcome(PROGRAMS[title])

@@ -39,25 +39,25 @@ def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.long
-def test_the_wheel_is_what_is_imported(elsewhere: Path) -> None:
+def test_the_installed_wheel_is_imported(elsewhere: Path) -> None:
     code = "import urdfkin; print(urdfkin.__file__)"
     printed = run(elsewhere / "env/bin/python", "-c", code, cwd=elsewhere)
     assert Path(printed.strip()).is_relative_to(elsewhere / "env")
 
 
 @pytest.mark.long
-def test_the_main_job_works(elsewhere: Path) -> None:
+def test_an_installed_wheel_loads_and_verifies_a_robot(elsewhere: Path) -> None:
     printed = run(elsewhere / "env/bin/urdfkin", "validate", "panda", "--samples", "5", cwd=elsewhere)
     assert "0 outside their bound" in printed
 
 
 @pytest.mark.long
-def test_the_robots_and_tables_of_the_project_travel_with_it(elsewhere: Path) -> None:
+def test_the_wheel_contains_the_robots_and_tables(elsewhere: Path) -> None:
     assert "polar" in run(elsewhere / "env/bin/urdfkin", "robots", cwd=elsewhere)
     assert "polar" in run(elsewhere / "env/bin/urdfkin", "info", "polar", cwd=elsewhere)
     assert "7.130" in run(elsewhere / "env/bin/urdfkin", "explain", "7.130", cwd=elsewhere)
 
 
 @pytest.mark.long
-def test_types_travel_with_it(elsewhere: Path) -> None:
+def test_the_wheel_contains_type_hints(elsewhere: Path) -> None:
     assert list((elsewhere / "env").glob("lib/*/site-packages/urdfkin/py.typed"))

@@ -143,7 +143,7 @@ def test_an_error_far_above_rounding_is_caught_near_the_singularity(
         monkeypatch.undo()
 
 
-def test_half_turns_whose_quaternion_has_either_sign_are_verified(free: Robot) -> None:
+def test_half_turns_with_quaternions_of_either_sign_are_verified(free: Robot) -> None:
     rng = np.random.default_rng(8)
     axis = rng.normal(size=(300, 3))
     quat = np.hstack((axis, rng.choice([0.0, 1e-17, -1e-17, 1e-16, -1e-16, 1e-15, 1e-12], (300, 1))))

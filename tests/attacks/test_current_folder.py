@@ -61,17 +61,17 @@ def command(tmp_path: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("file", ["r.xacro", str(ROBOTS / "elbow.urdf")])
-def test_check_runs_nothing_there(folder: Path, command: list[str], file: str) -> None:
+def test_check_runs_no_file_of_the_current_folder(folder: Path, command: list[str], file: str) -> None:
     run(folder, command, "check", "--format", "json", file)
 
 
-def test_processes_of_validate_run_nothing_there(folder: Path, command: list[str]) -> None:
+def test_processes_of_validate_run_no_file_of_the_current_folder(folder: Path, command: list[str]) -> None:
     robots = [str(ROBOTS / "one_link.urdf"), "r.xacro"]
     for how in (["--jobs", "2"], ["--isolate"]):
         assert "2 robots" in run(folder, command, "validate", *robots, "--samples", "0", *how)
 
 
-def test_compiling_runs_nothing_there(
+def test_compiling_runs_no_file_of_the_current_folder(
     folder: Path, command: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "cache"))
@@ -84,7 +84,7 @@ def test_compiling_runs_nothing_there(
     assert list((folder.parent / "cache").rglob("*.kernel"))
 
 
-def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
+def test_the_compiling_process_succeeds_and_runs_no_file_of_the_current_folder(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from urdfkin.compiled import preload
@@ -96,7 +96,7 @@ def test_the_process_that_compiles_runs_nothing_there_and_does_its_work(
     assert planted_code_ran(folder) == []
 
 
-def test_python_m_takes_nothing_from_there_once_urdfkin_is_running(tmp_path: Path) -> None:
+def test_python_m_urdfkin_imports_nothing_from_the_current_folder_once_started(tmp_path: Path) -> None:
     folder = tmp_path / "robot"
     folder.mkdir()
     (folder / "r.xacro").write_text(XACRO)
@@ -108,7 +108,7 @@ def test_python_m_takes_nothing_from_there_once_urdfkin_is_running(tmp_path: Pat
 # -- settings ------------------------------------------------------------------------------------------
 
 
-def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
+def test_numba_reads_no_settings_from_the_current_folder(tmp_path: Path) -> None:
     (tmp_path / ".numba_config.yaml").write_text(
         f"cache_dir: {tmp_path}\ndisable_jit: 1\ncache_locator_classes: evil.Locator\n"
     )
@@ -120,7 +120,7 @@ def test_numba_takes_no_settings_from_there(tmp_path: Path) -> None:
     assert python(code, cwd=tmp_path, env=environ).stdout == f"'' 0 '' {tmp_path}\n"
 
 
-def test_a_drawing_takes_no_settings_from_there(tmp_path: Path, command: list[str]) -> None:
+def test_a_drawing_reads_no_settings_from_the_current_folder(tmp_path: Path, command: list[str]) -> None:
     pytest.importorskip("matplotlib")
     robot = str(ROBOTS / "elbow.urdf")
     drawings = []

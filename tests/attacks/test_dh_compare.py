@@ -29,7 +29,7 @@ def with_ends(name: str) -> tuple[urdfkin.Robot, str, str]:
     return (robot, "base", "tool0") if name == "ur5" else (robot, robot.base_frame, robot.tip_frame)
 
 
-def test_the_wrong_d1_is_told_with_its_millimetres_fitted_or_not() -> None:
+def test_a_wrong_d1_is_reported_in_millimetres_with_and_without_a_fit() -> None:
     path, table = published("ur5")
     wrong = with_cells(table, 0, d=table.rows[0].d + 0.01)
     found = compare(path, wrong)
@@ -66,7 +66,7 @@ def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cel
     assert found.metres > 1e-3 or found.radians > 1e-3
 
 
-def test_only_a_table_that_is_the_urdf_as_written_has_every_cell_and_a_turned_tool_differs() -> None:
+def test_every_cell_agrees_only_for_a_table_that_is_the_urdf_as_written() -> None:
     robot = urdfkin.load("panda")
     table, path = robot.dh("panda_link8", "panda_link0"), robot.chain("panda_link8", "panda_link0")
     found = compare(path, table)
@@ -80,7 +80,7 @@ def test_only_a_table_that_is_the_urdf_as_written_has_every_cell_and_a_turned_to
     assert not found.agrees
 
 
-def test_cells_that_explain_nothing_are_not_blamed() -> None:
+def test_cells_that_do_not_explain_the_difference_are_not_listed() -> None:
     found = compare(*published("kinova"), fit=False)
     assert not found.agrees
     assert found.differences == ()
@@ -107,7 +107,7 @@ CALIBRATED = [(name, seed) for name in ("ur5", "kinova") for seed in range(3)]
 
 
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
-def test_a_calibrated_strict_table_is_as_far_off_as_its_hayati_form(name: str, seed: int) -> None:
+def test_a_calibrated_table_differs_about_equally_in_strict_and_hayati_form(name: str, seed: int) -> None:
     robot, base, tip = with_ends(name)
     tree, path = calibrated(robot.tree, seed), robot.chain(tip, base)
     off = {
@@ -119,7 +119,7 @@ def test_a_calibrated_strict_table_is_as_far_off_as_its_hayati_form(name: str, s
 
 
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
-def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name: str, seed: int) -> None:
+def test_no_cell_of_a_nominal_table_has_a_far_larger_effect_than_the_tip_error(name: str, seed: int) -> None:
     robot, base, tip = with_ends(name)
     nominal = dh_table(robot.tree, tip, base, snap=1e-4)
     strict = dh_table(calibrated(robot.tree, seed), tip, base, near_parallel="strict")
@@ -130,7 +130,7 @@ def test_no_cell_of_a_nominal_table_is_blamed_for_more_than_the_tip_is_off(name:
     assert found.residual <= 1e-9
 
 
-def test_cells_come_in_the_order_of_their_effect() -> None:
+def test_cells_that_differ_are_sorted_by_the_effect_on_the_tip() -> None:
     table = dh_table(calibrated(urdfkin.load("ur5").tree, 1), "tool0", "base")
     effects = [one.tip for one in compare(published("ur5")[0], table).differences]
     assert len(effects) > 5
@@ -144,7 +144,7 @@ def test_cells_come_in_the_order_of_their_effect() -> None:
     ("written", "is_rounding"), [("0.095", True), ("0.0947", True), ("0.0950", False), ("0.09480", False)]
 )
 @pytest.mark.parametrize("suffix", [".toml", ".json", ".csv"])
-def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
+def test_a_difference_within_the_last_digit_is_distinguished_from_a_larger_one(
     written: str, is_rounding: bool, suffix: str, tmp_path: Path
 ) -> None:
     """UR5's d5 is 0.09465."""
@@ -167,7 +167,7 @@ def test_a_difference_within_the_last_digit_is_told_from_one_beyond_it(
     assert ("within the last digit" in document(found, units_of()).text()) == is_rounding
 
 
-def test_the_command_says_what_is_rounded_and_knows_no_fit(tmp_path: Path) -> None:
+def test_the_dh_command_marks_rounded_cells_and_has_the_option_no_fit(tmp_path: Path) -> None:
     done = command("dh kinova --compare kinova")
     assert "All differences are within the last digit of the table (*)." in done.text
     data = json.loads(command("dh kinova --compare kinova --format json").text)

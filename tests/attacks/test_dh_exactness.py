@@ -59,7 +59,7 @@ def checked(robot: urdfkin.Robot, table: DHTable) -> TableCheck:
     return check
 
 
-def test_a_strict_table_that_loses_more_than_the_robots_rounding_says_how_many_millimetres() -> None:
+def test_a_strict_table_with_a_large_rounding_error_reports_the_error_in_millimetres() -> None:
     robot = robot_of(leaning(TWELVE_DIGITS))
     with pytest.warns(urdfkin.NotVerifiedWarning, match=r"LOSES .* mm .* use --snap 1e-12"):
         table = robot.dh("tip", "l0", near_parallel="strict")
@@ -74,7 +74,7 @@ def test_a_strict_table_that_loses_more_than_the_robots_rounding_says_how_many_m
     assert 1e-3 * EPS * longest <= check.metres <= 100.0 * EPS * longest
 
 
-def test_such_a_table_exits_3_and_its_hayati_form_and_its_snapped_form_exit_0() -> None:
+def test_an_inexact_strict_table_exits_with_3_and_the_hayati_or_snapped_table_with_0() -> None:
     text = text_of(leaning(TWELVE_DIGITS))
     ends = ("--base", "l0", "--tip", "tip")
     lossy = command("dh -", *ends, "--near-parallel", "strict", stdin=text)
@@ -85,7 +85,7 @@ def test_such_a_table_exits_3_and_its_hayati_form_and_its_snapped_form_exit_0() 
     assert command("dh -", *ends, "--near-parallel", "strict", "--snap", "1e-12", stdin=text).code == 0
 
 
-def test_a_wrong_strict_table_is_a_disagreement_however_long_its_rows_are() -> None:
+def test_a_wrong_strict_table_with_very_long_rows_is_a_disagreement() -> None:
     robot = robot_of(leaning(TWELVE_DIGITS))
     table = dh_table(robot.tree, "tip", "l0", near_parallel="strict")
     rows = list(table.rows)
@@ -108,7 +108,7 @@ def rack(multiplier: float) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize("multiplier", [1, 30, 1000, 1e5])
 @pytest.mark.parametrize("ends", [("d", "a"), ("a", "d"), ("d", "b")])
-def test_a_right_table_of_a_rack_and_pinion_is_right_whatever_the_multiplier(
+def test_a_correct_table_of_a_rack_and_pinion_agrees_for_every_multiplier(
     multiplier: float, ends: tuple[str, str]
 ) -> None:
     found = urdfkin.load(rack(multiplier))
@@ -117,7 +117,7 @@ def test_a_right_table_of_a_rack_and_pinion_is_right_whatever_the_multiplier(
 
 
 @pytest.mark.parametrize("multiplier", [30, 1000])
-def test_a_wrong_multiplier_in_a_table_is_still_found(multiplier: float) -> None:
+def test_a_wrong_multiplier_in_a_table_is_detected(multiplier: float) -> None:
     found = urdfkin.load(rack(multiplier))
     table = found.dh("d", "a")
     wrong = Mimic("rack", multiplier * (1.0 + 1e-9), 0.0)
@@ -141,7 +141,7 @@ def demand_a_plain_table(tree: KinematicTree, near_parallel: str) -> DHTable:
 
 @pytest.mark.parametrize("angle", [1.5707963267949, 1.570796326794897, 1.57079632679489661923])
 @pytest.mark.parametrize("near_parallel", ["hayati", "strict"])
-def test_an_angle_written_with_fourteen_digits_gets_no_beta_and_no_kilometres(
+def test_an_angle_with_fourteen_digits_causes_neither_beta_nor_long_rows(
     angle: float, near_parallel: str
 ) -> None:
     back, forth = rotation("y", angle), rotation("y", -math.pi / 2)
@@ -156,7 +156,7 @@ def test_an_angle_written_with_fourteen_digits_gets_no_beta_and_no_kilometres(
 
 
 @pytest.mark.parametrize("near_parallel", ["hayati", "strict"])
-def test_two_angles_of_fifteen_digits_that_tilt_together_are_rounding(near_parallel: str) -> None:
+def test_a_tilt_by_two_angles_of_fifteen_digits_is_treated_as_rounding(near_parallel: str) -> None:
     half = 3.14159265358979
     tree = arm(
         shift(0, 0, 0.3),
@@ -169,7 +169,7 @@ def test_two_angles_of_fifteen_digits_that_tilt_together_are_rounding(near_paral
 
 
 @pytest.mark.parametrize("tilt", [1e-13, 1e-12, 1e-9])
-def test_a_tilt_that_is_no_rounding_is_kept(tilt: float) -> None:
+def test_a_tilt_larger_than_rounding_gives_hayati_rows(tilt: float) -> None:
     tree = leaning(tilt)
     table = dh_table(tree, "tip", "l0")
     assert table.has_hayati_rows
@@ -178,7 +178,7 @@ def test_a_tilt_that_is_no_rounding_is_kept(tilt: float) -> None:
 
 
 @pytest.mark.slow
-def test_so101_has_no_foot_at_the_inverse_of_rounding_and_baxter_is_told_to_snap() -> None:
+def test_the_strict_table_of_so101_is_short_and_baxter_gets_a_hint_to_snap() -> None:
     robot = urdfkin.load("so101")
     table = robot.dh(near_parallel="strict")
     assert checked(robot, table).within
@@ -190,7 +190,7 @@ def test_so101_has_no_foot_at_the_inverse_of_rounding_and_baxter_is_told_to_snap
 
 
 @pytest.mark.parametrize("name", ["panda", "elbow"])
-def test_a_clean_table_gets_no_hint_at_snapping(name: str) -> None:
+def test_a_table_without_noisy_cells_gets_no_hint_to_snap(name: str) -> None:
     assert "--snap" not in command("dh", name).text
 
 
@@ -213,13 +213,13 @@ IDLE = [
 
 
 @pytest.mark.parametrize("line", IDLE)
-def test_an_option_that_does_nothing_is_an_error(line: str) -> None:
+def test_an_option_without_effect_is_an_error(line: str) -> None:
     err = refused("dh", *line.replace("TABLE", str(reference_path("ur5"))).split())
     idle = next(word for word in reversed(line.split()) if word.startswith("--"))
     assert re.search(rf"{idle}\S* does nothing .*; leave out this option", err)
 
 
-def test_what_stands_at_its_default_is_not_refused_but_an_idle_seed_is() -> None:
+def test_an_option_with_the_default_value_is_accepted_and_a_seed_without_effect_is_refused() -> None:
     assert command("dh ur5 --compare ur5 --tolerance 0.2").code == 0
     assert command("dh ur5 --tree --digits 10").code == 0
     assert "--seed does nothing without a random --q, --v or --a" in refused("placement panda --seed 3")
@@ -248,7 +248,7 @@ def _nowhere(package: str) -> str:
     raise LookupError(package)
 
 
-def test_declared_used_and_included_arguments_are_known_unless_an_include_is_computed(xacro: Path) -> None:
+def test_all_xacro_arguments_are_found_unless_an_include_is_computed_or_missing(xacro: Path) -> None:
     assert arguments_of(xacro, _nowhere) == {"length", "width", "colour"}
     xacro.write_text(XACRO.replace("part.xacro", "$(arg width).xacro"))
     assert arguments_of(xacro, _nowhere) is None
@@ -257,7 +257,7 @@ def test_declared_used_and_included_arguments_are_known_unless_an_include_is_com
 
 
 @pytest.mark.slow
-def test_an_unknown_xacro_argument_is_an_error_that_names_the_known(xacro: Path) -> None:
+def test_an_unknown_xacro_argument_is_an_error_that_names_the_similar_one(xacro: Path) -> None:
     robot = urdfkin.load(xacro, xacro_args={"length": 2, "width": 3, "colour": "blue"})
     assert robot.placement([0.0], "b")[:2, 3].tolist() == [2.0, 3.0]
     with pytest.raises(UnknownNameError, match=r"unknown xacro argument 'lenght'; did you mean length"):
@@ -280,14 +280,16 @@ def lost(text: str) -> tuple[float, ...]:
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["terminal", "markdown"])
 @pytest.mark.parametrize("units", [(), ("--degrees", "--millimetres")])
-def test_three_digits_are_said_to_lose_nearly_a_millimetre(form: str, units: tuple[str, ...]) -> None:
+def test_a_table_with_three_digits_states_a_rounding_error_of_nearly_a_millimetre(
+    form: str, units: tuple[str, ...]
+) -> None:
     done = command("dh ur10 --base base --tip tool0 --digits 3 --format", form, *units)
     measured, guaranteed = lost(done.text)
     assert 5e-4 < measured <= guaranteed < 2e-3
     assert "Pinocchio" in done.text
 
 
-def test_latex_says_it_on_stderr_and_the_whole_tree_as_well() -> None:
+def test_the_rounding_error_is_printed_on_stderr_for_latex_and_for_the_whole_tree() -> None:
     measured, _ = lost(command("dh ur10 --base base --tip tool0 --digits 3 --format latex").err)
     assert measured > 5e-4
     text = command("dh ur10 --tree --digits 3").text
@@ -299,7 +301,7 @@ def test_latex_says_it_on_stderr_and_the_whole_tree_as_well() -> None:
 @pytest.mark.parametrize("name", ["ur10", "panda", "so101", "tiago", "romeo"])
 @pytest.mark.parametrize("digits", [3, 5, 17])
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_what_the_digits_lose_stays_within_what_is_guaranteed(
+def test_the_rounding_error_of_printed_digits_is_within_the_stated_bound(
     name: str, digits: int, convention: str
 ) -> None:
     robot = urdfkin.load(name, verify=False)
@@ -313,7 +315,7 @@ def test_what_the_digits_lose_stays_within_what_is_guaranteed(
         assert found.metres <= 1e-14
 
 
-def test_the_loss_is_the_distance_to_the_table_that_the_text_says() -> None:
+def test_the_stated_rounding_error_is_the_distance_to_the_printed_table() -> None:
     """Cells as `--digits 3 --millimetres --degrees` prints them, typed in again."""
     table = urdfkin.load("ur10").dh("tool0", "base", snap=1e-6)
     text = command("dh ur10 --base base --tip tool0 --snap 1e-6 --digits 3 --millimetres --degrees").text

@@ -190,14 +190,14 @@ def assert_same(tree: KinematicTree, model: pin.Model, data: bytes) -> None:
 
 
 @pytest.mark.long
-def test_each_odd_piece_alone_is_read_by_both_or_told() -> None:
+def test_each_unusual_piece_is_read_equally_by_both_libraries_or_is_reported() -> None:
     for data in every_odd_piece():
         judged(data)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
-def test_odd_pieces_together_are_read_by_both_or_told(seed: int) -> None:
+def test_combined_unusual_pieces_are_read_equally_by_both_libraries_or_are_reported(seed: int) -> None:
     choose = random.Random(seed)
     for _ in range(500):
         judged(some_odd_pieces(choose))

@@ -66,21 +66,21 @@ STREAMS = {
 
 
 @pytest.mark.parametrize("line", STREAMS)
-def test_a_stream_that_is_full_or_closed_is_told_in_a_line(line: str) -> None:
+def test_a_full_or_closed_standard_stream_is_reported_in_one_line(line: str) -> None:
     code, words = STREAMS[line]
     found, out, err = shell(f"$URDFKIN {line}")
     assert (found, out) == (code, "")
     assert words in (one_line(err) if words else "")
 
 
-def test_a_closed_standard_output_is_no_matter_where_a_file_is_written(tmp_path: Path) -> None:
+def test_a_file_is_written_although_standard_output_is_closed(tmp_path: Path) -> None:
     code, _, err = shell("$URDFKIN placement ur5 -o T.csv >&-", tmp_path)
     assert code == 0, err
     assert (tmp_path / "T.csv").read_text().startswith("sample,T00")
 
 
 @pytest.mark.parametrize("words", ["robots", "--help", "explain 7.130"])
-def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(words: str) -> None:
+def test_a_command_ends_silently_with_exit_code_141_if_the_pipe_is_closed(words: str) -> None:
     code, _, err = shell(f"set -o pipefail; (sleep 0.01; $URDFKIN {words}) | true")
     assert (code, err) == (141, "")
 
@@ -89,7 +89,7 @@ def test_a_reader_that_leaves_ends_a_command_quietly_and_as_no_disagreement(word
 
 
 @pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9999", "7", "1"])
-def test_any_columns_give_a_table(columns: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_value_of_columns_gives_a_table(columns: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", columns)
     assert "shoulder_pan_joint" in "".join(running.good("info ur5").text.split())
 
@@ -118,7 +118,7 @@ def test_names_of_any_script_are_printed_on_any_terminal(words: str, env: dict[s
 
 
 @pytest.mark.parametrize("form", ["terminal", "latex", "toml", "csv", "urdf", "c"])
-def test_a_table_of_names_of_any_script_is_the_same_file_on_an_ascii_terminal(
+def test_a_table_with_names_of_any_script_is_the_same_file_on_an_ascii_terminal(
     form: str, arm: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(arm.parent)
@@ -130,7 +130,7 @@ def test_a_table_of_names_of_any_script_is_the_same_file_on_an_ascii_terminal(
         ).out
 
 
-def test_numba_told_not_to_compile_is_no_matter_whether_kernels_are_kept_or_not(tmp_path: Path) -> None:
+def test_commands_and_cached_kernels_work_with_numba_disable_jit(tmp_path: Path) -> None:
     code, out, err = shell("$URDFKIN placement ur5", NUMBA_DISABLE_JIT="1")
     assert code == 0, err
     assert "verified by Pinocchio" in out
@@ -152,7 +152,7 @@ WITH_FILES = (
 
 @pytest.mark.parametrize("long", LONG)
 @pytest.mark.parametrize("words", WITH_FILES)
-def test_a_name_too_long_for_a_file_is_told_in_a_line(
+def test_a_too_long_file_name_is_reported_in_one_line(
     words: str, long: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -165,7 +165,7 @@ def test_a_name_too_long_for_a_file_is_told_in_a_line(
 
 
 @pytest.mark.parametrize("name", ["~nobody_of_this_name/arm.urdf", "a\x00b.urdf", "\udcff.urdf"])
-def test_an_odd_name_is_told_in_a_line(name: str) -> None:
+def test_an_unusual_file_name_raises_an_error_of_urdfkin(name: str) -> None:
     with pytest.raises(urdfkin.UrdfkinError):
         urdfkin.load(name)
 
@@ -173,7 +173,7 @@ def test_an_odd_name_is_told_in_a_line(name: str) -> None:
 # -- pipes -------------------------------------------------------------------------------------------------
 
 
-def test_a_pipe_that_nobody_writes_to_is_given_up_and_reading_ends_where_it_is_told_to(
+def test_a_pipe_without_a_writer_is_refused_and_reading_ends_at_the_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(files, "PATIENCE", 0.1)
@@ -191,7 +191,7 @@ def test_a_pipe_that_nobody_writes_to_is_given_up_and_reading_ends_where_it_is_t
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.3])
-def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: float, tmp_path: Path) -> None:
+def test_a_named_pipe_with_a_slow_writer_is_read_completely(pause: float, tmp_path: Path) -> None:
     path = tmp_path / "pipe"
     os.mkfifo(path)
     content = bytes(range(256)) * 1000  # more than a pipe holds
@@ -212,7 +212,7 @@ def test_a_named_pipe_is_read_as_soon_as_somebody_writes_however_slowly(pause: f
         writer.join()
 
 
-def test_a_process_substitution_is_a_file(arm: Path) -> None:
+def test_a_process_substitution_is_read_like_a_file(arm: Path) -> None:
     code, out, err = shell("$URDFKIN check <(sleep 0.3; cat arm.urdf) && echo good", arm.parent)
     assert code == 0, err
     assert "good" in out
@@ -233,7 +233,7 @@ def _raising(error: BaseException) -> Callable[..., Any]:
 
 
 @pytest.mark.parametrize("error", [RuntimeError("odd"), MemoryError(), OSError(5, "odd"), RecursionError()])
-def test_a_crash_has_a_code_of_its_own_and_says_what_to_do(
+def test_a_crash_has_exit_code_70_and_asks_for_a_report(
     error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(campaign, "validate", _raising(error))
@@ -252,21 +252,21 @@ RAISED = [
 
 
 @pytest.mark.parametrize(("error", "code"), RAISED)
-def test_what_is_raised_on_purpose_has_its_code(
+def test_each_expected_exception_has_its_exit_code(
     error: BaseException, code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.argv", ["test"])
     assert exit.run(click.Command("test", callback=_raising(error)), "test") == code
 
 
-def test_nobody_who_reads_the_output_is_no_success() -> None:
+def test_a_command_with_a_closed_output_pipe_exits_with_0_or_141() -> None:
     assert running.process("robots", stdin=b"").code == 0
     _, _, err = shell("( $URDFKIN report --schema; echo $? >&2 ) | head -c 1 >/dev/null")
     assert err.split()[-1] in ("0", "141")
 
 
 @pytest.mark.parametrize("broken", ["write", "render"])
-def test_when_one_form_fails_the_others_are_written_and_the_report_is_printed(
+def test_if_one_format_fails_the_other_formats_are_written_and_the_report_is_printed(
     broken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -287,7 +287,7 @@ def test_when_one_form_fails_the_others_are_written_and_the_report_is_printed(
 
 
 @pytest.mark.parametrize(("make", "code"), [(failing, 1), (arms, 70)])
-def test_a_disagreement_stays_exit_1_when_its_report_cannot_be_written(
+def test_a_disagreement_exits_with_1_even_if_the_report_cannot_be_written(
     make: Callable[[], Any], code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(junit, "as_junit", _raising(RuntimeError("odd")))

@@ -26,7 +26,7 @@ def quaternions(scale: float) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", [1.0, 1e-9, 3e20])
 @pytest.mark.parametrize("version", ["1.1", "1.2"])
-def test_true_errors_of_robots_with_quaternions_are_rounding(version: str, scale: float) -> None:
+def test_true_errors_of_robots_with_quaternions_are_rounding_errors(version: str, scale: float) -> None:
     robot = urdfkin.load(text(quaternions(scale), f'version="{version}"'))
     assert worst_error(robot) < 24.0
 

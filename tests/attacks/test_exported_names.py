@@ -41,7 +41,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return loaded(ROBOTS[request.param], verify=False)
 
 
-def test_every_language_holds_the_same_code_under_any_names(robot: Robot) -> None:
+def test_no_name_becomes_code_in_the_export_of_any_language(robot: Robot) -> None:
     written = code(robot, quantities=("placement",))
     words = set(re.findall(r"\w+", written.name)) | {x for row in written.identifiers.values() for x in row}
     assert all(re.fullmatch(r"[A-Za-z0-9_]+", word) for word in words)
@@ -62,7 +62,7 @@ def code_alone(text: str, to: str) -> str:
 
 
 @pytest.mark.parametrize("to", _PYTHON)
-def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) -> None:
+def test_exported_python_code_contains_only_functions_and_tables(robot: Robot, to: str) -> None:
     module = ast.parse(write(code(robot, quantities=("placement",)), to))
     kinds = [type(node) for node in module.body]
     allowed = {ast.Expr, ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign, ast.If}
@@ -79,7 +79,7 @@ def test_python_holds_nothing_but_functions_and_tables(robot: Robot, to: str) ->
 
 
 @pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])
-def test_the_check_of_a_file_passes_under_any_names(robot: Robot, to: str) -> None:
+def test_the_self_check_of_an_exported_file_passes_with_any_names(robot: Robot, to: str) -> None:
     need(to)
     scope: dict[str, Any] = {"__name__": "checked"}
     exec(write(code(robot, quantities=("placement",)), to), scope)
@@ -89,7 +89,7 @@ def test_the_check_of_a_file_passes_under_any_names(robot: Robot, to: str) -> No
 
 @pytest.mark.long  # a compiler takes seconds for each header
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
-def test_cudas_header_declares_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
+def test_the_cuda_header_declares_only_the_exported_functions(robot: Robot, tmp_path: Path) -> None:
     written = code(robot, quantities=("placement",))
     path = file(written, "cuda", tmp_path)
     shim = Path(__file__).parents[1] / "export"
@@ -110,7 +110,7 @@ def test_cudas_header_declares_no_more_than_its_functions(robot: Robot, tmp_path
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
-def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None:
+def test_exported_c_code_defines_only_the_exported_functions(robot: Robot, tmp_path: Path) -> None:
     written = code(robot, quantities=("placement",))
     path = file(written, "c", tmp_path)
     strict = ["-std=c99", "-trigraphs", "-O0", "-Wall", "-Wextra", "-pedantic", "-Werror"]
@@ -125,7 +125,7 @@ def test_c_says_no_more_than_its_functions(robot: Robot, tmp_path: Path) -> None
 
 
 @given(st.lists(st.one_of(st.text(max_size=60), st.sampled_from([*_WORDS, *NAMES.values()])), max_size=20))
-def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
+def test_identifiers_are_valid_and_unique(names: list[str]) -> None:
     found = all_safe(names)
     assert len({word.lower() for word in found}) == len(names)
     for word in found:
@@ -134,7 +134,7 @@ def test_identifiers_are_words_no_two_alike(names: list[str]) -> None:
 
 
 @given(st.text(max_size=60) | st.sampled_from([*_WORDS, *NAMES.values()]))
-def test_words_of_a_comment_end_none(name: str) -> None:
+def test_a_name_in_a_comment_cannot_end_the_comment(name: str) -> None:
     for text in (comment_name(name), comment_name(name * 50)):
         assert text.isascii()
         assert text == "" or text.isprintable()

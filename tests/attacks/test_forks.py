@@ -177,13 +177,13 @@ CASES = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
-def test_a_forked_child_computes(case: str) -> None:
+def test_a_forked_child_process_computes(case: str) -> None:
     code = HARNESS + textwrap.dedent(CASES[case])
     done = python(code, timeout=250)
     assert set(done.stdout.splitlines()) == {"ended with 0"}, done.stderr
 
 
-def test_every_lock_and_pool_of_the_package_is_made_for_forks() -> None:
+def test_every_lock_and_pool_of_the_package_is_listed_as_safe_for_forks() -> None:
     """A new lock or pool has to say what a fork does to it; those of a validation end with its run."""
     made = ("threading.Lock(", "threading.RLock(", "default_factory=threading", "ThreadPoolExecutor(")
     package = Path(str(urdfkin.__file__)).parent

@@ -81,7 +81,7 @@ def test_a_document_four_times_as_long_takes_about_four_times_the_memory(kind: s
 
 
 @pytest.mark.long
-def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
+def test_a_chain_of_mimic_joints_is_read_in_linear_time_by_both_readers() -> None:
     documents = {size: KINDS["a chain of mimic joints"](size) for size in (100_000, 400_000)}
 
     def read(size: int) -> None:
@@ -92,7 +92,7 @@ def test_a_chain_of_followers_is_read_in_linear_time_both_times() -> None:
     grows_like_its_size(read, 100_000)
 
 
-def test_of_a_text_the_beginning_is_kept_and_many_blanks_before_it_lose_nothing() -> None:
+def test_a_long_text_is_truncated_and_leading_blanks_hide_no_text() -> None:
     root = read_document(Reporter("f", b"<robot>" + b"some &lt; words " * 10_000 + b"</robot>"))
     assert root is not None
     assert root.text.startswith("some < words some")
@@ -112,7 +112,7 @@ def test_of_a_text_the_beginning_is_kept_and_many_blanks_before_it_lose_nothing(
         *((f"&#{'0' * n}49; 0 0", code) for n, code in ((10, None), (3_000, None), (10_000, "URDF305"))),
     ],
 )
-def test_a_number_longer_than_any_number_is_refused_as_such(xyz: str, code: str | None) -> None:
+def test_a_number_with_too_many_characters_is_refused(xyz: str, code: str | None) -> None:
     with at_most(ENOUGH):
         findings = urdfkin.check(arm(origin=f'<origin xyz="{xyz}"/>'))
     assert {finding.code for finding in findings} == ({code} if code else set())
@@ -127,7 +127,7 @@ def told(findings: list[Finding], code: str) -> int:
 
 
 @pytest.mark.long
-def test_errors_of_one_kind_are_summed_up_none_is_lost_and_they_hide_none_of_another_kind() -> None:
+def test_many_errors_of_one_kind_are_summarised_and_hide_no_other_errors() -> None:
     findings = urdfkin.check(DOUBLES, fold=True)
     assert len(findings) == ERRORS_SHOWN
     assert told(findings, "URDF402") == MANY - 1
@@ -138,7 +138,7 @@ def test_errors_of_one_kind_are_summed_up_none_is_lost_and_they_hide_none_of_ano
 
 
 @pytest.mark.long
-def test_without_folding_findings_are_complete_up_to_the_stated_number_and_the_rest_by_line() -> None:
+def test_without_folding_findings_beyond_the_stated_number_are_listed_by_line() -> None:
     findings = urdfkin.check(DOUBLES)
     assert len(findings) == WRITTEN_OUT
     assert [finding.line for finding in findings] == list(range(2, WRITTEN_OUT + 2))
@@ -158,7 +158,7 @@ def test_the_message_of_a_refused_robot_stays_short_and_counts_everything() -> N
     assert len(message) < 2_000
 
 
-def test_many_on_one_line_are_counted_and_a_warning_speaks_for_those_on_its_own_line() -> None:
+def test_findings_of_one_kind_are_counted_with_the_lines_on_which_they_occur() -> None:
     text = "<robot name='r'>" + "<link name='a'/>" * 150 + "</robot>"
     findings = urdfkin.check(text, fold=True)
     assert told(findings, "URDF402") == 149
@@ -168,7 +168,7 @@ def test_many_on_one_line_are_counted_and_a_warning_speaks_for_those_on_its_own_
     assert "(4 more on this line and line 9)" in str(finding)
 
 
-def test_who_is_nearest_and_an_attribute_among_many_are_found_in_time() -> None:
+def test_similar_names_and_the_positions_of_many_attributes_are_found_quickly() -> None:
     attributes = "".join(f'\n  a{i}="ä" b{i}="1"' for i in range(50))
     findings = urdfkin.check(f'<robot name="r"><link name="l"{attributes}/></robot>')
     assert [(f.line, f.column) for f in findings] == [
@@ -185,9 +185,7 @@ def test_who_is_nearest_and_an_attribute_among_many_are_found_in_time() -> None:
     ("inside", "filling"),
     [("<!--{}-->", "a"), ("<?a {}?>", "a"), ('<material note="{}"/>', "a"), ("<material {}/>", 'a="1" ')],
 )
-def test_markup_that_does_not_end_is_refused_before_it_is_read_again_and_again(
-    inside: str, filling: str
-) -> None:
+def test_very_long_markup_is_refused_without_being_read_repeatedly(inside: str, filling: str) -> None:
     long = inside.format(filling * (15_000_000 // len(filling)))
     with at_most(ENOUGH):
         findings = urdfkin.check(f'<robot name="r"><link name="l"/>{long}</robot>')
@@ -195,13 +193,13 @@ def test_markup_that_does_not_end_is_refused_before_it_is_read_again_and_again(
 
 
 @pytest.mark.parametrize("inside", ["<!--{}-->", "<![CDATA[{}]]>", '<material note="{}"/>'])
-def test_pieces_that_are_cut_while_they_are_read_stay_whole(inside: str) -> None:
+def test_long_markup_that_is_read_in_blocks_does_not_change_positions(inside: str) -> None:
     text = f'<robot name="r">\n<link name="l"/>{inside.format("ä&lt;>" * 400_000)}\n<link name="l"/></robot>'
     double = next(f for f in urdfkin.check(text) if f.code == "URDF402")
     assert (double.line, double.column) == (3, 7)
 
 
-def test_limits_are_kept_before_anything_else_reads_the_file() -> None:
+def test_limits_of_the_file_are_enforced_when_a_robot_is_loaded() -> None:
     for text, code in (
         (arm(origin=f'<origin xyz="{"1" * 200_000} 0 0"/>'), "URDF305"),
         (arm(base=f'<link name="{"n" * 20_000}"/>'), "URDF117"),

@@ -19,7 +19,7 @@ ROBOTS = 300
 
 
 @pytest.mark.long
-def test_three_hundred_robots_leave_no_object_no_descriptor_and_no_memory() -> None:
+def test_three_hundred_deleted_robots_leak_no_object_file_descriptor_or_memory() -> None:
     # `python -m scripts.leaks 10000` is a longer run of this test.
     command, root = [sys.executable, "-m", "scripts.leaks", str(ROBOTS)], Path(__file__).parents[2]
     parts = json.loads(subprocess.run(command, capture_output=True, check=True, cwd=root).stdout)
@@ -35,7 +35,7 @@ COPIES: list[Callable[[Robot], Robot]] = [copy.copy, copy.deepcopy, lambda x: pi
 
 
 @pytest.mark.parametrize("copied", COPIES)
-def test_a_copy_has_a_ledger_of_its_own(copied: Callable[[Robot], Robot]) -> None:
+def test_a_copy_of_a_robot_has_its_own_certificate(copied: Callable[[Robot], Robot]) -> None:
     robot = urdfkin.load("panda")
     q = robot.neutral()
     robot.placement(q, "panda_hand")
@@ -51,7 +51,7 @@ def test_a_copy_has_a_ledger_of_its_own(copied: Callable[[Robot], Robot]) -> Non
 
 
 @pytest.mark.parametrize("copied", COPIES)
-def test_a_copy_is_the_same_robot(copied: Callable[[Robot], Robot]) -> None:
+def test_a_copy_of_a_robot_gives_the_same_results(copied: Callable[[Robot], Robot]) -> None:
     robot = urdfkin.load("panda", verify="sample")
     again = copied(robot)
     assert (again.name, again.verifier.policy, again.tip_frame) == (robot.name, "sample", robot.tip_frame)

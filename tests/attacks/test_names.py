@@ -33,7 +33,7 @@ LIKE_OURS = urdf(
 )
 
 
-def test_an_exact_name_has_priority_and_a_link_frame_is_its_link() -> None:
+def test_an_exact_name_has_priority_and_a_linkframe_object_is_the_link() -> None:
     foo, other, frame = [1.0, 0.0, 0.0], [1.0, 2.0, 0.0], LinkFrame.of("foo")
     robot, q = loaded(LIKE_OURS), [0.0, 0.0]
     for base in (None, BaseMotion()):
@@ -69,7 +69,7 @@ def test_prepared_frames_with_equal_text_are_different_frames() -> None:
     assert pickle.loads(pickle.dumps(robot.prepare(LinkFrame.of("foo")))).placement(q)[1, 3] == 0.0
 
 
-def test_every_frame_of_all_frames_is_its_own_frame_even_as_a_copy_and_in_a_validation() -> None:
+def test_every_entry_of_all_frames_refers_to_the_correct_link_also_in_a_copy() -> None:
     robot = loaded(LIKE_OURS)
     assert robot.all_frames == ("link:base", "link:foo", "link:link:foo", "joint:j1", "joint:j2")
     assert [robot.tree.frame_link(frame) for frame in robot.all_frames] == [0, 1, 2, 1, 2]
@@ -80,7 +80,7 @@ def test_every_frame_of_all_frames_is_its_own_frame_even_as_a_copy_and_in_a_vali
 
 
 @pytest.mark.parametrize("name", ["anymal_c", "so100", "z1", "b1_z1"])
-def test_a_robot_whose_link_and_joint_share_a_name_moves_with_its_base(name: str) -> None:
+def test_a_robot_with_a_link_and_a_joint_of_equal_name_moves_with_the_base(name: str) -> None:
     robot = urdfkin.load(name)
     shared = {joint.name for joint in robot.tree.joints} & set(robot.link_names)
     assert shared

@@ -87,7 +87,7 @@ def good_for(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("method", "parameter"), cases())
-def test_an_odd_argument_gives_a_result_or_an_error_of_urdfkins_own(
+def test_an_unusual_argument_of_a_method_gives_a_result_or_an_error_of_urdfkin(
     method: str, parameter: str, robot: Robot
 ) -> None:
     function = getattr(robot, method)
@@ -103,7 +103,9 @@ def test_an_odd_argument_gives_a_result_or_an_error_of_urdfkins_own(
 
 
 @pytest.mark.parametrize("method", ["placement", "velocity", "jacobian", "acceleration"])
-def test_a_prepared_frame_takes_what_its_robot_takes(method: str, robot: Robot) -> None:
+def test_an_unusual_argument_of_a_prepared_frame_gives_a_result_or_an_error_of_urdfkin(
+    method: str, robot: Robot
+) -> None:
     function = getattr(robot.prepare("c"), method)
     good = good_for(function)
     failures = {
@@ -124,7 +126,7 @@ ARGUMENTS = [(name, x) for name in FUNCTIONS for x in inspect.signature(getattr(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "parameter"), [pair for pair in ARGUMENTS if pair not in OBJECTS])
-def test_an_odd_argument_of_a_function_gives_a_result_or_an_error_of_urdfkins_own(
+def test_an_unusual_argument_of_a_function_gives_a_result_or_an_error_of_urdfkin(
     name: str, parameter: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)  # a word may be a store's
@@ -136,7 +138,7 @@ def test_an_odd_argument_of_a_function_gives_a_result_or_an_error_of_urdfkins_ow
 
 
 @pytest.mark.parametrize("odd", [key for key in ODD if key != "a half"])
-def test_a_duration_that_is_no_time_is_refused(odd: str, robot: Robot) -> None:
+def test_an_invalid_duration_is_refused(odd: str, robot: Robot) -> None:
     with pytest.raises(urdfkin.InputError):
         line(robot, robot.neutral(), robot.neutral(), ODD[odd], 5)
 
@@ -144,13 +146,13 @@ def test_a_duration_that_is_no_time_is_refused(odd: str, robot: Robot) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("odd", [1.5, "2", True, 0, -1, None.__class__, math.nan])
 @pytest.mark.parametrize("n", [1, 3, 40])
-def test_threads_are_a_whole_number_whatever_the_batch(odd: object, n: int, robot: Robot) -> None:
+def test_threads_must_be_a_positive_integer_for_every_batch_size(odd: object, n: int, robot: Robot) -> None:
     with pytest.raises(urdfkin.InputError, match="threads"):
         robot.jacobian(robot.sample(n), "c", threads=odd)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
-def test_many_threads_are_no_more_work_than_the_batch_and_the_processors(
+def test_the_number_of_parts_is_limited_by_the_batch_and_the_processors(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Ten million threads once caused ten million parts, which took 3.5 s.
@@ -184,7 +186,7 @@ ARRAYS_REFUSED: dict[str, Any] = {
 
 @pytest.mark.parametrize("verify", [True, False])
 @pytest.mark.parametrize("given", ARRAYS_REFUSED)
-def test_what_is_no_number_is_not_made_one_in_silence(given: str, verify: bool, robot: Robot) -> None:
+def test_arrays_that_are_not_real_numbers_are_refused(given: str, verify: bool, robot: Robot) -> None:
     with pytest.raises(urdfkin.InputError, match="q must be real numbers"):
         robot.placement(ARRAYS_REFUSED[given], "c", verify=verify)
     with pytest.raises(urdfkin.InputError, match="q must be real numbers"):
@@ -201,5 +203,5 @@ def test_what_is_no_number_is_not_made_one_in_silence(given: str, verify: bool, 
         (1, np.float32(2.0)),
     ],
 )
-def test_numbers_in_any_clothes_are_taken(given: Any, robot: Robot) -> None:
+def test_real_numbers_of_every_type_are_accepted(given: Any, robot: Robot) -> None:
     np.testing.assert_array_equal(robot.placement(given, "c"), robot.placement([1.0, 2.0], "c"))

@@ -145,22 +145,22 @@ def harmless(done: Done, line: str = "") -> None:
     assert "Traceback" not in done.err
 
 
-def test_every_command_is_tried() -> None:
+def test_every_command_has_a_test_with_hostile_names() -> None:
     assert set(ROBOT) | set(OTHERS) == set(commands())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("line", LINES)
-def test_no_name_and_no_word_of_the_command_line_acts_on_the_terminal(
-    line: str, files: dict[str, str]
-) -> None:
+def test_no_name_and_no_argument_has_an_effect_on_the_terminal(line: str, files: dict[str, str]) -> None:
     harmless(run(files, line), line)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fit", ["--no-fit", pytest.param("--fit", marks=pytest.mark.long)])
 @pytest.mark.parametrize("part", range(5))
-def test_no_name_of_a_table_or_of_what_it_is_held_against_acts(part: int, fit: str, tmp_path: Path) -> None:
+def test_no_name_in_a_comparison_of_a_table_has_an_effect_on_the_terminal(
+    part: int, fit: str, tmp_path: Path
+) -> None:
     # A fifth of the names: the time of a comparison grows with the cube of the table's length.
     names = list(IN_XML.values())[part::5]
     robot, table = tmp_path / f"{FILE}.urdf".replace("/", ""), tmp_path / f"{FILE}.toml".replace("/", "")
@@ -172,7 +172,7 @@ def test_no_name_of_a_table_or_of_what_it_is_held_against_acts(part: int, fit: s
 
 
 @pytest.mark.parametrize("command", [*commands(), "no such command"])
-def test_no_name_of_a_file_or_an_option_acts(command: str) -> None:
+def test_no_file_name_and_no_option_has_an_effect_on_the_terminal(command: str) -> None:
     for words in ([command, f"--{FILE}"], [command, f"{FILE}.urdf"], [f"{command}{FILE}"]):
         if words != ["explain", f"{FILE}.urdf"]:
             harmless(urdfkin(*words))
@@ -180,7 +180,9 @@ def test_no_name_of_a_file_or_an_option_acts(command: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", IN_XML)
-def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_hostile_name_adds_a_line_to_the_output(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("COLUMNS", "10000")
     counts: list[list[int]] = []
     lines = "info", "jacobian", "dh", "dh --format markdown", "dh --tree", "dh --format c", BREAKDOWN
@@ -195,7 +197,7 @@ def test_each_name_alone_adds_no_line(kind: str, tmp_path: Path, monkeypatch: py
 
 
 @pytest.mark.slow
-def test_machine_formats_say_the_names_as_they_are(files: dict[str, str]) -> None:
+def test_machine_readable_formats_contain_the_names_unchanged(files: dict[str, str]) -> None:
     names = [f"{name} " for name in IN_XML.values()]
     assert set(names) <= {joint["name"] for joint in run(files, "info ROBOT --format json").data["joints"]}
     data = run(files, "dh ROBOT --format json").data
@@ -214,7 +216,7 @@ def test_the_message_of_a_crash_is_escaped() -> None:
 
 
 @pytest.mark.slow
-def test_on_a_real_terminal_nothing_but_our_own_colours_comes_out(files: dict[str, str]) -> None:
+def test_a_real_terminal_receives_no_control_sequences_except_colours(files: dict[str, str]) -> None:
     for command, file in (("check", "ROBOT"), ("info", "ROBOT"), ("dh", "ROBOT"), ("report", "REPORT")):
         shown = on_a_terminal([command, files[file]])
         assert "\x1b[1m" in shown or command in ("dh", "info")
@@ -264,7 +266,7 @@ class Recorder:
 
 
 @pytest.mark.parametrize("step", [1, 2, 3, 7, 1000])
-def test_a_command_in_pieces_is_noticed_too(step: int) -> None:
+def test_a_log_command_written_in_pieces_is_escaped(step: int) -> None:
     recorder: Any = Recorder()
     stream = SafeStream(recorder)
     text = " " * 200 + "::error::x\n" + "a ##vso[task]\n  : :x\n:" + ":warning::y\nfine: ::x ## [y]\n"

@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "threats.md").read_text(encoding="utf-8")
 
 
-def test_every_row_of_the_page_names_an_existing_test_and_security_md_links_the_page() -> None:
+def test_every_row_of_the_threats_page_names_an_existing_test() -> None:
     named = re.findall(r"`(tests/[^`]+\.py)`", PAGE)
     assert len(named) >= 10
     assert [name for name in named if not (ROOT / name).is_file()] == []

@@ -19,7 +19,7 @@ NUMBERS = {"1": 1.0, "+1.5": 1.5, "-.5": -0.5, "1.": 1.0, "1e-3": 1e-3, " 2E+2 "
 
 
 @pytest.mark.parametrize("text", NO_NUMBERS)
-def test_a_word_that_is_no_number_is_refused_with_its_joint_and_its_line(text: str, tmp_path: Path) -> None:
+def test_an_invalid_number_is_refused_with_joint_and_line(text: str, tmp_path: Path) -> None:
     if "," not in text:
         words = "--q, elbow_joint: not a finite number: found"
         assert words in refused("placement ur5 --q", f"0,0,{text},0,0,0")
@@ -46,7 +46,7 @@ OPTIONS = [
 
 @pytest.mark.parametrize("text", ["1_0", "\u0661\u0660", "nan", "\uff14"])
 @pytest.mark.parametrize("words", OPTIONS, ids=lambda words: words[-1])
-def test_a_word_that_is_no_number_is_refused_as_an_option(
+def test_an_invalid_number_is_refused_as_an_option(
     words: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -54,7 +54,7 @@ def test_a_word_that_is_no_number_is_refused_as_an_option(
 
 
 @pytest.mark.parametrize("count", ["1_0", "\u0661", "0", "-1", "1.5", ""])
-def test_a_word_that_is_no_positive_integer_is_refused_as_a_count_of_samples(count: str) -> None:
+def test_an_invalid_number_of_samples_is_refused(count: str) -> None:
     done = urdfkin("placement ur5 --q", f"random:{count}")
     assert (done.code == 0) is (count == ""), done.err
 

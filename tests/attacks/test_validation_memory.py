@@ -156,7 +156,7 @@ def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, st
     return write
 
 
-def test_the_limit_depends_on_the_free_memory_of_the_machine_and_of_a_container(
+def test_the_memory_limit_depends_on_the_free_memory_of_the_machine_and_of_a_container(
     system: Callable[[str, str], None],
 ) -> None:
     assert memory.limit() == 8_000_000 * 1024 // 2
@@ -166,7 +166,7 @@ def test_the_limit_depends_on_the_free_memory_of_the_machine_and_of_a_container(
     assert memory.limit() == 1_000_000_000
 
 
-def test_the_limit_depends_on_control_groups_whose_inactive_cached_files_count_as_free(
+def test_the_memory_limit_depends_on_control_groups_and_counts_inactive_files_as_free(
     system: Callable[[str, str], None],
 ) -> None:
     system("proc/self/cgroup", "0::/outer/inner\n")
@@ -181,7 +181,7 @@ def test_the_limit_depends_on_control_groups_whose_inactive_cached_files_count_a
 
 
 @pytest.mark.long
-def test_the_limit_depends_on_the_limit_of_the_process() -> None:
+def test_the_memory_limit_depends_on_the_limit_of_the_process() -> None:
     done = python(
         "import resource; resource.setrlimit(resource.RLIMIT_AS, (3 * 10**9,) * 2)\n"
         "from urdfkin.validation import memory; print(memory.limit())"

@@ -197,7 +197,7 @@ def test_an_interrupted_run_has_not_passed_even_where_every_robot_is_verified() 
         (["verified", "not verified"], False, 3),
     ],
 )
-def test_exit_1_is_a_disagreement_and_nothing_else(verdicts: list[str], interrupted: bool, code: int) -> None:
+def test_exit_code_1_means_only_a_disagreement(verdicts: list[str], interrupted: bool, code: int) -> None:
     found = outcome(verdicts, asked=len(verdicts), interrupted=interrupted)
     assert found.exit_code == code
     assert not found.passed

@@ -13,7 +13,7 @@ import pytest
 from websockets.sync.client import connect
 
 from tests.attacks.hostile import IN_XML, NAMES, chain_of_all
-from tests.attacks.test_viewer_gate import free_port, key_of
+from tests.attacks.test_viewer_server import free_port, key_of
 from tests.report.browser import Browser, opened
 from tests.urdfs import loaded
 from urdfkin.view.server import new_server
@@ -83,9 +83,7 @@ def attack(browser: Browser, address: str) -> tuple[list[str], list[str]]:
     return found, browser.errors()
 
 
-def test_another_page_can_neither_connect_nor_read_nor_frame_the_viewer(
-    viewer: Viewer, browser: Browser
-) -> None:
+def test_another_page_cannot_connect_to_read_or_embed_the_viewer(viewer: Viewer, browser: Browser) -> None:
     with other_site() as site:
         for page in (site, site.replace("127.0.0.1", "localhost")):
             browser.chrome.get(page)
@@ -102,7 +100,7 @@ def test_another_page_can_neither_connect_nor_read_nor_frame_the_viewer(
         assert not any("frame" in error.lower() for error in errors), errors
 
 
-def test_a_name_that_is_pointed_at_this_machine_shows_a_refusal(viewer: Viewer, browser: Browser) -> None:
+def test_a_foreign_host_name_of_this_machine_shows_a_refusal(viewer: Viewer, browser: Browser) -> None:
     browser.chrome.get(viewer.server.address.replace("127.0.0.1", "rebound.test"))
     assert (
         browser.js("return document.body.innerText").strip()
@@ -110,7 +108,7 @@ def test_a_name_that_is_pointed_at_this_machine_shows_a_refusal(viewer: Viewer, 
     )
 
 
-def test_the_page_follows_no_address_to_another_server(viewer: Viewer, browser: Browser) -> None:
+def test_the_page_does_not_connect_to_another_server_in_the_address(viewer: Viewer, browser: Browser) -> None:
     # Viser's client connects to the server in `?websocket=`, whose messages could run code in the page.
     with socket.create_server(("127.0.0.1", 0)) as elsewhere:
         elsewhere.settimeout(0.2)
@@ -121,9 +119,7 @@ def test_the_page_follows_no_address_to_another_server(viewer: Viewer, browser: 
             elsewhere.accept()
 
 
-def test_no_name_becomes_an_element_or_a_script_in_any_panel_and_it_is_shown_as_it_is(
-    viewer: Viewer, browser: Browser
-) -> None:
+def test_no_name_becomes_an_element_or_a_script_in_any_panel(viewer: Viewer, browser: Browser) -> None:
     browser.chrome.get(viewer.server.address)
     browser.wait_for("verified")
     viewer.dh.value = "standard"
@@ -150,7 +146,7 @@ def test_no_name_becomes_an_element_or_a_script_in_any_panel_and_it_is_shown_as_
     browser.wait_for(f"base to {NAMES['script']}")
 
 
-def test_who_knows_the_key_cannot_have_the_viewer_published(
+def test_a_client_with_the_key_cannot_publish_the_viewer(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[object] = []

@@ -24,7 +24,7 @@ def index(words: str) -> int:
     return found
 
 
-def test_steps_run_after_a_failure_and_the_comparison_needs_its_two_files_alone() -> None:
+def test_later_steps_run_after_a_failure_and_the_comparison_needs_only_two_files() -> None:
     later = steps()[index("urdfkin check --strict") + 1 :]
     assert len(later) >= 9
     for step in later:
@@ -35,7 +35,7 @@ def test_steps_run_after_a_failure_and_the_comparison_needs_its_two_files_alone(
 
 
 @pytest.mark.slow
-def test_the_key_of_the_kernels_names_all_that_they_depend_on_and_is_one(tmp_path: Path) -> None:
+def test_the_cache_key_of_the_kernels_contains_every_dependency(tmp_path: Path) -> None:
     assert "steps.kernels.outputs.key" in steps()[index("actions/cache@")]["with"]["key"]
     told = steps()[index("pip freeze")]
     assert told["id"] == "kernels"
@@ -48,7 +48,7 @@ def test_the_key_of_the_kernels_names_all_that_they_depend_on_and_is_one(tmp_pat
     assert re.fullmatch(r"key=[0-9a-f]{16}\n", output.read_text())
 
 
-def test_no_page_names_a_tag_and_every_workflow_is_held_against_the_schema() -> None:
+def test_no_page_names_a_tag_and_every_workflow_is_validated_against_a_schema() -> None:
     for page in ("docs/ci.md", ".pre-commit-hooks.yaml", "README.md"):
         assert not re.search(r"rev: v?\d", (ROOT / page).read_text("utf-8")), page
     files = {str(path.relative_to(ROOT)) for path in (ROOT / ".github/workflows").iterdir()}
@@ -72,7 +72,7 @@ def schema_says(schema: str, file: Path) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("file", WRITTEN)
-def test_what_github_reads_keeps_to_its_schema(file: str, tmp_path: Path) -> None:
+def test_every_file_for_github_conforms_to_the_schema(file: str, tmp_path: Path) -> None:
     code, said = schema_says(WRITTEN[file], ROOT / file)
     assert code == 0, said
     broken = tmp_path / "broken.yml"
@@ -80,7 +80,7 @@ def test_what_github_reads_keeps_to_its_schema(file: str, tmp_path: Path) -> Non
     assert schema_says(WRITTEN[file], broken)[0] == 1
 
 
-def test_the_site_is_built_as_make_builds_it_and_published_from_where_that_puts_it() -> None:
+def test_the_site_is_built_by_make_and_the_output_folder_is_published() -> None:
     jobs = yaml.safe_load((ROOT / ".github/workflows/site.yml").read_text("utf-8"))["jobs"]
     commands = [step["run"] for step in jobs["build"]["steps"] if "run" in step]
     assert commands == ['python -m pip install --quiet --editable ".[docs]"', "make site"]

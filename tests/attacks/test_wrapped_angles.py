@@ -99,7 +99,7 @@ def test_a_mimic_joint_of_an_unwrapped_joint_is_reported(
     np.testing.assert_allclose(motion.q[:, 0], 2.0 * T, atol=1e-12)
 
 
-def test_a_planar_joint_on_a_circle_drives_straight_ahead_in_its_own_frame(tmp_path: Path) -> None:
+def test_a_planar_joint_on_a_circle_has_constant_velocity_in_its_own_frame(tmp_path: Path) -> None:
     t = np.linspace(0.0, 4.0, 4001)
     angle = 2.0 * t
     q = np.column_stack([3.0 * np.sin(angle), -3.0 * np.cos(angle), wrapped(angle)])

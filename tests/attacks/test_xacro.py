@@ -61,7 +61,7 @@ REFUSALS = (
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_an_expression_that_is_a_program_is_refused_with_the_reason(expanded: Expand, program: str) -> None:
+def test_a_dangerous_expression_is_refused_with_the_reason(expanded: Expand, program: str) -> None:
     ways = [as_eval(program)]
     if "}" not in program:  # the character ends an expression
         ways.append(link(f"${{{program}}}"))
@@ -227,7 +227,9 @@ def test_links_in_a_repository_on_a_search_path_are_not_followed(
 # -- the environment, programs, the net ---------------------------------------------------------------
 
 
-def test_the_environment_is_empty(expanded: Expand, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_xacro_file_reads_no_environment_variables(
+    expanded: Expand, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("TOKEN", SECRET)
     assert "'TOKEN' is not set" in refused(expanded, link("$(env TOKEN)"))
     assert 'name="none"' in expanded(link("$(optenv TOKEN none)"))
@@ -255,7 +257,7 @@ DEEDS = [
 
 
 @pytest.mark.parametrize("deed", DEEDS)
-def test_a_program_in_the_confined_process_is_refused(deed: str) -> None:
+def test_a_forbidden_operation_in_the_confined_process_is_refused(deed: str) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         connected: list[object] = []
         threading.Thread(target=lambda: connected.append(server.accept()), daemon=True).start()
@@ -296,7 +298,7 @@ def test_the_time_and_the_output_of_an_expansion_are_limited(
 # -- evaluation ---------------------------------------------------------------------------------------
 
 
-def test_only_allowed_functions_are_called_and_and_and_or_evaluate_like_python() -> None:
+def test_only_allowed_functions_are_called_and_operators_evaluate_like_python() -> None:
     names = {"f": len, "g": max, "d": {"h": print}, "x": [1, 2]}
     assert evaluate("g(x)", names, [max]) == 2
     others = "f(x)", "d.h(x)", "d['h'](x)", "(lambda: 1)()", "g(x)(x)", "x.__len__()", "f.__self__"

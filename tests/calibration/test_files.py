@@ -43,7 +43,7 @@ def csv(path: Path, header: str, rows: FloatArray) -> Path:
     return path
 
 
-def test_every_form_reads_the_same(tmp_path: Path) -> None:
+def test_every_format_of_measured_poses_is_read_equally(tmp_path: Path) -> None:
     quat, p = quaternion_of(T[:, :3, :3]), T[:, :3, 3]
     columns = "qw,qx,qy,qz,x,y,z,b,a"
     rows = np.hstack([np.roll(quat, 1, axis=1), p, Q[:, ::-1]])
@@ -61,14 +61,14 @@ def test_every_form_reads_the_same(tmp_path: Path) -> None:
         np.testing.assert_allclose(found, T, atol=1e-15)
 
 
-def test_a_quaternion_with_few_digits_is_brought_to_length_one(tmp_path: Path) -> None:
+def test_a_quaternion_with_few_digits_is_normalised(tmp_path: Path) -> None:
     quat = quaternion_of(T[:, :3, :3])
     rows = np.hstack([quat * 1.0009, T[:, :3, 3], Q])
     found = read_poses(csv(tmp_path / "long.csv", "qx,qy,qz,qw,x,y,z,a,b", rows), NAMES, NAMES)[1]
     np.testing.assert_allclose(found, T, atol=1e-15)
 
 
-def test_positions_alone_are_positions_alone(tmp_path: Path) -> None:
+def test_files_with_positions_only_are_read_as_positions(tmp_path: Path) -> None:
     path = csv(tmp_path / "p.csv", "a,x,y,z", np.hstack([Q[:, :1], 1e3 * T[:, :3, 3]]))
     q, p = read_poses(path, NAMES, ("a",), "mm")
     assert (q == Q * [1.0, 0.0]).all()
@@ -88,20 +88,20 @@ def test_positions_alone_are_positions_alone(tmp_path: Path) -> None:
         ("a,b,T00,T01,T02,T03,T10,T11,T12,T13,T20,T21,T22,T23", "a pose must be a rotation"),
     ],
 )
-def test_what_is_wrong_with_columns_is_told(header: str, words: str, tmp_path: Path) -> None:
+def test_wrong_columns_of_poses_are_reported(header: str, words: str, tmp_path: Path) -> None:
     path = csv(tmp_path / "x.csv", header, np.ones((2, header.count(",") + 1)))
     with pytest.raises(InputError) as error:
         read_poses(path, NAMES, NAMES)
     assert words in str(error.value)
 
 
-def test_what_is_wrong_with_arrays_is_told(tmp_path: Path) -> None:
+def test_wrong_arrays_of_poses_are_reported(tmp_path: Path) -> None:
     np.savez(tmp_path / "x.npz", q=Q, T=T, p=T[:, :3, 3])
     with pytest.raises(InputError, match="`q` and `T`, `q` and `p`, or `q`, `p` and `quat`: found q, T, p"):
         read_poses(tmp_path / "x.npz", NAMES, NAMES)
 
 
-def test_what_placement_writes_is_read(tmp_path: Path) -> None:
+def test_the_csv_output_of_placement_is_read_as_measured_poses(tmp_path: Path) -> None:
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 2))
     (tmp_path / "q.csv").write_text("\n".join(f"{a!r},{b!r}" for a, b in q.tolist()))
     done = urdfkin("placement", "planar_two_link", "--q", f"@{tmp_path}/q.csv", "--format", "csv")
@@ -209,7 +209,7 @@ def description(prefix: str) -> str:
     return "\n".join([*lines, "</robot>"])
 
 
-def test_the_drivers_angles_turn_about_x_y_and_z_in_that_order_and_a_urdfs_do_not(file: Path) -> None:
+def test_the_driver_and_a_urdf_apply_roll_pitch_yaw_in_different_orders(file: Path) -> None:
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 6))
     true = controller().placement(q)
     driver, urdf = (
@@ -226,7 +226,7 @@ def test_the_drivers_angles_turn_about_x_y_and_z_in_that_order_and_a_urdfs_do_no
 
 @pytest.mark.slow
 @pytest.mark.parametrize("prefix", ["", "left_"])
-def test_the_ros_descriptions_urdf_gets_the_files_numbers(prefix: str, file: Path) -> None:
+def test_the_calibration_file_is_written_to_the_urdf_of_the_ros_description(prefix: str, file: Path) -> None:
     robot = load(description(prefix))
     found = universal_robots(robot, file, "urdf")
     assert present(found.certificate).verified
@@ -242,7 +242,7 @@ def test_the_ros_descriptions_urdf_gets_the_files_numbers(prefix: str, file: Pat
     assert true.changes.total is not None
 
 
-def test_the_older_descriptions_frames_stay_near_where_they_were(file: Path) -> None:
+def test_the_frames_of_the_older_description_move_by_less_than_60_millimetres(file: Path) -> None:
     robot = load("ur10")
     found = universal_robots(robot, file)
     assert found.certificate is not None
@@ -278,14 +278,14 @@ def test_an_arm_with_other_joints_is_refused(file: Path) -> None:
         ("kinematics: " + "[" * 5000, "this is not a YAML file"),
     ],
 )
-def test_another_file_is_told(text: str, words: str, tmp_path: Path) -> None:
+def test_an_invalid_calibration_file_is_reported(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "x.yaml").write_text(text)
     with pytest.raises(InputError) as error:
         read_calibration(tmp_path / "x.yaml")
     assert words in str(error.value)
 
 
-def test_another_robot_and_another_order_are_told(file: Path) -> None:
+def test_an_unsuitable_robot_and_an_unknown_rotation_order_are_reported(file: Path) -> None:
     with pytest.raises(InputError, match="the robot is not a Universal Robots arm"):
         universal_robots("panda", file)
     with pytest.raises(UnknownNameError, match="driver"):
@@ -310,7 +310,7 @@ def origins(data: bytes) -> dict[str, FloatArray]:
 
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_every_other_byte_stays_and_the_new_origins_are_read(end: str, mark: bytes) -> None:
+def test_only_the_origins_change_in_the_new_urdf(end: str, mark: bytes) -> None:
     old = mark + BRANCHED.replace("\n", end).encode()
     new = with_origins(old, ORIGINS)
     # The joint without an origin gets one before its parent.
@@ -321,14 +321,14 @@ def test_every_other_byte_stays_and_the_new_origins_are_read(end: str, mark: byt
     assert (found["four"] == origins(old)["four"]).all()
 
 
-def test_lines_without_a_moved_joint_stay_and_quotes_and_order_too() -> None:
+def test_lines_without_a_changed_joint_and_the_style_of_attributes_are_preserved() -> None:
     text = BRANCHED.encode()
     old, new = (data.splitlines() for data in (text, with_origins(text, {"one": ORIGINS["one"]})))
     assert [k for k, pair in enumerate(zip(old, new, strict=True)) if pair[0] != pair[1]] == [6]
     assert re.fullmatch(rb"""    <origin xyz="\S+ \S+ \S+"   rpy='\S+ \S+ \S+'/>""", new[6])
 
 
-def test_a_number_that_stays_keeps_its_digits() -> None:
+def test_an_unchanged_number_keeps_its_digits() -> None:
     text = BRANCHED.replace('xyz="0.1 0.2 0.3"', 'xyz="1e-1 .20 0.3"').encode()
     T = origins(text)["one"].copy()
     assert with_origins(text, {"one": T}) == text
@@ -337,7 +337,7 @@ def test_a_number_that_stays_keeps_its_digits() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
-def test_a_quaternion_stays_a_quaternion() -> None:
+def test_an_origin_with_a_quaternion_is_written_with_a_quaternion() -> None:
     text = BRANCHED.replace('name="branched"', 'name="branched" version="1.1"')
     text = text.replace('<origin xyz="0.4 0 0.1"/>', '<origin xyz="0.4 0 0.1" quat_xyzw="0 0 -0.6 -0.8"/>')
     drawn = origins(text.encode())["four"].copy()
@@ -348,12 +348,12 @@ def test_a_quaternion_stays_a_quaternion() -> None:
     assert np.dot([float(x) for x in written[1].split()], [0, 0, -0.6, -0.8]) > 0.0
 
 
-def test_a_follower_that_cannot_follow_is_no_reason_to_refuse() -> None:
+def test_a_urdf_with_an_invalid_mimic_joint_can_be_edited() -> None:
     text = BRANCHED.replace('<axis xyz="0 -1 0"/>', '<axis xyz="0 -1 0"/><mimic joint="nobody"/>').encode()
     assert b'<mimic joint="nobody"/>' in with_origins(text, {"one": ORIGINS["one"]})
 
 
-def test_what_has_errors_or_no_such_joint_is_not_edited() -> None:
+def test_a_urdf_with_errors_or_without_the_joint_is_not_edited() -> None:
     with pytest.raises(InputError, match="a URDF with errors is not edited"):
         with_origins(b"<robot>", {})
     with pytest.raises(InputError, match="no such joint"):
@@ -366,7 +366,7 @@ angles = st.floats(-7.0, 7.0)
 
 
 @given(st.tuples(angles, angles, angles), st.tuples(*[st.floats(-1e-3, 1e-3)] * 3))
-def test_of_all_angles_the_nearest_are_written(
+def test_the_roll_pitch_yaw_angles_nearest_to_the_old_ones_are_written(
     old: tuple[float, float, float], by: tuple[float, float, float]
 ) -> None:
     wanted = np.array(old) + by
@@ -377,7 +377,7 @@ def test_of_all_angles_the_nearest_are_written(
 
 
 @pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
-def test_where_roll_and_yaw_are_one_the_roll_stays(pitch: float) -> None:
+def test_the_roll_is_unchanged_at_a_pitch_of_a_right_angle(pitch: float) -> None:
     R = np.round(rotation_from_rpy([0.0, pitch, 0.5]), 16)
     R[:2, 0] = R[2, 1:] = 0.0
     found = nearest_rpy(R, (0.3, pitch, 0.0))

@@ -34,7 +34,7 @@ def elsewhere(arm: Bench, at: FloatArray, n: int = 20) -> FloatArray:
 @pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize(("arm", "tip", "base"), [("ur5", "tool0", "base"), (BRANCHED, "hand", "b")])
-def test_without_noise_the_true_arm_is_found_to_rounding(
+def test_without_noise_the_true_arm_is_identified_within_rounding(
     arm: str, tip: str, base: str, complete: bool
 ) -> None:
     true = bench(arm, ("origins",), tip, base)
@@ -51,7 +51,7 @@ def test_without_noise_the_true_arm_is_found_to_rounding(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
-def test_the_instrument_and_its_target_may_be_anywhere(complete: bool) -> None:
+def test_any_pose_of_the_instrument_and_of_the_target_is_identified(complete: bool) -> None:
     true = bench("panda", ("origins",), "panda_hand", "panda_link0", poses=40)
     B, X = pose(1, 4.0), pose(2, 0.3)
     T = B @ true.T @ X
@@ -64,7 +64,7 @@ def test_the_instrument_and_its_target_may_be_anywhere(complete: bool) -> None:
     assert np.linalg.norm(present(rough.tool)[:3, 3] - X[:3, 3]) < 0.02
 
 
-def test_joints_that_are_called_as_the_ends_are_no_ends() -> None:
+def test_joints_named_base_and_tool_are_not_confused_with_the_base_and_the_tool() -> None:
     text = BRANCHED.replace('"three"', '"base"').replace('"four"', '"tool"')
     true = bench(text, ("origins",), "hand", "trunk")
     B, X = pose(1, 4.0), pose(2, 0.3)
@@ -74,14 +74,14 @@ def test_joints_that_are_called_as_the_ends_are_no_ends() -> None:
     assert np.abs(present(found.base) - B).max() < 0.05
 
 
-def test_joints_zeros_alone_are_found() -> None:
+def test_joint_offsets_alone_are_identified() -> None:
     true = bench(BRANCHED, ("offsets",), "hand", "trunk", error=0.05)
     found = true.calibrate(fit=["offsets"])
     assert [str(parameter) for parameter in found.parameters] == ["three rz", "four rz"]
     np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
 
 
-def test_gains_are_found_and_not_written() -> None:
+def test_gains_are_identified_and_not_written() -> None:
     true = bench("ur5", ("gains",), "tool0", "base", error=1e-3)
     found = true.calibrate(fit=["gains"])
     np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
@@ -93,7 +93,7 @@ def test_gains_are_found_and_not_written() -> None:
 
 
 @pytest.mark.parametrize("convention", list(DHConvention))
-def test_a_tables_cells_are_found_with_a_fifth_where_axes_are_parallel(convention: DHConvention) -> None:
+def test_the_cells_of_a_table_are_identified_with_beta_for_parallel_axes(convention: DHConvention) -> None:
     drawn = table(convention)
     model = table_model(drawn, ("origins",))
     truth = model.chain.start + 2e-3 * np.random.default_rng(4).standard_normal(len(model.chain.start))
@@ -117,7 +117,7 @@ def whitened(true: Bench, found: Calibration) -> float:
 
 
 @pytest.mark.slow
-def test_the_covariance_and_the_noise_are_what_they_are_said_to_be() -> None:
+def test_the_stated_covariance_and_noise_agree_with_repeated_calibrations() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=40)
     metres, radians = 2e-4, 5e-4
     every = [true.calibrate(true.noisy(metres, radians, seed)) for seed in range(20)]
@@ -137,7 +137,7 @@ def test_the_covariance_and_the_noise_are_what_they_are_said_to_be() -> None:
 
 
 @pytest.mark.slow
-def test_odd_poses_are_told_and_left_out_only_if_that_is_wanted() -> None:
+def test_outliers_are_reported_and_excluded_only_on_request() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=60)
     T = true.noisy(1e-4, 2e-4, 7)
     T[17, :3, 3] += [5e-3, 0.0, 0.0]
@@ -152,7 +152,7 @@ def test_odd_poses_are_told_and_left_out_only_if_that_is_wanted() -> None:
     assert doubts(clean) == ["poses 17, 40 are excluded as outliers"]
 
 
-def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
+def test_a_fit_without_redundant_measurements_is_refused() -> None:
     true = bench("ur5", ("origins",), "tool0", "base", poses=5)
     T = true.noisy(1e-4, 1e-4, 0)
     with pytest.raises(InputError, match="the fit cannot be checked"):
@@ -183,14 +183,14 @@ def test_as_many_numbers_as_parameters_leave_nothing_to_judge_by() -> None:
         ({"tip": 5}, "tip must be a name"),
     ],
 )
-def test_bad_input_is_told(change: dict[str, object], words: str) -> None:
+def test_invalid_calibration_input_is_reported(change: dict[str, object], words: str) -> None:
     arguments = {"q": np.zeros((3, 6)), "poses": np.eye(3), "tip": "tool0"} | change
     with pytest.raises(InputError) as error:
         calibrate(load("ur5", verify=False), **arguments)  # type: ignore[arg-type]
     assert words in str(error.value)
 
 
-def test_an_unknown_set_of_parameters_offers_the_nearest() -> None:
+def test_an_unknown_set_of_parameters_lists_similar_names() -> None:
     with pytest.raises(UnknownNameError, match="offsets"):
         calibrate("ur5", fit=["offset"])
 
@@ -204,7 +204,9 @@ ARMS = {"ur5": ("tool0", "base"), "panda": ("panda_hand", "panda_link0"), BRANCH
 @pytest.mark.slow
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("arm", ARMS, ids=["ur5", "panda", "branched, up and down"])
-def test_turning_joints_have_four_numbers_sliding_ones_two_and_the_tip_six(arm: str, complete: bool) -> None:
+def test_a_revolute_joint_has_four_identifiable_parameters_and_a_prismatic_one_two(
+    arm: str, complete: bool
+) -> None:
     tip, base = ARMS[arm]
     robot = load(arm, verify=False)
     found = calibrate(robot, tip=tip, base=base, fit=["base", "tool", "origins"], complete=complete)
@@ -216,7 +218,7 @@ def test_turning_joints_have_four_numbers_sliding_ones_two_and_the_tip_six(arm: 
     assert gains.identification.rank == law + len(kinds)
 
 
-def test_no_kept_parameter_has_to_be_large_for_one_that_stands_still() -> None:
+def test_no_fitted_parameter_must_be_large_to_replace_a_fixed_parameter() -> None:
     # With nearly parallel axes, four parameters could become hundreds of metres long.
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40, error=1e-3)
     true = arm.calibrate()
@@ -228,7 +230,7 @@ def test_no_kept_parameter_has_to_be_large_for_one_that_stands_still() -> None:
     assert np.abs(shares[0]).max() < 4.0
 
 
-def test_what_stands_still_says_what_does_the_same() -> None:
+def test_each_fixed_parameter_states_the_parameter_with_the_same_effect() -> None:
     found = calibrate("ur5", tip="tool0", base="base", fit=["base", "origins"], complete=False)
     reasons = {str(found.parameters[k]): why for k, why in found.identification.still.items()}
     assert reasons["shoulder_pan_joint rz"] == "same effect as base rz"
@@ -236,7 +238,7 @@ def test_what_stands_still_says_what_does_the_same() -> None:
     assert reasons["wrist_3_link-tool0_fixed_joint rx"] == "no effect on the measured numbers"
 
 
-def test_a_joint_that_never_moved_is_told_of() -> None:
+def test_a_joint_without_motion_in_the_poses_is_reported() -> None:
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40)
     q = arm.q.copy()
     q[:, 2] = 0.4
@@ -249,7 +251,7 @@ def test_a_joint_that_never_moved_is_told_of() -> None:
 
 
 @pytest.mark.slow
-def test_poses_that_hardly_excite_a_parameter_are_told_of() -> None:
+def test_poorly_observable_parameters_are_reported() -> None:
     arm = bench("ur5", ("origins",), "tool0", "base", poses=40)
     q = arm.q.copy()
     q[:, 2] = 0.4 + 1e-3 * q[:, 2]

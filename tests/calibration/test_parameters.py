@@ -80,7 +80,7 @@ def six(model: CalibrationModel, where: str, moved: dict[int, Number]) -> Pose:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("base", "tip"), [("trunk", "hand"), ("b", "hand"), ("hand", "b")])
-def test_a_urdfs_columns_are_the_difference_quotients_of_its_text_at_fifty_digits(
+def test_the_parameter_jacobian_of_a_urdf_agrees_with_finite_differences_at_fifty_digits(
     base: str, tip: str
 ) -> None:
     robot = load(BRANCHED, verify=False)
@@ -127,7 +127,7 @@ def table(convention: DHConvention) -> DHTable:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", list(DHConvention))
-def test_a_tables_columns_are_the_difference_quotients_of_its_product_at_fifty_digits(
+def test_the_parameter_jacobian_of_a_table_agrees_with_finite_differences_at_fifty_digits(
     convention: DHConvention,
 ) -> None:
     dh = table(convention)

@@ -63,14 +63,16 @@ def reason(name: str, q: FloatArray, **how: Any) -> str:
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
 @pytest.mark.parametrize("name", NAMES)
-def test_joint_angles_in_degrees_are_named(name: str, fit: list[str], complete: bool) -> None:
+def test_joint_angles_in_degrees_are_identified_as_the_mistake(
+    name: str, fit: list[str], complete: bool
+) -> None:
     true = arm(name)
     slides = [joint == "two" for joint in true.robot.coordinate_names]
     q = np.where(slides, true.q, np.degrees(true.q))
     assert reason(name, q, fit=fit, complete=complete).startswith("joint angles are in degrees")
 
 
-def test_all_values_multiplied_by_57_are_named_where_one_of_them_slides() -> None:
+def test_values_that_are_all_multiplied_by_180_over_pi_are_identified_as_the_mistake() -> None:
     name = "through the trunk"
     assert "multiplied by 180/pi" in reason(name, np.degrees(arm(name).q))
 
@@ -78,7 +80,7 @@ def test_all_values_multiplied_by_57_are_named_where_one_of_them_slides() -> Non
 @pytest.mark.parametrize("complete", [True, False])
 @pytest.mark.parametrize("by", [1, -1, 2])
 @pytest.mark.parametrize("name", NAMES)
-def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool) -> None:
+def test_shifted_rows_of_q_are_identified_as_the_mistake(name: str, by: int, complete: bool) -> None:
     said = reason(name, np.roll(arm(name).q, by, axis=0), complete=complete)
     rows = "one row" if abs(by) == 1 else "2 rows"
     way = "later" if by > 0 else "earlier"
@@ -89,7 +91,7 @@ def test_rows_of_q_that_are_shifted_are_named(name: str, by: int, complete: bool
 
 @pytest.mark.parametrize("fit", [ALL, ["origins"]], ids=["anywhere", "origins"])
 @pytest.mark.parametrize("name", NAMES)
-def test_the_joint_whose_sign_is_wrong_is_named(name: str, fit: list[str]) -> None:
+def test_the_joint_with_the_wrong_sign_is_named(name: str, fit: list[str]) -> None:
     true = arm(name)
     for joint, column in zip(
         true.model.coupling.names, true.model.coupling.q_index(true.robot.tree), strict=True
@@ -125,7 +127,7 @@ def test_a_gain_or_a_tilted_axis_does_not_hide_a_wrong_sign() -> None:
     assert "'three' is wrong" in said
 
 
-def test_sliding_joints_in_millimetres_are_named() -> None:
+def test_prismatic_joints_in_millimetres_are_identified_as_the_mistake() -> None:
     name = "through the trunk"
     slides = [joint == "two" for joint in arm(name).robot.coordinate_names]
     assert reason(name, np.where(slides, 1e3 * arm(name).q, arm(name).q)).startswith(
@@ -133,7 +135,7 @@ def test_sliding_joints_in_millimetres_are_named() -> None:
     )
 
 
-def test_a_tables_data_are_judged_as_a_robots() -> None:
+def test_data_for_a_table_are_checked_like_data_for_a_robot() -> None:
     drawn = table(DHConvention.STANDARD)
     model = table_model(drawn, ("origins",))
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 4))
@@ -163,7 +165,7 @@ def test_good_data_are_never_refused(name: str, complete: bool) -> None:
             assert not found.plausibility.objections
 
 
-def test_other_wrong_data_are_refused_without_a_reason() -> None:
+def test_unexplained_wrong_data_are_refused_without_a_likely_reason() -> None:
     q = np.random.default_rng(0).permutation(arm("ur5").q)
     said = refused("ur5", q)
     assert "of the reach" in said
@@ -183,7 +185,7 @@ def test_few_distinct_configurations_are_refused() -> None:
         arm("ur5").calibrate(T, jittered)
 
 
-def test_values_beyond_a_turn_are_taken_for_degrees_unless_they_are_said_to_be_radians() -> None:
+def test_values_beyond_a_turn_are_refused_as_degrees_unless_declared_as_radians() -> None:
     true = arm("branched")
     q = true.q.copy()
     q[:, true.robot.coordinate_names.index("four")] += 4.0 * np.pi  # a continuous joint after two full turns
@@ -193,7 +195,7 @@ def test_values_beyond_a_turn_are_taken_for_degrees_unless_they_are_said_to_be_r
     assert not found.plausibility.objections
 
 
-def test_a_refused_fit_is_had_by_force() -> None:
+def test_a_refused_fit_is_returned_with_force() -> None:
     found = fitted("ur5", np.roll(arm("ur5").q, 1, axis=0), force=True)
     assert found.plausibility.objections
     assert found.plausibility.reason is not None

@@ -23,7 +23,7 @@ def words_of(folder: Path, shift: int = 0) -> tuple[list[str], Any]:
     return ["calibrate", f"{folder}/arm.urdf", "--tip", "hand", "--poses", f"{folder}/poses.npz"], true
 
 
-def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
+def test_calibrate_writes_a_urdf_and_prints_data(tmp_path: Path) -> None:
     (words, true), out = words_of(tmp_path), tmp_path / "new.urdf"
     done = good(*words, "--format", "json", "-o", str(out))
     assert done.data["rank"] == 14
@@ -36,7 +36,7 @@ def test_measured_poses_become_a_urdf_and_data(tmp_path: Path) -> None:
     assert "verified by Pinocchio" in shown.text
 
 
-def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path: Path) -> None:
+def test_an_implausible_calibration_is_written_only_with_force(tmp_path: Path) -> None:
     (words, _), out = words_of(tmp_path, shift=1), tmp_path / "new.urdf"
     done = urdfkin(*words, "-o", str(out))
     assert done.code == 3
@@ -50,7 +50,7 @@ def test_a_calibration_that_is_not_plausible_is_written_by_force_alone(tmp_path:
     assert out.exists()
 
 
-def test_a_tables_file_becomes_a_table(tmp_path: Path) -> None:
+def test_the_calibration_of_a_table_file_writes_a_table(tmp_path: Path) -> None:
     drawn = table(DHConvention.STANDARD)
     model = table_model(drawn, ("origins",))
     truth = model.chain.start + 1e-3

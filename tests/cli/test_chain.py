@@ -18,7 +18,7 @@ PATHS = [
 
 
 @pytest.mark.parametrize(("name", "base", "tip"), PATHS)
-def test_axes_and_origins_are_those_of_the_robots_own_frames(name: str, base: str, tip: str) -> None:
+def test_axes_and_origins_of_a_chain_agree_with_the_robots_frames(name: str, base: str, tip: str) -> None:
     robot = library.load(name)
     ends = ["--base", base, "--tip", tip] if base else []
     data = good("chain", name, *ends, "--q", "random", "--seed", "3", "--format", "json").data
@@ -54,7 +54,9 @@ def test_the_table_and_the_csv_have_the_same_joints_in_the_order_of_the_path(
 
 
 @pytest.mark.parametrize("slip", ["an origin", "an axis", "the tip"])
-def test_a_chain_that_is_elsewhere_is_a_disagreement(slip: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_axis_or_origin_of_a_chain_is_a_disagreement(
+    slip: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     right = FrameChain.frames
 
     def wrong(path: FrameChain, q: FloatArray) -> FloatArray:
@@ -71,7 +73,7 @@ def test_a_chain_that_is_elsewhere_is_a_disagreement(slip: str, monkeypatch: pyt
     assert "the chain's axes disagree" in done.err
 
 
-def test_without_a_check_it_says_so_and_a_batch_or_a_floating_joint_is_refused() -> None:
+def test_an_unverified_chain_is_marked_and_a_batch_or_a_floating_joint_is_refused() -> None:
     done = urdfkin("chain ur5 --no-verify")
     assert done.code == 3
     assert "NOT VERIFIED" in done.text

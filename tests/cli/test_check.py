@@ -32,9 +32,7 @@ LINES = {
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_the_exit_code_is_1_for_errors_only_and_strict_makes_errors_of_warnings(
-    line: str, folder: None
-) -> None:
+def test_only_errors_exit_with_1_and_strict_turns_warnings_into_errors(line: str, folder: None) -> None:
     code, words = LINES[line]
     done = urdfkin("check", *line.split(), stdin=BAD)
     assert (done.code, done.err) == (code, "")
@@ -43,7 +41,7 @@ def test_the_exit_code_is_1_for_errors_only_and_strict_makes_errors_of_warnings(
         assert done.data, "one document"
 
 
-def test_an_error_exits_1_with_its_place_a_missing_file_or_an_unknown_code_2(folder: None) -> None:
+def test_an_error_exits_with_1_and_a_missing_file_or_an_unknown_code_with_2(folder: None) -> None:
     done = urdfkin("check good.urdf bad.urdf")
     assert done.code == 1
     lines = done.text.splitlines()
@@ -72,7 +70,7 @@ PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-F]{2})+")
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("absolute", [False, True])
-def test_a_file_of_any_name_is_named_by_a_uri_that_gives_its_bytes_back(
+def test_a_sarif_uri_decodes_to_the_exact_bytes_of_the_file_name(
     tmp_path: Path, name: bytes, absolute: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = tmp_path / os.fsdecode(name)

@@ -56,7 +56,7 @@ def settings(text: str) -> None:
 # -- files ---------------------------------------------------------------------------------------------
 
 
-def test_a_folder_stands_for_every_urdf_in_it_but_for_hidden_copied_and_excluded_ones(here: Path) -> None:
+def test_a_folder_means_all_contained_urdfs_except_hidden_copied_and_excluded_files(here: Path) -> None:
     put("build/COLCON_IGNORE", "")
     others = ".venv/x.urdf", "build/arm.urdf", "old/arm.urdf", "hands/x.xml"
     for name in ("arm.urdf", "hands/left.urdf", *others):
@@ -68,7 +68,7 @@ def test_a_folder_stands_for_every_urdf_in_it_but_for_hidden_copied_and_excluded
     ]  # fmt: skip
 
 
-def test_a_pattern_and_a_name_of_a_robot_or_an_option_stand_for_files(here: Path) -> None:
+def test_patterns_and_files_named_like_a_robot_or_an_option_are_found(here: Path) -> None:
     for name in ("a/one.urdf", "a/b/two.urdf", "a/three.txt"):
         put(name)
     assert found("a/**/*.urdf") == [("a/b/two.urdf", "URDF503"), ("a/one.urdf", "URDF503")]
@@ -90,7 +90,7 @@ def test_a_folder_or_pattern_without_a_urdf_is_an_error_not_a_success(here: Path
 # -- output --------------------------------------------------------------------------------------------
 
 
-def test_carets_stand_below_what_is_meant_and_of_a_long_line_the_part_around_is_shown(here: Path) -> None:
+def test_carets_mark_the_finding_and_a_long_line_is_shown_in_part(here: Path) -> None:
     put("arm.urdf", LONG.replace("    <axis", "\t<!-- \u6c49 --><axis"))
     lines = check("arm.urdf").text.splitlines()
     assert lines[0].startswith("arm.urdf:5:18: URDF503 [*] warning: joint 'j': the axis has length 2")
@@ -113,7 +113,7 @@ def test_codes_are_selected_and_ignored_by_code_name_and_family(here: Path) -> N
     assert "did you mean URDF523, URDF513, URDF503" in check("--select", "URDF5O3").err
 
 
-def test_statistics_count_by_code_the_most_first(here: Path) -> None:
+def test_statistics_are_counted_by_code_and_sorted_by_number(here: Path) -> None:
     for k in range(3):
         put(f"{k}.urdf")
     put("bad.urdf", BAD)
@@ -128,7 +128,7 @@ def test_statistics_count_by_code_the_most_first(here: Path) -> None:
 # -- comments ------------------------------------------------------------------------------------------
 
 
-def test_a_comment_silences_and_the_reason_reaches_machines(here: Path) -> None:
+def test_a_comment_silences_a_finding_and_json_contains_the_reason(here: Path) -> None:
     comment = "<!-- urdfkin: ignore[URDF503] the drawing gives two points -->"
     put("arm.urdf", LONG.replace("    <axis", f"    {comment}\n    <axis"))
     done = check("--strict", "arm.urdf")
@@ -144,7 +144,7 @@ def test_a_comment_silences_and_the_reason_reaches_machines(here: Path) -> None:
 # -- settings ------------------------------------------------------------------------------------------
 
 
-def test_settings_are_found_above_and_the_command_line_says_otherwise(
+def test_settings_are_read_from_a_parent_folder_and_options_override_settings(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put("robots/arm.urdf")
@@ -159,7 +159,7 @@ def test_settings_are_found_above_and_the_command_line_says_otherwise(
     assert check("--config", "other.toml", "arm.urdf").code == 0
 
 
-def test_codes_are_ignored_in_some_files_and_by_no_settings_of_others(
+def test_codes_are_ignored_per_file_and_only_by_settings_of_the_same_repository(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("legacy/arm.urdf", "arm.urdf", "inner/arm.urdf"):
@@ -215,7 +215,7 @@ def test_findings_in_a_baseline_do_not_fail_the_check_and_new_findings_do(here: 
     )
 
 
-def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_names_the_baseline(
+def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_selects_the_baseline(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><a/>{}</joint>'
@@ -231,7 +231,7 @@ def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_names_the_baselin
     assert found() == found(str(here)) == []
 
 
-def test_a_baseline_written_for_some_files_keeps_what_it_knows_of_others(here: Path) -> None:
+def test_a_baseline_written_for_some_files_keeps_the_findings_of_other_files(here: Path) -> None:
     one, two = put("one.urdf"), put("two.urdf")
     check("--write-baseline", "known.json")
     one.write_text(GOOD)
@@ -245,7 +245,7 @@ def test_a_baseline_written_for_some_files_keeps_what_it_knows_of_others(here: P
 @pytest.mark.parametrize(
     "text", ["", "[]", "{", '{"schema": "urdfkin-baseline", "version": 2}', "[" * 100_000]
 )
-def test_what_is_no_baseline_is_refused(here: Path, text: str) -> None:
+def test_an_invalid_baseline_is_refused(here: Path, text: str) -> None:
     put("arm.urdf")
     put("known.json", text)
     for option in ("--baseline", "--write-baseline"):
@@ -280,7 +280,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_only_what_is_new_since_a_branch_is_told(repository: Path) -> None:
+def test_only_findings_that_are_new_since_a_branch_are_reported(repository: Path) -> None:
     done = check("--strict", "--changed-since", "main")
     assert (done.code, done.text) == (0, "no findings in 0 files (unchanged files: 2)\n")
     put("arm.urdf", "\n" + LONG.replace("<axis", '<axis  shade="3"'))
@@ -298,7 +298,7 @@ def test_only_what_is_new_since_a_branch_is_told(repository: Path) -> None:
     assert found("--changed-since", "main") == new
 
 
-def test_changes_are_found_from_a_folder_below_and_for_a_file_outside_the_repository(
+def test_changes_are_found_from_a_subfolder_and_for_a_file_outside_the_repository(
     repository: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     (repository / "below").mkdir()
@@ -308,7 +308,7 @@ def test_changes_are_found_from_a_folder_below_and_for_a_file_outside_the_reposi
     assert found("--changed-since", "main", "../arm.urdf", str(other)) == [(str(other), "URDF503")]
 
 
-def test_a_mesh_that_a_pull_request_takes_away_is_missed_in_a_file_that_it_left(repository: Path) -> None:
+def test_a_deleted_mesh_is_reported_in_an_unchanged_file(repository: Path) -> None:
     mesh = put("meshes/arm.stl", "")
     shape = '<link name="a"><visual><geometry><mesh filename="meshes/arm.stl"/></geometry></visual></link>'
     put("shaped.urdf", LONG.replace('<link name="a"/>', shape))
@@ -347,7 +347,7 @@ IN_PARTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", IN_PARTS)
-def test_a_usd_or_mjcf_file_is_told_in_full_when_it_or_a_part_of_it_changed(
+def test_all_findings_of_a_usd_or_mjcf_file_are_reported_if_a_part_changed(
     repository: Path, form: str
 ) -> None:
     pytest.importorskip("pxr" if form == "usd" else "mujoco")
@@ -371,7 +371,7 @@ def test_a_usd_or_mjcf_file_is_told_in_full_when_it_or_a_part_of_it_changed(
 
 
 @pytest.mark.slow
-def test_a_xacro_file_is_told_in_full_when_what_it_may_include_changed(repository: Path) -> None:
+def test_all_findings_of_a_xacro_file_are_reported_if_a_possible_include_changed(repository: Path) -> None:
     pytest.importorskip("xacrodoc")
     macro = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="l" value="{}"/></robot>'
     include = (
@@ -390,13 +390,15 @@ def test_a_xacro_file_is_told_in_full_when_what_it_may_include_changed(repositor
 
 
 @pytest.mark.parametrize("version", ["nowhere", "--help", "HEAD:arm.urdf", ""])
-def test_a_version_that_is_none_is_told_with_what_to_do(repository: Path, version: str) -> None:
+def test_an_unknown_git_version_is_an_error_with_a_remedy(repository: Path, version: str) -> None:
     err = refused("check", f"--changed-since={version}")
     assert "git finds no common version of this commit and HEAD" in err
     assert "fetch-depth: 0" in err
 
 
-def test_without_a_repository_the_error_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_repository_or_without_git_the_error_states_this(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     put("arm.urdf")
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
@@ -405,7 +407,7 @@ def test_without_a_repository_the_error_says_so(tmp_path: Path, monkeypatch: pyt
     assert "git is not installed" in check("--changed-since", "main").err
 
 
-def test_git_runs_nothing_that_a_strangers_repository_names(repository: Path) -> None:
+def test_git_runs_no_program_from_the_settings_of_an_untrusted_repository(repository: Path) -> None:
     mark = repository / "RUN"
     for setting in ("core.fsmonitor", "diff.external", "filter.x.clean", "core.pager", "core.sshCommand"):
         git("config", setting, f"touch {mark}; cat")
@@ -418,7 +420,7 @@ def test_git_runs_nothing_that_a_strangers_repository_names(repository: Path) ->
 # -- fixes ---------------------------------------------------------------------------------------------
 
 
-def test_fix_mends_files_and_what_is_left_is_told(here: Path) -> None:
+def test_fix_corrects_files_and_reports_the_remaining_findings(here: Path) -> None:
     arm = put("arm.urdf", LONG.replace("<parent", '<parent frame="x"'))
     arm.chmod(0o640)
     done = check("--fix")
@@ -434,7 +436,7 @@ def test_fix_mends_files_and_what_is_left_is_told(here: Path) -> None:
     assert (arm.stat().st_mtime_ns, arm.stat().st_ino) == before
 
 
-def test_only_what_is_told_is_mended(here: Path) -> None:
+def test_only_reported_findings_are_fixed(here: Path) -> None:
     text = LONG.replace("<parent", '<parent frame="x"')
     mended = text.replace("0 0 2", "0 0 1")
     arm = put("arm.urdf", text)
@@ -449,7 +451,7 @@ def test_only_what_is_told_is_mended(here: Path) -> None:
     assert arm.read_text() == silenced
 
 
-def test_diff_shows_a_patch_that_does_what_fix_does(here: Path) -> None:
+def test_diff_prints_a_patch_with_the_changes_of_fix(here: Path) -> None:
     arm = put("arm.urdf", LONG.replace("    <axis", "\t<axis"))
     done = check("--diff")
     assert (done.code, done.err) == (1, "1 finding to fix in 1 file\n")
@@ -484,7 +486,7 @@ def apply(patch: bytes) -> None:
 
 @pytest.mark.parametrize("name", ["arm.urdf", "an arm.urdf", "\xe4rm.urdf", 'ar"m.urdf', "below/arm.urdf"])
 @pytest.mark.parametrize("lines", ODD_LINES)
-def test_git_applies_what_diff_prints_and_it_does_what_fix_does(here: Path, lines: str, name: str) -> None:
+def test_git_applies_the_patch_of_diff_with_the_result_of_fix(here: Path, lines: str, name: str) -> None:
     arm, odd = put(name), ODD_LINES[lines].encode()
     arm.write_bytes(odd)
     done = check("--diff", str(arm) if name != "arm.urdf" else str(arm.resolve()))
@@ -500,7 +502,7 @@ def test_git_applies_what_diff_prints_and_it_does_what_fix_does(here: Path, line
 
 
 @pytest.mark.parametrize("lines", ["line feeds", "a bidi mark nearby"])
-def test_a_patch_that_is_printed_below_the_top_of_a_repository_is_applied_there(
+def test_a_patch_printed_in_a_subfolder_of_a_repository_is_applied_in_the_subfolder(
     here: Path, monkeypatch: pytest.MonkeyPatch, lines: str
 ) -> None:
     git("init", "-q")
@@ -526,7 +528,7 @@ def test_fixes_that_rotate_a_joint_need_unsafe_fixes(here: Path) -> None:
     assert 'rpy="1.5707963267948966 0 0"' in arm.read_text()
 
 
-def test_github_gets_errors_first_and_one_line_for_many_of_a_kind(here: Path) -> None:
+def test_github_output_has_errors_first_and_one_line_for_many_findings_of_a_kind(here: Path) -> None:
     joints = "".join(
         f'<link name="l{k}"/><joint name="j{k}" type="continuous"><parent link="a"/><child link="l{k}"/>'
         f'<axis xyz="0 0 2"/></joint>\n'
@@ -541,7 +543,7 @@ def test_github_gets_errors_first_and_one_line_for_many_of_a_kind(here: Path) ->
 
 
 @pytest.mark.parametrize("style", ["terminal", "concise", "json", "sarif", "github"])
-def test_findings_go_to_a_file(here: Path, style: str) -> None:
+def test_findings_are_written_to_a_file(here: Path, style: str) -> None:
     put("arm.urdf")
     printed = check("--format", style)
     done = check("--format", style, "-o", "found.txt")
@@ -558,7 +560,7 @@ def test_standard_input_and_a_robot_of_the_catalogue_are_not_fixed(here: Path) -
     assert check("--fix", "ur5", "--select", "URDF601").code == 0
 
 
-def test_sarif_fixes_are_the_edits(here: Path) -> None:
+def test_sarif_contains_the_edits_of_fix(here: Path) -> None:
     put("arm.urdf")
     (result,) = check("--format", "sarif").data["runs"][0]["results"]
     (change,) = result["fixes"][0]["artifactChanges"]
@@ -573,7 +575,7 @@ def test_sarif_fixes_are_the_edits(here: Path) -> None:
 PAGE = (Path(__file__).parents[2] / "docs" / "check.md").read_text("utf-8")
 
 
-def test_what_is_on_the_page_is_what_one_sees_and_it_lists_the_codes_that_have_cures(here: Path) -> None:
+def test_the_page_shows_the_real_output_and_lists_the_fixable_codes(here: Path) -> None:
     put("arm.urdf")
     (shown,) = re.findall(r"```console\n\$ urdfkin check arm.urdf\n(.*?)```", PAGE, re.DOTALL)
     assert check("arm.urdf").text == shown

@@ -42,7 +42,7 @@ def offered(monkeypatch: pytest.MonkeyPatch) -> Offered:
     return ask
 
 
-def test_commands_options_choices_codes_equations_and_tables_are_offered(offered: Offered) -> None:
+def test_commands_options_choices_codes_equations_and_tables_are_completed(offered: Offered) -> None:
     assert offered("") == list(commands())
     assert offered("jaco") == ["jacobian", "jacobian-rate"]
     assert offered("jacobian panda --refe") == ["--reference"]
@@ -57,7 +57,7 @@ def test_commands_options_choices_codes_equations_and_tables_are_offered(offered
 
 
 @pytest.mark.parametrize("line", ["info ", "validate ur5 ", "diff ur5 ", "same ur5 ", "export ", "dh "])
-def test_robots_are_files_and_the_catalogues_names(offered: Offered, line: str) -> None:
+def test_a_robot_is_completed_by_files_and_names_of_the_catalogue(offered: Offered, line: str) -> None:
     assert offered(line) == ["file", *catalogue()]
     assert offered(f"{line}pand") == ["file", "panda", "panda_collision"]
 
@@ -65,7 +65,9 @@ def test_robots_are_files_and_the_catalogues_names(offered: Offered, line: str) 
 @pytest.mark.parametrize(
     "words", ["jacobian {} --frame", "placement {} --relative-to", "dh {} --tip", "chain {} --base"]
 )
-def test_frames_are_those_of_the_robot_on_the_line(offered: Offered, words: str, tmp_path: Path) -> None:
+def test_frames_are_completed_from_the_robot_on_the_command_line(
+    offered: Offered, words: str, tmp_path: Path
+) -> None:
     own = tmp_path / "own.urdf"
     own.write_text(library.load("planar_two_link", verify=False).urdf)
     for source in ("panda", str(own)):
@@ -74,7 +76,9 @@ def test_frames_are_those_of_the_robot_on_the_line(offered: Offered, words: str,
     assert offered(f"{words.format('panda')} panda_lef") == ["panda_leftfinger"]
 
 
-def test_frames_of_an_mjcf_file_are_its_bodies_sites_and_joints(offered: Offered, tmp_path: Path) -> None:
+def test_frames_of_an_mjcf_file_are_completed_by_bodies_sites_and_joints(
+    offered: Offered, tmp_path: Path
+) -> None:
     path = tmp_path / "arm.xml"
     path.write_text(
         '<mujoco><worldbody><body name="upper"><joint name="hinge"/><geom name="skin" size="1"/>'
@@ -83,7 +87,7 @@ def test_frames_of_an_mjcf_file_are_its_bodies_sites_and_joints(offered: Offered
     assert offered(f"jacobian {path} --frame ") == ["upper", "hinge", "lower", "grip"]
 
 
-def test_no_name_is_offered_that_a_shell_would_carry_out(offered: Offered, tmp_path: Path) -> None:
+def test_no_name_is_completed_that_a_shell_would_execute(offered: Offered, tmp_path: Path) -> None:
     path = tmp_path / "hostile.urdf"
     harmful = [
         *IN_XML.values(), "$(reboot)", "`reboot`", "a;reboot", "a b", "-o", "a'b", "*", "~x", "a\\b", "!x",
@@ -99,7 +103,7 @@ UNREADABLE = [
 
 
 @pytest.mark.parametrize("robot", UNREADABLE)
-def test_what_cannot_be_read_offers_nothing_and_says_nothing(
+def test_an_unreadable_robot_gives_no_frame_completions_and_no_delay(
     offered: Offered, robot: str, tmp_path: Path
 ) -> None:
     made = {name: tmp_path / name.lower() for name in ("BROKEN", "PIPE", "FOLDER")}
@@ -111,7 +115,7 @@ def test_what_cannot_be_read_offers_nothing_and_says_nothing(
     assert time.monotonic() - begin < 5.0  # the command does not wait for a pipe
 
 
-def test_completing_imports_nothing_heavy() -> None:
+def test_completion_imports_no_heavy_module() -> None:
     env = {"_URDFKIN_COMPLETE": "bash_complete", "COMP_CWORD": "4"}
     env["COMP_WORDS"] = "urdfkin jacobian talos --frame arm_left_1"
     done = python(
@@ -136,7 +140,7 @@ SHELLS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shell", SHELLS)
-def test_a_real_shell_completes_a_frame_and_runs_the_line(shell: str, tmp_path: Path) -> None:
+def test_a_real_shell_completes_a_frame_and_runs_the_command(shell: str, tmp_path: Path) -> None:
     if shutil.which(shell) is None:
         pytest.skip(f"{shell} is not installed")
     words, setup = SHELLS[shell]

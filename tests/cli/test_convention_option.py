@@ -23,7 +23,7 @@ def _text(values: np.ndarray) -> str:
 
 @pytest.mark.parametrize("name", ["mujoco", "drake", "isaaclab", "pinocchio"])
 @pytest.mark.parametrize("command", OF_FRAMES)
-def test_a_result_is_that_of_the_robot_in_the_convention(command: str, name: str) -> None:
+def test_a_result_equals_the_result_of_the_robot_in_the_convention(command: str, name: str) -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     other = robot.with_convention(name)
     row, rng = by_command()[command], np.random.default_rng(3)
@@ -39,7 +39,7 @@ def test_a_result_is_that_of_the_robot_in_the_convention(command: str, name: str
     assert done.data["rows"][0] == ("wx" if name == "drake" else "vx")
 
 
-def test_a_placement_reads_q_of_the_convention_and_wxyz_has_its_scalar_first() -> None:
+def test_a_placement_reads_q_in_the_convention_and_wxyz_has_the_scalar_first() -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     q = robot.sample(1, 3)[0]
     text = _text(robot.convention("mujoco").to(q))
@@ -53,7 +53,7 @@ def test_a_placement_reads_q_of_the_convention_and_wxyz_has_its_scalar_first() -
     assert w == [*x[:3], x[6], *x[3:6]]
 
 
-def test_the_table_names_the_convention_and_what_was_checked() -> None:
+def test_the_table_names_the_convention_and_states_the_checked_results() -> None:
     lines = run("velocity ur5 --convention drake --v random").text.splitlines()
     assert "convention drake" in lines[0]
     named = [line.split()[0] for line in lines if line.startswith(("linear", "angular"))]
@@ -63,7 +63,7 @@ def test_the_table_names_the_convention_and_what_was_checked() -> None:
     assert "before the conversion" not in run("velocity ur5 --v random").err
 
 
-def test_a_users_file_and_its_units_zeros_and_names_are_read(tmp_path: Path) -> None:
+def test_a_convention_file_defines_units_zeros_and_names(tmp_path: Path) -> None:
     file = tmp_path / "motors.toml"
     file.write_text('joints = ["elbow", "joint_1"]\nangle = "deg"\n[joint.joint_2]\nname = "elbow"\n')
     for q in ("90,0", "elbow=90, joint_1=0"):
@@ -94,9 +94,7 @@ FAULTY = {
 
 
 @pytest.mark.parametrize("text", FAULTY)
-def test_a_file_without_a_joint_or_with_two_columns_of_one_name_is_one_error(
-    text: str, tmp_path: Path
-) -> None:
+def test_a_faulty_convention_file_is_reported_in_one_line(text: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(text)
     for command in (("placement", "--convention"), ("order", "--to")):
@@ -106,7 +104,7 @@ def test_a_file_without_a_joint_or_with_two_columns_of_one_name_is_one_error(
         assert "mine" in err
 
 
-def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
+def test_a_batch_without_the_option_imports_no_module_of_conventions() -> None:
     done = python(
         "import sys\nfrom tests.cli.running import urdfkin\n"
         "done = urdfkin('velocity a1 --q random:100 --v random --format csv')\n"
@@ -121,7 +119,7 @@ def test_a_batch_without_the_option_runs_no_line_of_conventions() -> None:
 TOOLS = [name for name in BUILT_IN if name != "idyntree"]
 
 
-def test_a_row_is_a_joint_and_a_column_a_convention() -> None:
+def test_order_prints_a_row_for_each_joint_and_a_column_for_each_convention() -> None:
     lines = run("order a1 --root-joint floating --format csv").text.splitlines()
     table = [line.split(",") for line in lines]
     assert table[0] == ["joint", *TOOLS]
@@ -134,7 +132,7 @@ def test_a_row_is_a_joint_and_a_column_a_convention() -> None:
             assert robot.convention(name).rate_names[first].split(".")[0] == row[0]
 
 
-def test_tools_with_the_same_indices_share_a_column_and_json_has_the_librarys_numbers() -> None:
+def test_tools_with_equal_indices_have_one_column_and_json_has_the_librarys_numbers() -> None:
     text = run("order a1").text
     assert "urdfkin: also pinocchio, kdl, isaacgym" in text
     names = ["joint", "urdfkin", "urdf", "isaaclab", "isaaclab3", "alphabetical"]
@@ -151,7 +149,7 @@ def test_tools_with_the_same_indices_share_a_column_and_json_has_the_librarys_nu
 @pytest.mark.parametrize(
     ("start", "end"), list(itertools.product(("mujoco", "isaaclab", "drake", "pinocchio"), repeat=2))
 )
-def test_the_printed_code_converts(start: str, end: str) -> None:
+def test_the_printed_code_converts_q_and_v_between_conventions(start: str, end: str) -> None:
     text = run("order tiago --from", start, "--to", end, "--root-joint", "floating").text
     robot = urdfkin.load("tiago", root_joint="floating", verify=False)
     q, v = robot.sample(1)[0], np.random.default_rng(0).standard_normal(robot.nv)

@@ -15,7 +15,7 @@ def run(*words: str) -> Done:
     return urdfkin("dh", *words)
 
 
-def test_the_table_is_printed_with_its_check_in_the_forms_of_the_package() -> None:
+def test_dh_prints_the_table_with_the_check_and_has_every_format_of_the_package() -> None:
     text = good("dh", *UR5, "--snap", "1e-6", "--degrees", "--millimetres").text
     assert "ur5: base to tool0, standard Denavit-Hartenberg parameters" in text
     assert "2  shoulder_lift_joint     -425            0       0           q2" in text
@@ -31,7 +31,7 @@ def test_the_table_is_printed_with_its_check_in_the_forms_of_the_package() -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS)
-def test_every_form_is_written(form: str, tmp_path: Path) -> None:
+def test_dh_writes_a_table_in_every_format(form: str, tmp_path: Path) -> None:
     if form == "svg":
         pytest.importorskip("matplotlib")
     good("dh", *UR5, "--format", form, "--snap", "1e-6", "-o", str(tmp_path / "table"))
@@ -39,7 +39,7 @@ def test_every_form_is_written(form: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_written_table_is_taken_back_and_converted(tmp_path: Path) -> None:
+def test_a_written_table_can_be_read_compared_and_converted(tmp_path: Path) -> None:
     file = str(tmp_path / "arm.toml")
     run(*UR5, "--snap", "1e-6", "--format", "toml", "-o", file)
     text = good("dh", file, "--convention", "modified").text
@@ -49,7 +49,7 @@ def test_a_written_table_is_taken_back_and_converted(tmp_path: Path) -> None:
     assert run(file, "--format", "urdf").text.startswith('<robot name="ur5"')
 
 
-def test_a_table_for_each_leaf() -> None:
+def test_dh_all_prints_a_table_for_each_leaf() -> None:
     assert good("dh solo12 --all").text.count("standard Denavit-Hartenberg parameters") == 4
     documents = run("solo12", "--all", "--format", "json").data
     assert [one["tip_frame"] for one in documents] == ["FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"]
@@ -57,14 +57,14 @@ def test_a_table_for_each_leaf() -> None:
 
 
 @pytest.mark.parametrize("form", ["terminal", "markdown", "csv", "json"])
-def test_the_whole_tree_as_one_table(form: str) -> None:
+def test_dh_tree_prints_the_whole_tree_as_one_table(form: str) -> None:
     result = good("dh solo12 --tree --format", form)
     assert "eps*scale" in result.text + result.err
     assert "FL_HFE" in result.text
 
 
 @pytest.mark.slow
-def test_a_comparison_exits_with_its_verdict() -> None:
+def test_the_exit_code_of_a_comparison_is_the_verdict() -> None:
     assert "agrees exactly" in good("dh ur5 --compare ur5").text
     wrong = urdfkin("dh ur5 --compare ur3 --base base --tip tool0")
     assert (wrong.code, "DIFFERS" in wrong.text) == (1, True)

@@ -12,7 +12,7 @@ from tests.cli.running import good, urdfkin
 
 
 @pytest.mark.slow
-def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
+def test_an_exported_file_is_written_and_passes_the_check(tmp_path: Path) -> None:
     path = tmp_path / "elbow.py"
     words = "export planar_two_link --to numpy --quantity jacobian,velocity --quantity placement -o"
     done = urdfkin(words, str(path))
@@ -25,7 +25,7 @@ def test_a_file_is_written_and_checks_itself(tmp_path: Path) -> None:
     assert (wrong.code, "WRONG placement" in wrong.text) == (1, True)
 
 
-def test_standard_output_has_the_file_and_commands_nobody() -> None:
+def test_an_export_on_standard_output_contains_no_log_command() -> None:
     done = good("export planar_two_link --to c --name", "my arm")
     assert "void my_arm_jacobian_batch(size_t n" in done.text
     done = urdfkin("export - --to numpy --no-verify", stdin=urdf("x ##vso[task.setvariable]y ::error::"))
@@ -33,7 +33,7 @@ def test_standard_output_has_the_file_and_commands_nobody() -> None:
     assert "##vso[" not in done.text
 
 
-def test_what_was_not_verified_says_so_everywhere(tmp_path: Path) -> None:
+def test_an_unverified_export_is_marked_in_the_file_and_in_the_check(tmp_path: Path) -> None:
     path = tmp_path / "arm.py"
     assert urdfkin("export planar_two_link --no-verify --to numpy -o", str(path)).code == 3
     assert "UNVERIFIED" in path.read_text("utf-8").splitlines()[0]
@@ -60,7 +60,9 @@ CHANGES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
-def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: str, tmp_path: Path) -> None:
+def test_an_exported_file_with_a_changed_head_is_not_verified(
+    change: str, exported: str, tmp_path: Path
+) -> None:
     pattern, by = CHANGES[change]
     changed = re.sub(pattern, by, exported, count=1)
     assert changed != exported
@@ -75,7 +77,7 @@ def test_a_file_whose_head_was_changed_is_not_verified(change: str, exported: st
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-def test_line_ends_change_nothing_and_a_check_includes_nothing_that_lies_beside_the_file(
+def test_the_check_accepts_other_line_ends_and_includes_no_file_beside_the_export(
     exported: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "arm.py"
@@ -92,7 +94,9 @@ def test_line_ends_change_nothing_and_a_check_includes_nothing_that_lies_beside_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("beside", ["numpy.py", "math.py", "numpy/__init__.py", "sitecustomize.py"])
-def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: str, tmp_path: Path) -> None:
+def test_the_check_of_an_export_runs_no_file_beside_the_export(
+    beside: str, exported: str, tmp_path: Path
+) -> None:
     mark, planted = tmp_path / "mark", tmp_path / "arm" / beside
     planted.parent.mkdir(parents=True)
     planted.write_text(f"open({str(mark)!r}, 'w').close()")
@@ -103,7 +107,7 @@ def test_a_check_runs_nothing_that_lies_beside_the_file(beside: str, exported: s
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["x'); system('touch mark'); y=('.m", "2 x.m", "disp.m"])
-def test_octave_is_told_the_functions_name_and_never_the_files(
+def test_octave_receives_the_name_of_the_function_and_not_of_the_file(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # This program replaces Octave, and writes its arguments to a file.

@@ -51,7 +51,7 @@ def test_a_table_is_written_in_every_format(line: str) -> None:
 @pytest.mark.parametrize(
     "line", [line for line in TABLES if line.split()[0] in ("robots", "info", "chain", "diff")]
 )
-def test_csv_has_one_width_and_numbers_that_stay_numbers(line: str) -> None:
+def test_csv_rows_have_equal_length_and_negative_numbers_are_not_quoted(line: str) -> None:
     heads, *rows = csv.reader(io.StringIO(written(line, "csv")))
     assert rows
     assert {len(row) for row in rows} == {len(heads)}
@@ -70,7 +70,7 @@ def test_the_suffix_of_a_file_selects_the_format_of_a_table(suffix: str, begin: 
     assert "verified by Pinocchio" in text
 
 
-def test_the_check_is_part_of_json_or_is_printed_beside_the_data() -> None:
+def test_the_check_is_part_of_json_and_is_printed_on_stderr_for_csv() -> None:
     done = urdfkin("chain ur5 --format json")
     assert done.err == ""
     assert done.data["verified"] is True
@@ -111,7 +111,7 @@ def test_a_suffix_writes_the_bytes_of_its_format(suffix: str, tmp_path: Path) ->
     assert (tmp_path / f"J.{suffix}").read_bytes() == good(*WORDS, "--format", suffix.lower()).out
 
 
-def test_the_form_stands_where_the_ending_says_nothing_and_a_breakdown_goes_by_it_too(tmp_path: Path) -> None:
+def test_the_format_option_applies_to_an_unknown_suffix_and_a_suffix_to_a_breakdown(tmp_path: Path) -> None:
     assert urdfkin(*WORDS, "--format", "json", "-o", str(tmp_path / "J.dat")).code == 0
     assert len(json.loads((tmp_path / "J.dat").read_text())["result"]) == 2
     assert urdfkin(*WORDS, "-o", str(tmp_path / "J")).code == 0
@@ -122,7 +122,7 @@ def test_the_form_stands_where_the_ending_says_nothing_and_a_breakdown_goes_by_i
 
 
 @pytest.mark.slow
-def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
+def test_the_suffix_of_a_file_selects_the_format_of_a_dh_table(tmp_path: Path) -> None:
     starts = {"urdf": "<robot", "md": "**elbow: ", "tex": "\\begin{table}", "m": "% Kinematics of elbow"}
     for ending in ("toml", "json", "csv", "py", "c", *starts):
         good("dh elbow -o", str(tmp_path / f"t.{ending}"))
@@ -137,7 +137,7 @@ def test_a_table_goes_by_the_ending_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_validation_names_its_verdict_and_the_files_it_wrote(tmp_path: Path) -> None:
+def test_a_validation_states_the_verdict_and_the_written_files(tmp_path: Path) -> None:
     html, data = str(tmp_path / "r.html"), str(tmp_path / "r.json")
     done = urdfkin("validate elbow --samples 1 --html", html, "--json", data)
     *_, summary, wrote = done.text.splitlines()
@@ -146,7 +146,7 @@ def test_a_validation_names_its_verdict_and_the_files_it_wrote(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("style", ["terminal", "json"])
-def test_a_file_that_could_not_be_read_was_not_checked(style: str, tmp_path: Path) -> None:
+def test_an_unreadable_file_is_not_counted_as_checked(style: str, tmp_path: Path) -> None:
     done = urdfkin("check", ELBOW, str(tmp_path / "none.urdf"), "--format", style)
     assert done.code == 2
     if style == "json":
@@ -158,7 +158,7 @@ def test_a_file_that_could_not_be_read_was_not_checked(style: str, tmp_path: Pat
 # -- files are written completely or not at all ------------------------------------------------------
 
 
-def test_a_file_that_is_written_is_alone_in_its_folder_with_the_rights_it_had(tmp_path: Path) -> None:
+def test_writing_a_file_leaves_no_other_file_and_preserves_permissions(tmp_path: Path) -> None:
     place = tmp_path / "out.json"
     write_file(place, b"first")
     assert place.stat().st_mode & 0o777 == 0o666 & ~_umask()
@@ -173,7 +173,7 @@ def full(*_: Any) -> NoReturn:
 
 
 @pytest.mark.parametrize("where", ["chmod", "replace", "write"])
-def test_what_cannot_be_finished_leaves_the_file_as_it_was_and_nothing_beside_it(
+def test_an_incomplete_write_leaves_the_old_file_unchanged_and_no_other_file(
     where: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     original = tempfile.NamedTemporaryFile
@@ -195,7 +195,7 @@ def test_what_cannot_be_finished_leaves_the_file_as_it_was_and_nothing_beside_it
     assert path.read_bytes() == b"before"
 
 
-def test_a_file_is_written_through_a_link_and_asking_for_it_leaves_nothing(tmp_path: Path) -> None:
+def test_a_file_is_written_through_a_link_and_a_check_for_write_access_leaves_no_file(tmp_path: Path) -> None:
     check_writable(tmp_path / "out.json", None)
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(SourceError, match="cannot be written"):

@@ -37,7 +37,7 @@ def run_examples(command: str) -> None:
         assert done.out or done.err
 
 
-def test_the_help_page_has_every_command_the_version_pinocchios_and_the_families_that_exist() -> None:
+def test_the_help_lists_every_command_both_versions_and_the_existing_families() -> None:
     text = urdfkin("--help").text
     for name, (_, summary) in commands().items():
         assert f"  {name} " in text
@@ -53,7 +53,7 @@ def test_the_help_page_has_every_command_the_version_pinocchios_and_the_families
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", commands())
-def test_every_command_has_help_with_an_example_of_itself(command: str) -> None:
+def test_the_help_of_every_command_has_an_example(command: str) -> None:
     done = good(command, "--help")
     assert done.text.startswith(f"Usage: urdfkin {command} ")
     assert examples(command)
@@ -83,9 +83,7 @@ def test_the_examples_of_the_help_run(command: str, tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.slow
-def test_the_examples_of_validation_run_one_after_the_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_examples_of_validation_run_in_sequence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my.urdf").write_text(urdf_of("tree_1"))
     for name in ("results", "main", "branch"):
@@ -95,7 +93,7 @@ def test_the_examples_of_validation_run_one_after_the_other(
         run_examples(command)
 
 
-def test_help_imports_nothing_heavy_of_any_command() -> None:
+def test_the_help_of_every_command_imports_no_heavy_module() -> None:
     for words in ("import urdfkin", "import urdfkin.cli", "from urdfkin.cli import cli; cli.get_help"):
         code = f"import sys; {words}; print(sorted({HEAVY!r} & set(sys.modules)))"
         assert python(code).stdout == "[]\n"
@@ -103,7 +101,7 @@ def test_help_imports_nothing_heavy_of_any_command() -> None:
 
 
 @pytest.mark.slow
-def test_help_is_there_at_once() -> None:
+def test_help_needs_less_than_600_milliseconds() -> None:
     def processor_seconds() -> float:
         begin = os.times()
         assert process("--help").code == 0
@@ -113,7 +111,7 @@ def test_help_is_there_at_once() -> None:
     assert min(processor_seconds() for _ in range(3)) < 0.6  # measured: 0.06 s
 
 
-def test_words_for_commands_lead_to_commands_and_these_have_the_librarys_names() -> None:
+def test_synonyms_lead_to_commands_and_commands_have_the_names_of_the_library() -> None:
     assert set(_SYNONYMS) & set(commands()) == set()
     assert set(_ABSENT) & (set(commands()) | set(_SYNONYMS)) == set()
     for meant in _SYNONYMS.values():
@@ -125,7 +123,7 @@ def test_words_for_commands_lead_to_commands_and_these_have_the_librarys_names()
     ] == []
 
 
-def test_an_equations_number_gives_its_page_and_no_other_number_does() -> None:
+def test_explain_prints_the_page_of_an_equation_and_refuses_other_numbers() -> None:
     page = good("explain 7.130").text
     for part in ("Equation 7.130", "w-dot_0i x d_{i-1,i}", "Robot.acceleration", "Pinocchio", "tests/text/"):
         assert part in page

@@ -42,7 +42,7 @@ def test_a_csv_file_and_an_archive_of_the_same_motion_give_the_librarys_numbers(
         assert "proper acceleration [m/s^2]" in text
 
 
-def test_a_base_in_the_archive_moves_the_robot_and_rates_are_made_where_there_are_none(
+def test_a_base_in_the_archive_is_used_and_missing_derivatives_are_computed(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
     base, path = moving_base(4, 3), tmp_path / "log.npz"
@@ -89,12 +89,12 @@ def test_a_wrong_archive_is_refused_in_one_line(
     assert err.count("\n") == 1
 
 
-def test_half_a_vector_is_refused_and_an_unverified_imu_exits_with_3() -> None:
+def test_an_incomplete_gravity_vector_is_refused_and_an_unverified_imu_exits_with_3() -> None:
     assert "none for z" in urdfkin("imu ur5 --gravity 0,9.81").err
     assert urdfkin("imu ur5 --no-verify").code == 3
 
 
-def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -> None:
+def test_singular_values_print_the_librarys_numbers_in_every_format(tmp_path: Path) -> None:
     robot = library.load("panda")
     words = ["singular-values", "panda", "--frame", "panda_hand", "--rows", "linear", "--q", "random:3"]
     q = robot.sample(3, 0)
@@ -117,7 +117,7 @@ def test_manipulability_has_the_librarys_numbers_in_every_form(tmp_path: Path) -
     assert "sample 2" in text
 
 
-def test_what_is_no_number_is_null_in_json() -> None:
+def test_infinite_and_undefined_numbers_are_null_in_json() -> None:
     words = ["singular-values", "planar_two_link", "--rows", "linear", "--q", "0.3,0", "--format", "json"]
     document = urdfkin(*words).data
     assert document["condition"]["upper"] == [None]
@@ -126,7 +126,7 @@ def test_what_is_no_number_is_null_in_json() -> None:
     assert document["verified"]
 
 
-def test_a_singularity_is_explained_in_place_of_a_gradient() -> None:
+def test_a_singularity_is_explained_instead_of_a_gradient() -> None:
     text = urdfkin("singular-values ur5 --frame tool0 --q neutral").text
     assert "Singular within rounding: rank 5 of 6" in text
     assert "Lost direction: rotation of tool0 about (1, 0, 0), in world axes." in text

@@ -41,13 +41,13 @@ def parents_of_the_drawing(lines: list[str]) -> list[int]:
 
 
 @pytest.mark.parametrize("name", ["forked", "panda", "talos"])
-def test_the_guides_say_whom_each_link_hangs_from(name: str) -> None:
+def test_the_tree_drawing_shows_the_parent_of_each_link(name: str) -> None:
     tree = forked() if name == "forked" else library.load(name, verify=False).tree
     drawn = [guide + "x" for guide in guides(tree)]
     assert parents_of_the_drawing(drawn) == [-1, *(one.parent for one in tree.joints)]
 
 
-def test_another_order_is_told_with_the_first_joint_and_guides_of_only_children_do_not_move() -> None:
+def test_info_reports_the_first_joint_with_a_different_order_in_the_file() -> None:
     rows = [(joint(f"j{k}"), f"l{k}", f"l{k + 1}") for k in range(300)]
     assert set(guides(build_tree("long", "l0", rows))) == {""}
     urdf = to_urdf(forked())
@@ -58,7 +58,7 @@ def test_another_order_is_told_with_the_first_joint_and_guides_of_only_children_
     assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("the same order")
 
 
-def test_a_follower_names_its_leader_and_an_axis_its_letter() -> None:
+def test_info_names_the_mimicked_joint_and_the_letter_of_a_main_axis() -> None:
     rows = [
         (joint("lead", axis=np.array([0.0, -1.0, 0.0])), "root", "A"),
         (joint("same", mimic=Mimic("lead", 1.0, 0.0)), "A", "B"),
@@ -76,7 +76,7 @@ def test_a_follower_names_its_leader_and_an_axis_its_letter() -> None:
     assert cells["D"] == ["held", "fixed"]
 
 
-def test_a_joint_of_several_numbers_shows_where_all_are_and_the_last_links_are_tips() -> None:
+def test_info_prints_index_ranges_of_joints_with_several_numbers_and_all_tips() -> None:
     text = urdfkin("info", to_urdf(forked()), "--root-joint", "floating").text
     (line,) = [line for line in text.splitlines() if "root_joint" in line]
     assert line.split()[1:5] == ["root_joint", "floating", "q[0:7]", "v[0:6]"]
@@ -84,13 +84,13 @@ def test_a_joint_of_several_numbers_shows_where_all_are_and_the_last_links_are_t
 
 
 @pytest.mark.parametrize("name", ["panda", "a1"])
-def test_print_shows_a_robot_as_info_does(name: str) -> None:
+def test_printing_a_robot_gives_the_output_of_info(name: str) -> None:
     shown = [line.split() for line in str(library.load(name, verify=False)).splitlines()]
     told = [line.split() for line in urdfkin("info", name).text.splitlines()]
     assert [line for line in told if "─" not in line[0]] == [line for line in shown if "--" not in line[0]]
 
 
-def test_a_tree_keeps_its_lines_in_every_form() -> None:
+def test_the_tree_drawing_is_preserved_in_every_format() -> None:
     robot = library.load(to_urdf(forked()), verify=False)
     assert "\n│ ├ D " in str(robot)
     assert "\n│   F " in str(robot)

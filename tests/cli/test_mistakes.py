@@ -153,7 +153,7 @@ MISTAKES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_gives_one_clear_message_and_exit_2(
+def test_each_mistake_of_the_user_gives_one_message_and_exit_code_2(
     mistake: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -166,7 +166,7 @@ def test_a_mistake_gives_one_clear_message_and_exit_2(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_report_that_must_not_be_written_is_refused_before_the_work(
+def test_a_report_without_write_permission_is_refused_before_any_computation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Tests may run as the superuser, who may write every file, so the system's error is simulated.
@@ -180,9 +180,7 @@ def test_a_report_that_must_not_be_written_is_refused_before_the_work(
         assert err.count("\n") == 1
 
 
-def test_a_report_that_is_read_only_is_not_renamed_over(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_read_only_output_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "J.csv"
     path.write_text("mine")
     monkeypatch.setattr(os, "access", lambda _, mode: mode != os.W_OK)
@@ -191,7 +189,7 @@ def test_a_report_that_is_read_only_is_not_renamed_over(
 
 
 @pytest.mark.slow
-def test_a_reader_that_goes_away_is_no_error() -> None:
+def test_a_reader_that_closes_the_pipe_causes_no_traceback() -> None:
     words = [sys.executable, "-m", "urdfkin", "velocity", "ur5", "--q", "random:5000", "--format", "csv"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
         assert running.stdout is not None
@@ -202,7 +200,7 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 
 
 @pytest.mark.slow
-def test_a_robot_pinocchio_cannot_check_says_so_once_with_exit_3() -> None:
+def test_a_robot_that_pinocchio_cannot_check_is_reported_once_with_exit_code_3() -> None:
     snake = chain([""] * 316, origin='xyz="0.1 0 0"', name="snake")
     done = process("placement", "-", "--format", "json", stdin=snake.encode())
     assert done.code == 3
@@ -212,5 +210,5 @@ def test_a_robot_pinocchio_cannot_check_says_so_once_with_exit_3() -> None:
 
 
 @pytest.mark.parametrize("stdin", [b"", b"\xff\xfe\x00", b"<robot", urdf_of("single_link").encode()[:-3]])
-def test_standard_input_that_is_no_urdf_is_an_input_error(stdin: bytes) -> None:
+def test_standard_input_without_a_valid_urdf_is_an_input_error(stdin: bytes) -> None:
     assert "<stdin>" in refused("placement -", stdin=stdin)

@@ -26,7 +26,9 @@ MOVED = "0,0,1,0,0,0.5235987755982988"
 @pytest.mark.slow
 @pytest.mark.parametrize("written", ["rpy", "quaternion"])
 @pytest.mark.parametrize("relative_to", [None, "forearm_link"])
-def test_few_numbers_are_the_same_pose(written: str, relative_to: str | None) -> None:
+def test_rpy_and_quaternion_output_give_the_same_pose_as_the_matrix(
+    written: str, relative_to: str | None
+) -> None:
     words = [] if relative_to is None else ["--relative-to", relative_to]
     ask = ["placement", "ur5", "--q", "random:3", *words, "--format", "json"]
     T = np.array(urdfkin(*ask).data["result"])
@@ -42,7 +44,7 @@ def test_few_numbers_are_the_same_pose(written: str, relative_to: str | None) ->
     np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:], found)
 
 
-def test_the_table_says_from_where_in_which_units_and_a_base_does_nothing_to_a_relative_placement() -> None:
+def test_the_table_states_origin_and_units_and_a_base_with_relative_to_is_refused() -> None:
     text = urdfkin("placement ur5 --relative-to forearm_link").text
     assert "ur5: placement of tool0, relative to forearm_link" in text
     assert "axis of forearm_link" in text
@@ -52,7 +54,7 @@ def test_the_table_says_from_where_in_which_units_and_a_base_does_nothing_to_a_r
     assert "--base-placement does nothing with --relative-to" in err
 
 
-def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_conversion_to_rpy_is_a_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
     right = rotation.rpy_of
     monkeypatch.setattr(rotation, "rpy_of", lambda R: right(R)[..., ::-1])
     done = urdfkin("placement ur5 --q random --as rpy")
@@ -63,7 +65,7 @@ def test_numbers_of_another_rotation_are_a_disagreement(monkeypatch: pytest.Monk
     assert urdfkin(again).code == 0
 
 
-def test_where_roll_and_yaw_turn_about_one_axis_the_numbers_are_right_all_the_same() -> None:
+def test_rpy_output_is_correct_in_gimbal_lock() -> None:
     angles = [0.3, 1.5707963267948966, 0.2]
     pose = ",".join(map(repr, [0, 0, 0, *angles]))
     done = good(f"placement ur5 --base-placement {pose} --frame base_link --as rpy --format json")
@@ -75,7 +77,7 @@ def test_where_roll_and_yaw_turn_about_one_axis_the_numbers_are_right_all_the_sa
 
 
 @pytest.mark.parametrize("representation", ["ZYZ", "xyz", "quaternion"])
-def test_the_analytical_jacobian_is_the_librarys_with_its_rows_named(representation: str) -> None:
+def test_the_analytical_jacobian_equals_the_librarys_and_has_named_rows(representation: str) -> None:
     words = ["analytical-jacobian", "ur5", "--q", "random:2", "--representation", representation]
     done = urdfkin(*words, "--format", "json")
     assert (done.code, done.data["representation"]) == (0, representation)
@@ -86,7 +88,7 @@ def test_the_analytical_jacobian_is_the_librarys_with_its_rows_named(representat
     assert done.data["rows"][3] in urdfkin(*words).text
 
 
-def test_forms_are_told_apart_every_sequence_is_known_and_a_singularity_is_told_with_the_cure() -> None:
+def test_all_representations_are_known_and_a_singularity_is_reported_with_a_remedy() -> None:
     assert set(REPRESENTATIONS) == {"rpy", "quaternion", *SEQUENCES}
     err = refused("analytical-jacobian planar_two_link --q 0.3,0.4")
     assert "representational singularity" in err
@@ -115,7 +117,7 @@ TAKES: dict[str, list[str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", TAKES)
-def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) -> None:
+def test_every_command_accepts_the_necessary_parts_of_the_base_motion(command: str) -> None:
     turns = ["--representation", "xyz"] if command.startswith("analytical") else []
     rates = ["--v", "random", "--a", "random"][: len(TAKES[command])]
     words = [command, "ur5", "--q", "random", *rates, *turns, "--format", "json"]
@@ -128,12 +130,12 @@ def test_every_quantity_takes_what_it_needs_of_the_bases_motion(command: str) ->
     assert np.abs(np.array(urdfkin(*words).data["result"]) - data["result"]).max() > 1e-3
 
 
-def test_an_explained_acceleration_has_the_bases_part() -> None:
+def test_an_acceleration_breakdown_contains_the_part_of_the_base() -> None:
     done = good("acceleration ur5 --breakdown --base-acceleration 0,0,9.81,0,0,0")
     assert [line.split()[-4] for line in done.text.splitlines() if line.startswith("base ")] == ["9.81"]
 
 
-def test_a_batch_of_bases_goes_with_one_configuration_and_with_as_many(tmp_path: Path) -> None:
+def test_a_batch_of_bases_is_combined_with_one_or_as_many_configurations(tmp_path: Path) -> None:
     rows = np.random.default_rng(1).standard_normal((4, 7))
     rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
     path = tmp_path / "base.csv"
@@ -169,7 +171,7 @@ def test_the_parts_of_the_polar_robots_acceleration_are_shown_with_their_sum() -
 
 
 @pytest.mark.slow
-def test_as_data_the_parts_sum_to_the_acceleration() -> None:
+def test_the_parts_of_an_acceleration_in_json_and_csv_sum_to_the_acceleration() -> None:
     data = good("acceleration", *POLAR, "--breakdown", "--format", "json").data
     terms = np.array(data["terms"])
     assert terms.shape == (1, 2, 4, 6)
@@ -185,7 +187,7 @@ def test_as_data_the_parts_sum_to_the_acceleration() -> None:
 
 
 @pytest.mark.slow
-def test_the_rate_of_the_jacobian_has_a_command() -> None:
+def test_the_command_jacobian_rate_gives_the_librarys_result() -> None:
     data = good("jacobian-rate", *POLAR[:5], "--format", "json").data
     assert np.array_equal(
         data["result"][0], library.load("polar").jacobian_rate([0.3, 0.7], [1.0, 2.0], "slider")

@@ -18,7 +18,7 @@ STANDING = CampaignProgress(
 
 
 @pytest.mark.parametrize("compiling", [0.0, 90.0])
-def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow(compiling: float) -> None:
+def test_stored_chunks_and_compilation_do_not_change_the_reported_speed(compiling: float) -> None:
     now = [100.0]
     pace = Pace(lambda: now[0])
     now[0] += compiling
@@ -32,7 +32,7 @@ def test_what_was_kept_or_compiled_before_makes_nobody_fast_or_slow(compiling: f
     assert "3 failed" in line(replace(STANDING, failures=3), pace)
 
 
-def test_programs_are_told_in_json_from_before_any_work_to_the_last_chunk() -> None:
+def test_json_progress_is_printed_from_the_start_to_the_last_chunk() -> None:
     def states(robots: str) -> list[dict[str, Any]]:
         err = urdfkin(f"validate {robots} --samples 50 --json-progress").err
         return [json.loads(text) for text in err.splitlines() if text.startswith("{")]
@@ -46,7 +46,9 @@ def test_programs_are_told_in_json_from_before_any_work_to_the_last_chunk() -> N
     assert first["chunks_per_second"] is None
 
 
-def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_gets_progress_lines_at_intervals_and_none_for_a_short_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert "chunks" not in urdfkin("validate planar_two_link --samples 50").err
     monkeypatch.setattr(campaign, "_LINES", 0.0)
     done = urdfkin("validate planar_two_link --samples 50")
@@ -55,7 +57,7 @@ def test_a_log_gets_a_line_now_and_then_and_a_short_run_none(monkeypatch: pytest
 
 
 @pytest.mark.slow
-def test_a_shard_says_what_it_came_to_and_what_comes_next(tmp_path: Path) -> None:
+def test_a_shard_reports_the_result_and_the_next_command(tmp_path: Path) -> None:
     where = str(tmp_path / "s")
     words = ("validate", "planar_two_link", "double_pendulum", "--samples", "0", "--store", where)
     done = good(*words, "--shard", "2/2")

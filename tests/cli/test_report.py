@@ -33,7 +33,7 @@ def bad(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
+def test_validate_writes_every_format_in_one_run(tmp_path: Path) -> None:
     done = running.process(
         "validate", "ur5", "--samples", "2", "--json", "a.json", "--html", "a.html",
         "--junit", "a.xml", "--markdown", "a.md", cwd=tmp_path, PYTHONWARNINGS="error",
@@ -47,7 +47,7 @@ def test_validate_writes_every_form_at_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path) -> None:
+def test_the_accuracy_study_reports_a_moving_base_only_if_requested(tmp_path: Path) -> None:
     data, page = tmp_path / "a.json", tmp_path / "a.html"
     words = "validate", "polar", "--samples", "1", "--accuracy", "--accuracy-samples", "1", "--json", data
     still = urdfkin(*words)
@@ -63,7 +63,7 @@ def test_the_judge_says_that_the_base_moved_where_it_was_told_to(tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> None:
+def test_a_report_rendered_later_equals_the_report_of_validate(tmp_path: Path) -> None:
     data, made = tmp_path / "a.json", []
     for words in (("validate", "planar_two_link", "--samples", "3", "--json", data), ("report", data)):
         files = {form: tmp_path / f"{words[0]}.{form}" for form in ("html", "junit", "markdown")}
@@ -73,7 +73,7 @@ def test_a_report_rendered_later_is_the_one_rendered_at_once(tmp_path: Path) -> 
     assert made[0] == made[1]
 
 
-def test_report_prints_where_no_form_is_asked_for_exits_as_the_run_did_and_hands_out_the_schema(
+def test_report_prints_by_default_with_the_exit_code_of_the_run_and_prints_the_schema(
     good: Path, bad: Path
 ) -> None:
     done = urdfkin("report", good)
@@ -87,7 +87,9 @@ def test_report_prints_where_no_form_is_asked_for_exits_as_the_run_did_and_hands
 
 
 @pytest.mark.slow
-def test_compare_exits_1_on_a_regression_and_0_the_other_way(good: Path, bad: Path, tmp_path: Path) -> None:
+def test_compare_exits_with_1_for_a_regression_or_a_missing_robot(
+    good: Path, bad: Path, tmp_path: Path
+) -> None:
     done = urdfkin("report", "compare", good, bad, "--markdown", tmp_path / "c.md")
     assert done.code == 1
     assert "REGRESSION panda: verdict: verified -> disagrees" in done.text
@@ -116,7 +118,7 @@ def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     assert words.endswith("no regression, 1 change (exit 0: changes without a regression)")
 
 
-def test_an_unwritable_report_spoils_no_file_that_is_there(tmp_path: Path) -> None:
+def test_an_unwritable_report_leaves_existing_files_unchanged(tmp_path: Path) -> None:
     there = tmp_path / "a.json"
     there.write_text("old")
     done = urdfkin("validate", "ur5", "--samples", "0", "--json", there, "--html", "/nowhere/a.html")
@@ -125,7 +127,7 @@ def test_an_unwritable_report_spoils_no_file_that_is_there(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_plot_says_what_was_checked(tmp_path: Path) -> None:
+def test_plot_reports_the_number_of_checked_samples(tmp_path: Path) -> None:
     done = urdfkin(
         "plot", "ur5", "--to", "random", "--samples", "11", "--panel", "position", "-o", tmp_path / "a.png"
     )

@@ -68,7 +68,7 @@ def commands_with(*names: str) -> dict[str, set[str]]:
     return found
 
 
-def test_every_command_that_takes_joint_values_has_a_convention_and_of_a_batch_a_trajectory() -> None:
+def test_every_command_with_joint_values_has_a_convention_and_with_a_batch_a_trajectory() -> None:
     found = commands_with("q", "trajectory", "poses")
     assert {*COMMANDS, "placement", "chain", "plot", "view", "calibrate"} <= found.keys()
     assert [name for name, given in found.items() if "convention" not in given] == []
@@ -77,7 +77,7 @@ def test_every_command_that_takes_joint_values_has_a_convention_and_of_a_batch_a
 
 
 @pytest.mark.parametrize("command", ["placement", *COMMANDS])
-def test_each_row_has_the_bits_of_the_single_command(
+def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
     command: str, motion: dict[str, FloatArray], log: Path
 ) -> None:
     inputs, *options = COMMANDS.get(command, ["q"])
@@ -114,7 +114,7 @@ def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArra
         assert head[1:3] == ["vx panda_joint1", "vx panda_joint2"]
 
 
-def test_every_sample_is_checked_and_a_breakdown_has_the_times_too(
+def test_every_sample_is_checked_and_a_breakdown_contains_the_times(
     log: Path, motion: dict[str, FloatArray]
 ) -> None:
     line = run("velocity panda --frame panda_hand --trajectory", str(log)).text.splitlines()[-1]
@@ -126,7 +126,7 @@ def test_every_sample_is_checked_and_a_breakdown_has_the_times_too(
     assert float(first[0]) == motion["t"][0]
 
 
-def test_units_in_a_heading_are_those_of_the_texts_also_in_a_batch_of_q(tmp_path: Path) -> None:
+def test_units_in_column_headings_are_applied_in_trajectories_and_batches(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(
         "time [ms],joint_1 [deg],joint_2_deg,v:joint_1_deg_s,v:joint_2 [deg/s]\n250,30,-7.7,90,1e1\n"
@@ -142,7 +142,7 @@ def test_units_in_a_heading_are_those_of_the_texts_also_in_a_batch_of_q(tmp_path
 
 
 @pytest.mark.parametrize("name", ["mujoco", "drake", "isaaclab"])
-def test_a_file_in_a_convention_gives_the_results_of_the_robot_in_it(name: str, tmp_path: Path) -> None:
+def test_a_file_in_a_convention_gives_the_results_of_the_converted_robot(name: str, tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     other, rng = robot.with_convention(name), np.random.default_rng(1)
     values = other.conversion.to(robot.sample(4, 3), *rng.standard_normal((2, 4, robot.nv)))
@@ -176,7 +176,7 @@ def test_singular_values_do_not_depend_on_the_convention_and_the_gradient_follow
     assert "convention mujoco" in run(*words[:-2], text, "--convention", "mujoco").text.splitlines()[0]
 
 
-def test_a_placement_needs_no_time_and_keeps_the_angles_of_the_file(tmp_path: Path) -> None:
+def test_a_placement_needs_no_time_and_does_not_unwrap_angles(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("wheel\n3.1\n")
     (tmp_path / "w.urdf").write_text(robot_of(joint("wheel", "continuous", "a", "b"), name="w"))
@@ -191,7 +191,7 @@ def test_a_placement_needs_no_time_and_keeps_the_angles_of_the_file(tmp_path: Pa
     assert "angle jumps by a whole turn" in done.err
 
 
-def test_velocities_of_the_file_are_used_and_what_is_computed_is_said(
+def test_velocities_of_the_file_are_used_and_computed_derivatives_are_stated(
     motion: dict[str, FloatArray], tmp_path: Path
 ) -> None:
     path = write(tmp_path / "log.csv", urdfkin.load("panda"), {x: motion[x] for x in "tqv"})
@@ -207,7 +207,7 @@ def test_velocities_of_the_file_are_used_and_what_is_computed_is_said(
     np.testing.assert_array_equal(exact["a"], np.gradient(motion["v"], motion["t"], axis=0, edge_order=2))
 
 
-def test_a_base_of_the_options_or_of_the_file_moves_the_robot(
+def test_a_base_in_the_options_or_in_the_file_moves_the_robot(
     motion: dict[str, FloatArray], log: Path, tmp_path: Path
 ) -> None:
     words = "placement panda --frame panda_hand --format json --trajectory"
@@ -228,7 +228,7 @@ def test_a_base_of_the_options_or_of_the_file_moves_the_robot(
 
 
 @pytest.mark.parametrize("option", ["--q=ready", "--seed=1", "--v=random"])
-def test_a_value_beside_a_trajectory_is_refused(option: str, log: Path) -> None:
+def test_a_joint_value_together_with_a_trajectory_is_refused(option: str, log: Path) -> None:
     err = refused("velocity panda --trajectory", str(log), option)
     assert f"{option.partition('=')[0]} does nothing along a --trajectory" in err
 
@@ -248,7 +248,7 @@ SPOILT = {
 
 
 @pytest.mark.parametrize("what", SPOILT)
-def test_what_is_wrong_with_a_file_is_one_line(what: str, log: Path) -> None:
+def test_a_wrong_trajectory_file_is_reported_in_one_line(what: str, log: Path) -> None:
     right, wrong, message = SPOILT[what]
     log.write_text(re.sub(right, wrong, log.read_text(), count=1))
     err = refused("placement panda --trajectory", str(log))
@@ -257,14 +257,14 @@ def test_what_is_wrong_with_a_file_is_one_line(what: str, log: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["placement", "singular-values", "chain", "imu", "view --q ready"])
-def test_an_unknown_convention_points_to_the_list_of_all(command: str) -> None:
+def test_the_error_for_an_unknown_convention_names_the_command_that_lists_all(command: str) -> None:
     err = refused(f"{command} panda --convention mujocco")
     assert err.count("\n") == 1
     assert "unknown convention 'mujocco'; did you mean mujoco" in err
     assert "`urdfkin order ROBOT` lists all" in err
 
 
-def test_a_chain_reads_q_in_a_convention_and_says_so() -> None:
+def test_a_chain_reads_q_in_a_convention_and_names_the_convention() -> None:
     robot = urdfkin.load("a1", verify=False)
     q, mujoco = robot.sample(1, 2)[0], robot.convention("mujoco")
     words = ("chain", "a1", "--base", "trunk", "--tip", "FL_foot")
@@ -276,7 +276,7 @@ def test_a_chain_reads_q_in_a_convention_and_says_so() -> None:
     assert "convention mujoco" in run(*words, "--convention", "mujoco", "--q", text).text.splitlines()[0]
 
 
-def test_measured_poses_in_a_convention_and_in_degrees_are_those_in_radians(tmp_path: Path) -> None:
+def test_measured_poses_in_a_convention_or_in_degrees_give_the_results_of_radians(tmp_path: Path) -> None:
     robot = urdfkin.load("planar_two_link")
     q = robot.sample(12, 1)
     p = robot.placement(q, "tip")[:, :3, 3] + [0.01, 0.0, 0.0]

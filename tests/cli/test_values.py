@@ -44,7 +44,7 @@ def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 3])
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_json_csv_and_npy_give_the_librarys_numbers_to_the_last_digit(quantity: str, n: int) -> None:
+def test_json_csv_and_npy_give_exactly_the_librarys_numbers(quantity: str, n: int) -> None:
     result = expected(quantity, n, "local")
     assert np.array_equal(np.array(json.loads(command(quantity, n, "local", "json"))["result"]), result)
     assert np.array_equal(np.load(io.BytesIO(command(quantity, n, "local", "npy"))), result)
@@ -62,7 +62,7 @@ def _is_number(cell: str) -> bool:
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_the_table_says_what_was_computed_checked_and_how_closely(
+def test_the_table_states_the_computed_result_and_the_closeness_of_the_check(
     quantity: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
@@ -95,7 +95,7 @@ def test_a_table_folds_no_name_and_is_no_wider_than_the_terminal(
 @pytest.mark.slow
 @pytest.mark.parametrize("columns", [60, 80, 110, 200])
 @pytest.mark.parametrize("name", ["panda", "tiago_dual"])
-def test_info_folds_no_name_and_puts_each_joints_numbers_in_its_line_or_the_next(
+def test_info_folds_no_name_and_prints_the_indices_of_a_joint_beside_or_below_the_name(
     name: str, columns: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
@@ -115,7 +115,7 @@ def test_info_folds_no_name_and_puts_each_joints_numbers_in_its_line_or_the_next
 
 
 @pytest.mark.slow
-def test_a_terminal_that_knows_no_lines_gets_dashes() -> None:
+def test_a_terminal_without_unicode_lines_gets_dashes() -> None:
     done = process("info", "panda", COLUMNS="80", PYTHONIOENCODING="ascii")
     assert (done.code, done.err) == (0, "")
     assert "\n" + "-" * 80 + "\n" in done.text
@@ -134,7 +134,7 @@ def test_the_catalogue_folds_no_name_and_is_no_wider_than_the_terminal(
         assert {entry.name, *entry.family.split(), *filter(None, (entry.base, entry.tip))} <= words
 
 
-def test_the_json_says_all_that_is_needed_to_use_it() -> None:
+def test_the_json_result_contains_robot_frame_names_inputs_and_check() -> None:
     robot = library.load("panda")
     data = urdfkin("acceleration panda --q random --v random --a random --format json").data
     assert (data["robot"], data["frame"]) == ("panda", "panda_hand_tcp")
@@ -147,7 +147,7 @@ def test_the_json_says_all_that_is_needed_to_use_it() -> None:
     assert np.array_equal(again, data["result"])
 
 
-def test_numbers_are_taken_as_they_are_written_by_name_in_degrees_or_with_blanks() -> None:
+def test_joint_values_are_read_as_a_list_by_name_in_degrees_or_with_blanks() -> None:
     data = urdfkin("placement panda --q", ",".join(map(repr, Q)), "--format", "json").data
     assert data["q"] == [list(Q)]
     assert np.array_equal(data["result"][0], library.load("panda").placement(Q, "panda_hand_tcp"))
@@ -178,7 +178,7 @@ def test_a_batch_comes_from_a_csv_file_with_or_without_a_header(layout: str, tmp
     assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(q, "panda_hand_tcp"))
 
 
-def test_a_batch_may_come_from_standard_input_as_a_robot_may() -> None:
+def test_a_batch_or_a_robot_is_read_from_standard_input() -> None:
     robot = library.load("ur5")
     rows = "\n".join(",".join(map(repr, row)) for row in robot.sample(3, 1).tolist())
     done = urdfkin("jacobian ur5 --q @- --format npy", stdin=rows)
@@ -188,7 +188,7 @@ def test_a_batch_may_come_from_standard_input_as_a_robot_may() -> None:
     assert np.array_equal(done.data["result"][0], robot.jacobian(np.zeros(6), "tool0"))
 
 
-def test_a_batch_goes_with_one_sample_a_seed_repeats_it_and_a_long_one_is_shown_in_part() -> None:
+def test_a_batch_is_combined_with_one_sample_reproducible_and_shown_in_part() -> None:
     done = urdfkin("velocity ur5 --q random:5 --v 1,0,0,0,0,0 --format json")
     assert np.shape(done.data["v"]) == (5, 6)
     assert "different lengths: found 5, 4" in refused("velocity ur5 --q random:5 --v random:4")
@@ -203,7 +203,7 @@ def test_a_batch_goes_with_one_sample_a_seed_repeats_it_and_a_long_one_is_shown_
     assert "4 more samples" in text
 
 
-def test_output_goes_to_a_file_or_to_a_device_and_the_check_to_stderr(tmp_path: Path) -> None:
+def test_output_is_written_to_a_file_or_a_device_and_the_check_to_stderr(tmp_path: Path) -> None:
     path = tmp_path / "J.npy"
     done = urdfkin("jacobian panda --format npy --output", str(path))
     assert (done.code, done.out) == (0, b"")
@@ -215,9 +215,7 @@ def test_output_goes_to_a_file_or_to_a_device_and_the_check_to_stderr(tmp_path: 
     assert urdfkin("jacobian panda --format csv -o -").text.startswith("sample,row,panda_joint1")
 
 
-def test_the_default_frame_is_the_catalogues_tip_limits_are_warned_of_and_mimic_joints_follow_as_asked() -> (
-    None
-):
+def test_the_default_frame_is_the_catalogues_tip_and_exceeded_limits_cause_warnings() -> None:
     assert "jacobian of panda_hand_tcp" in urdfkin("jacobian panda").text
     assert "jacobian of tool0" in urdfkin("jacobian ur5").text
     done = good("placement panda --q 0,0,0,-1,0,0,0,0.5 --format json")
@@ -241,13 +239,13 @@ def test_a_root_joint_adds_its_coordinates(root_joint: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["single_link", "fixed_only", "odd_names", "same_names", "mimic_hand_40"])
 @pytest.mark.parametrize("quantity", QUANTITIES)
-def test_odd_robots_pass_through_the_command(quantity: str, name: str) -> None:
+def test_unusual_robots_are_processed_in_every_format(quantity: str, name: str) -> None:
     words = [word for letter in QUANTITIES[quantity] for word in (f"--{letter}", "random:2")]
     for format_ in ("table", "json", "csv", "npy"):
         assert good(quantity, "-", *words, "--format", format_, stdin=urdf_of(name)).out
 
 
-def test_a_table_is_a_robot_to_every_command_and_without_verification_exit_3_says_so() -> None:
+def test_a_table_can_be_used_as_a_robot_and_no_verification_exits_with_3() -> None:
     done = urdfkin("jacobian panda --no-verify")
     assert (done.code, "NOT VERIFIED" in done.text) == (3, True)
     assert "the check was turned off by verify=False" in done.text
@@ -272,7 +270,7 @@ LONG = "a_joint_of_the_left_manipulator_whose_name_is_as_long_as_names_of_people
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("columns", ["80", ""])
-def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pipe(
+def test_in_a_pipe_no_name_is_folded_and_no_line_ends_in_blanks(
     words: str, columns: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
@@ -294,7 +292,7 @@ def test_names_are_never_folded_nothing_wraps_and_no_line_ends_in_blanks_in_a_pi
 # -- locked joints -----------------------------------------------------------------------------------
 
 
-def test_locked_joints_have_no_number_and_no_column_also_in_a_replay() -> None:
+def test_locked_joints_have_no_coordinate_and_no_column() -> None:
     done = urdfkin("jacobian panda --lock panda_finger_joint1=40mm --q ready --format json")
     robot = library.load("panda", lock={"panda_finger_joint1": 0.04})
     assert done.code == 0, done.err
@@ -332,7 +330,7 @@ RADIANS = [math.pi / 6, -0.785398, 0.0, -math.pi / 2, 0.0, 1.5, 0.785398, 0.001]
 
 
 @pytest.mark.slow
-def test_every_command_that_takes_q_reads_it_so(tmp_path: Path) -> None:
+def test_every_command_with_q_reads_named_values_and_units(tmp_path: Path) -> None:
     q = "shoulder_pan_joint=30deg, shoulder_lift_joint=-90deg, elbow_joint=90deg, wrist_1_joint=0,"
     q += "wrist_2_joint=pi/2 , wrist_3_joint=0"
     at = library.load("ur5").placement(q, "tool0")[:3, 3]

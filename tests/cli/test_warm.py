@@ -27,7 +27,7 @@ def kernels(cache: Path) -> list[str]:
         "jacobian elbow -o no/J.csv", "dh no.urdf", "validate BAD",
     ],
 )  # fmt: skip
-def test_bad_input_is_told_before_anything_is_compiled(words: str, tmp_path: Path) -> None:
+def test_wrong_input_is_reported_before_any_compilation(words: str, tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
     done = process(*words.replace("BAD", str(bad)).split(), XDG_CACHE_HOME=str(tmp_path / "cache"))
@@ -37,7 +37,7 @@ def test_bad_input_is_told_before_anything_is_compiled(words: str, tmp_path: Pat
 
 
 @pytest.mark.long
-def test_only_what_is_needed_is_compiled_and_it_is_said_once(tmp_path: Path) -> None:
+def test_only_needed_kernels_are_compiled_and_reported_once(tmp_path: Path) -> None:
     words = ("placement", "elbow", "--no-verify", "--q", "random:20000", "--format", "npy")
     first = process(*words, XDG_CACHE_HOME=str(tmp_path))
     assert kernels(tmp_path) == ["placements"]
@@ -47,7 +47,7 @@ def test_only_what_is_needed_is_compiled_and_it_is_said_once(tmp_path: Path) -> 
     assert "compil" not in process(*words, XDG_CACHE_HOME=str(tmp_path)).err
 
 
-def test_warm_compiles_everything_and_then_nothing_is_started_to_compile(
+def test_after_warm_no_process_is_started_to_compile(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert urdfkin("warm").code == 0
@@ -73,7 +73,7 @@ def test_warm_compiles_every_kernel_of_the_package(tmp_path: Path) -> None:
     assert {"hessians", "imus", "lengths"} <= every <= set(kernels(tmp_path))
 
 
-def test_programs_are_told_by_one_warning_of_a_logger(
+def test_compilation_is_logged_as_one_warning(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kernel_cache, "_logged", [])
@@ -88,7 +88,7 @@ def test_programs_are_told_by_one_warning_of_a_logger(
 
 
 @pytest.mark.slow
-def test_no_seconds_of_a_report_hold_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_in_a_report_excludes_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(campaign, "load_kernels", lambda: time.sleep(1.0))
     monkeypatch.setattr(campaign, "_kernels_pay", lambda samples: True)
     begin = time.perf_counter()

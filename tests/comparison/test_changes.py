@@ -34,7 +34,7 @@ NEW = (
 )
 
 
-def test_each_attribute_is_told_and_what_means_the_same_is_not() -> None:
+def test_each_changed_attribute_is_reported_and_equal_values_are_not() -> None:
     assert [str(change) for change in urdfkin.diff(OLD, NEW).changes] == [
         "joint shoulder: limit upper 2 -> 1.5", "joint elbow: origin x 0.4 -> 0.425", "joint flange: new",
         "link upper: inertial mass 2 -> 2.5", "link tool: new",
@@ -42,7 +42,7 @@ def test_each_attribute_is_told_and_what_means_the_same_is_not() -> None:
     assert not urdfkin.diff(OLD, OLD.replace("0.4 0 0", "4e-1 0.0 -0"))
 
 
-def test_a_joints_effect_is_its_own_and_the_total_is_of_all() -> None:
+def test_the_effect_of_each_joint_and_the_total_effect_are_reported() -> None:
     found = urdfkin.diff(OLD, NEW)
     [effect] = found.effects
     assert effect.element == "joint elbow"
@@ -53,7 +53,7 @@ def test_a_joints_effect_is_its_own_and_the_total_is_of_all() -> None:
     assert present(found.total).lower == pytest.approx(0.025, rel=1e-9)
 
 
-def test_two_changes_that_undo_each_other_move_less_together() -> None:
+def test_the_total_effect_of_two_opposite_changes_is_smaller() -> None:
     three = OLD.replace("</robot>", FIXED.format("wrist", "tip", 0.3))
     bent = three.replace('xyz="0.4 0 0"', 'xyz="0.4 0 0" rpy="0 0 0.5"')
     bent = bent.replace('xyz="0.3 0 0"', 'xyz="0.3 0 0" rpy="0 0 -0.5"')
@@ -63,13 +63,13 @@ def test_two_changes_that_undo_each_other_move_less_together() -> None:
     assert present(found.total).lower == pytest.approx(chord, rel=1e-6)
 
 
-def test_a_change_of_name_alone_is_told_and_moves_nothing() -> None:
+def test_a_change_of_the_name_is_reported_without_an_effect() -> None:
     found = urdfkin.diff(OLD, OLD.replace('name="arm"', 'name="leg"'))
     assert found.changes == (ModelChange("robot", "name", "arm", "leg"),)
     assert (found.effects, found.total) == ((), None)
 
 
-def test_the_command_says_it_in_every_form(tmp_path: Path) -> None:
+def test_diff_prints_changes_and_effects_in_every_format(tmp_path: Path) -> None:
     (tmp_path / "old.urdf").write_text(OLD)
     (tmp_path / "new.urdf").write_text(NEW)
     old, new, page = (str(tmp_path / name) for name in ("old.urdf", "new.urdf", "comment.md"))
@@ -93,7 +93,7 @@ MJCF = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_between_two_formats_each_difference_is_told_at_its_joint(tmp_path: Path) -> None:
+def test_differences_between_a_urdf_and_an_mjcf_file_are_reported_at_the_joint(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo reads MJCF")
     found = urdfkin.diff(OLD, MJCF)
     said = [str(change) for change in found.changes]
@@ -115,7 +115,7 @@ def test_between_two_formats_each_difference_is_told_at_its_joint(tmp_path: Path
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_between_two_formats_limits_are_compared_as_they_are_written() -> None:
+def test_limits_of_a_urdf_and_an_mjcf_file_are_compared_as_written() -> None:
     pytest.importorskip("mujoco", reason="MuJoCo reads MJCF")
     # The elbows have different zeros. `same` converts the limits; `diff` lists the limits of the files.
     turned = MJCF.replace('pos="0.425 0 0"', 'pos="0.4 0 0" euler="0 0 0.5"').replace("0 0.1 1", "0 0 1")
@@ -130,7 +130,7 @@ def test_between_two_formats_limits_are_compared_as_they_are_written() -> None:
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_strangers_names_stay_names_in_markdown() -> None:
+def test_untrusted_names_are_escaped_in_markdown() -> None:
     found = urdfkin.diff(OLD, OLD.replace('"lower"', '"&lt;b&gt;|@all"'), effects=False)
     assert "<b>" not in markdown_of(found)
     assert "|@all" not in markdown_of(found)

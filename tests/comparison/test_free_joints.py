@@ -27,7 +27,7 @@ CHAIN = urdfs.robot(
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 @pytest.mark.parametrize("also", ["", "renamed", "rerooted"])
-def test_a_free_joint_may_count_from_another_place(kind: str, also: str) -> None:
+def test_free_joints_with_a_different_zero_pose_are_equivalent(kind: str, also: str) -> None:
     a = loaded(CHAIN.format(kind, "0"), verify=True)
     tree = pairs.counted_elsewhere(a.tree)
     assert tree is not a.tree
@@ -45,7 +45,7 @@ def test_a_free_joint_may_count_from_another_place(kind: str, also: str) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["floating", "planar"])
-def test_what_hangs_on_a_free_joint_is_still_compared(kind: str) -> None:
+def test_joints_behind_a_free_joint_are_compared(kind: str) -> None:
     a, b = loaded(CHAIN.format(kind, "0")), loaded(CHAIN.format(kind, "0.001"))
     for other in (b, loaded(pairs.counted_elsewhere(b.tree))):
         found = urdfkin.same(a, other)
@@ -55,7 +55,7 @@ def test_what_hangs_on_a_free_joint_is_still_compared(kind: str) -> None:
         assert 0.0 < worst.lower <= worst.upper <= 1.03 * worst.lower
 
 
-def test_a_plane_that_is_tilted_is_no_matter_of_coordinates() -> None:
+def test_a_tilted_plane_of_a_planar_joint_is_a_difference() -> None:
     a = loaded(CHAIN.format("planar", "0"))
     b = loaded(CHAIN.format("planar", "0").replace("0.2 -0.3 0.4", "0.2 -0.299 0.4"))
     found = urdfkin.same(a, b)
@@ -84,7 +84,7 @@ def gantry(order: str, wrist: str = "turn", tilt: str = "0") -> Robot:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("order", "wrist"), [("xyz", "quill"), ("zyx", "turn"), ("yzx", "quill")])
-def test_slides_come_in_any_order_and_one_along_an_axis_before_it_or_behind(order: str, wrist: str) -> None:
+def test_robots_with_reordered_prismatic_joints_are_the_same(order: str, wrist: str) -> None:
     a, b = gantry("xyz"), gantry(order, wrist)
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.SAME
@@ -95,25 +95,25 @@ def test_slides_come_in_any_order_and_one_along_an_axis_before_it_or_behind(orde
 
 
 @pytest.mark.slow
-def test_every_order_of_slides_is_the_same_robot() -> None:
+def test_every_order_of_orthogonal_prismatic_joints_gives_the_same_robot() -> None:
     a = gantry("xyz")
     for order in permutations("xyz"):
         assert urdfkin.same(a, gantry("".join(order)), bounds=False).verdict is Verdict.SAME
 
 
-def test_an_order_that_axes_do_not_allow_is_a_difference() -> None:
+def test_a_joint_order_that_the_axes_do_not_allow_is_a_difference() -> None:
     assert not urdfkin.same(gantry("xyz", tilt="0.001"), gantry("xyz", "quill", tilt="0.001"), bounds=False)
 
 
 @pytest.mark.slow
-def test_a_carriage_that_another_joint_carries_is_a_difference() -> None:
+def test_a_named_link_that_a_different_joint_carries_is_a_difference() -> None:
     named = loaded(gantry("yxz").urdf.replace('"yxz', '"xyz'))
     (one,) = urdfkin.same(gantry("xyz"), named, bounds=False).differences
     assert one.words == "link xyz0 is carried by joint x in A, by joint y in B"
 
 
 @pytest.mark.slow
-def test_the_schema_knows_conversions_and_orders() -> None:
+def test_the_schema_allows_conversions_and_joint_orders() -> None:
     from jsonschema import Draft202012Validator
 
     schema = Draft202012Validator(SAME.schema())
@@ -126,7 +126,7 @@ def test_the_schema_knows_conversions_and_orders() -> None:
 
 
 @pytest.mark.parametrize("floating_first", [True, False])
-def test_what_carries_the_root_of_one_model_alone_is_all_that_differs(floating_first: bool) -> None:
+def test_a_root_joint_in_only_one_model_is_the_only_difference(floating_first: bool) -> None:
     text = CHAIN.format("fixed", "0").replace(
         '<axis xyz="0 0 1"/></joint><joint name="hip"', '</joint><joint name="hip"'
     )

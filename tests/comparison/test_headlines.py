@@ -55,7 +55,7 @@ def headline(a: str | Robot, b: str | Robot, **asked: float) -> str:
     return of(urdfkin.same(a, b, **asked), SameQuestion(**asked))  # type: ignore[arg-type]
 
 
-def test_a_tool_that_moved_is_equivalent_up_to_tools_and_is_not_within_less() -> None:
+def test_a_moved_tool_is_equivalent_up_to_tools_and_not_within_a_smaller_distance() -> None:
     a, b = arm(), arm(tool='<origin xyz="0 0 0.15"/>')
     found = urdfkin.same(a, b)
     assert (found.verdict, found.up_to) == (Verdict.SAME_AFTER, ("tools",))
@@ -69,13 +69,13 @@ def test_a_tool_that_moved_is_equivalent_up_to_tools_and_is_not_within_less() ->
     assert asked.startswith("NOT WITHIN 1e-06 m and rad without changes of B: tcp is 50 mm off")
 
 
-def test_a_turned_tool_is_told_in_radians() -> None:
+def test_a_rotated_tool_is_reported_in_radians() -> None:
     a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
     assert "without changes of B, tcp is 20 mrad off" in headline(a, b)
     assert not urdfkin.same(a, b).within(0.019)
 
 
-def test_zeros_senses_and_the_base_count_as_written() -> None:
+def test_within_counts_shifted_zeros_as_written() -> None:
     a, b = arm(), arm(shoulder="0 0 0.001")
     found = urdfkin.same(a, b)
     assert found.up_to == ("zeros",)
@@ -85,7 +85,7 @@ def test_zeros_senses_and_the_base_count_as_written() -> None:
     assert found.within(1.001e-3)
 
 
-def test_what_differs_in_orientation_alone_is_told_in_radians() -> None:
+def test_a_difference_in_orientation_alone_is_reported_in_radians() -> None:
     a, b = arm(), arm().replace('<axis xyz="0 1 0"/>', '<axis xyz="0.01 1 0"/>')
     a, b = (text.replace('<origin xyz="0 0 0.1"/>', "") for text in (a, b))
     said = headline(a, b)
@@ -96,7 +96,7 @@ def test_what_differs_in_orientation_alone_is_told_in_radians() -> None:
     assert worst.radians_seen > 0.005
 
 
-def test_a_joint_of_another_kind_is_searched() -> None:
+def test_a_joint_of_a_different_type_is_a_difference_without_an_upper_bound() -> None:
     a, b = arm(), arm(second="prismatic")
     found = urdfkin.same(a, b)
     worst = present(found.worst)
@@ -111,7 +111,7 @@ def test_a_joint_of_another_kind_is_searched() -> None:
 
 
 @pytest.mark.parametrize("below", ["", '<link name="table"/>'])
-def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: str) -> None:
+def test_a_robot_with_a_different_mount_is_equivalent_up_to_the_base(below: str) -> None:
     a, b = arm(), arm(mount='<origin xyz="1 0 0.5"/>')
     if below:
         more = f"{below}{joint('under', 'fixed', 'table', 'world')}</robot>"
@@ -126,19 +126,19 @@ def test_a_robot_that_is_mounted_elsewhere_is_equivalent_up_to_the_base(below: s
     assert certified(found, urdfkin.load(a), urdfkin.load(b))
 
 
-def test_a_frame_between_two_joints_of_the_base_is_no_mount() -> None:
+def test_a_moved_mount_on_a_base_with_two_arms_is_a_difference() -> None:
     more = f'<link name="arm2"/>{joint("other", "revolute", "world", "arm2", more=limit())}</robot>'
     a, b = (arm(mount=f'<origin xyz="{x} 0 0"/>').replace("</robot>", more) for x in (0.0, 1.0))
     assert urdfkin.same(a, b, bounds=False).verdict is Verdict.DIFFERS
 
 
-def test_limits_that_differ_stand_in_the_headline() -> None:
+def test_the_headline_counts_joints_with_different_limits() -> None:
     a, b = arm(), arm(limits=(-1.0, 2.0))
     assert headline(a, b).endswith("; limits of 1 joint differ")
     assert headline("ur5", "ur5_limited").endswith("; limits of 5 joints differ")
 
 
-def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> None:
+def test_intervals_cover_the_files_limits_although_mimic_joints_exceed_limits() -> None:
     a, b = finger(-1.0), finger(-1.01)
     found = urdfkin.same(a, b)
     assert present(found.worst).lower == pytest.approx(550e-6, rel=1e-3)
@@ -150,12 +150,12 @@ def test_intervals_cover_the_files_limits_where_mimic_joints_leave_theirs() -> N
     assert found.narrowed == tuple(f"{model}: {own} from -0.005 to {end} (jb)" for model, end in ends)
 
 
-def test_nothing_is_within_anything_where_no_bound_was_asked_for() -> None:
+def test_without_computed_bounds_no_difference_is_within_a_distance() -> None:
     a, b = arm(), arm().replace('<axis xyz="0 1 0"/>', '<axis xyz="0.01 1 0"/>')
     assert not urdfkin.same(a, b, bounds=False).within(1.0)
 
 
-def test_the_command_answers_what_was_asked(tmp_path: Path) -> None:
+def test_the_exit_code_and_text_of_same_depend_on_the_option_within(tmp_path: Path) -> None:
     texts = arm(), arm(tool='<origin xyz="0 0 0.15"/>'), finger(-1.0), finger(-1.01)
     a, b, f, g = files = [str(tmp_path / f"{name}.urdf") for name in "abfg"]
     for file, text in zip(files, texts, strict=True):
@@ -170,7 +170,7 @@ def test_the_command_answers_what_was_asked(tmp_path: Path) -> None:
     assert "within their limits only for values from -0.005 to 0.005" in done.text
 
 
-def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Path) -> None:
+def test_the_page_shows_the_verdict_within_the_distance_and_the_origin_of_the_models(tmp_path: Path) -> None:
     for name, text in (("a", finger(-1.0)), ("b", finger(-1.01))):
         (tmp_path / f"{name}.urdf").write_text(text)
     a, b, page = (str(tmp_path / name) for name in ("a.urdf", "b.urdf", "page.html"))
@@ -198,7 +198,7 @@ def test_the_page_follows_the_question_and_says_where_it_comes_from(tmp_path: Pa
     assert 'class="gap"' in text
 
 
-def test_a_table_is_held_to_the_frames_that_both_name() -> None:
+def test_a_table_is_compared_at_the_frames_that_both_models_name() -> None:
     table = urdfkin.load("ur5").dh("tool0", "base")
     assert urdfkin.same("ur5", table, within=1e-9).within(1e-9)
     tool = table.tool.copy()
@@ -208,7 +208,7 @@ def test_a_table_is_held_to_the_frames_that_both_name() -> None:
     assert not found.within(1e-3)
 
 
-def test_what_is_renamed_is_held_to_what_is_asked_too() -> None:
+def test_within_applies_to_robots_with_different_names_too() -> None:
     b = arm(shoulder="0 0 0.001")
     for name in ("world", "base", "upper", "lower", "tcp", "turn", "bend", "hold", "mount"):
         b = b.replace(f'"{name}"', f'"other_{name}"')
@@ -219,14 +219,14 @@ def test_what_is_renamed_is_held_to_what_is_asked_too() -> None:
     assert found.within(1.001e-3)
 
 
-def test_diff_says_radians_where_nothing_is_moved() -> None:
+def test_diff_reports_radians_for_a_pure_rotation() -> None:
     from urdfkin.report.diff import headline as of
 
     a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
     assert of(urdfkin.diff(a, b)) == "1 change; together they turn tcp by up to 20 mrad"
 
 
-def test_what_is_printed_of_it_is_in_standard_words() -> None:
+def test_the_repr_of_a_result_states_the_verdict() -> None:
     found = urdfkin.same(arm(), arm(tool='<origin xyz="0 0 0.15"/>', shoulder="0 0 0.5"), bounds=False)
     assert repr(found) == "<Sameness arm, arm: equivalent up to zeros, tools>"
 
@@ -239,7 +239,7 @@ def test_a_link_that_moved_on_a_body_without_joints_is_a_difference() -> None:
     assert present(found.worst).lower == pytest.approx(0.5)
 
 
-def test_metres_that_are_only_bounded_are_given_as_a_bound() -> None:
+def test_a_distance_without_a_lower_bound_is_reported_as_an_upper_bound() -> None:
     words = headline(FOLLOWING.format(0.5, 0.1), FOLLOWING.format(0.5, 0.1 + 6e-13))
     assert words.startswith("DIFFERS by up to ")
     assert "0 m" not in words

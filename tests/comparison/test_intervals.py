@@ -52,7 +52,7 @@ WIDTH = {"panda, rounded": 2.0}
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("case", CASES)
-def test_the_interval_holds_what_a_global_search_at_fifty_digits_finds(case: str) -> None:
+def test_the_interval_contains_the_result_of_a_global_search_at_fifty_digits(case: str) -> None:
     name, change = CASES[case]
     a = robot(name)
     b = urdfkin.load(change(a), verify=False)
@@ -67,7 +67,7 @@ def test_the_interval_holds_what_a_global_search_at_fifty_digits_finds(case: str
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_support_function_is_a_bound_and_a_close_one(seed: int) -> None:
+def test_a_support_function_is_a_close_upper_bound(seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid, p = Grid(16, 48), rng.standard_normal(3)
     reach, points = point(grid, p), p[np.newaxis]
@@ -88,7 +88,7 @@ def test_a_support_function_is_a_bound_and_a_close_one(seed: int) -> None:
     assert reach.largest() >= size
 
 
-def test_a_frame_that_slides_without_end_has_no_bound() -> None:
+def test_a_frame_with_an_unlimited_translation_has_no_bound() -> None:
     turn, fly = (
         joint("turn", "continuous", "a", "b", 'rpy="{} 0 0"'),
         joint("fly", "floating", "b", "c", axis=""),
@@ -160,7 +160,7 @@ def two_joints(elbow: str, multiplier: float | None) -> urdfkin.Robot:
     "elbow",
     ['xyz="1.01 0.02 0" rpy="0.01 0 0.02"', 'xyz="1.5 0 0.3"', 'xyz="1 0 -0.9"', 'xyz="1 0 0" rpy="0.5 0 0"'],
 )
-def test_second_derivatives_are_bounded_for_tilted_and_for_parallel_axes_and_followers(
+def test_second_derivatives_are_bounded_for_tilted_and_parallel_axes_and_mimic_joints(
     elbow: str, multiplier: float | None
 ) -> None:
     a, b = two_joints('xyz="1 0 0"', multiplier), two_joints(elbow, multiplier)
@@ -170,7 +170,7 @@ def test_second_derivatives_are_bounded_for_tilted_and_for_parallel_axes_and_fol
     compare_with_difference_quotients(search, frame, names, M)
 
 
-def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() -> None:
+def test_a_prismatic_mimic_joint_is_bounded_together_with_the_mimicked_joint() -> None:
     s = 0.01
 
     def arm(slide: str) -> urdfkin.Robot:
@@ -188,13 +188,13 @@ def test_a_slide_that_follows_a_turn_in_front_of_it_is_bounded_with_that_turn() 
     assert tighten(search, frame, 1.01 * s, upper) >= 0.99 * attained
 
 
-def test_joints_that_follow_by_other_multipliers_have_no_bound_on_second_derivatives() -> None:
+def test_mimic_joints_with_different_multipliers_have_no_bound_on_second_derivatives() -> None:
     _, M = bounds_of(*search_of(two_joints('xyz="1 0 0"', 0.5), two_joints('xyz="1 0 0"', 0.6), "tool"))
     assert np.isinf(M).all()
 
 
 @pytest.mark.parametrize("variables", [1, 2, 5])
-def test_the_first_derivatives_bound_of_a_box_is_no_less_than_its_corners(variables: int) -> None:
+def test_the_bound_of_a_box_by_first_derivatives_is_not_less_than_the_corners(variables: int) -> None:
     rng = np.random.default_rng(variables)
     D, G = rng.normal(size=(50, 3)), rng.normal(size=(50, 3, variables))
     D[0] = 0.0
@@ -213,7 +213,9 @@ def test_the_first_derivatives_bound_of_a_box_is_no_less_than_its_corners(variab
 
 
 @pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.3)])
-def test_a_tools_point_moves_as_its_jacobian_says(tool: tuple[float, float, float]) -> None:
+def test_the_jacobian_of_a_tool_point_agrees_with_finite_differences(
+    tool: tuple[float, float, float],
+) -> None:
     arm, none = robot("panda"), cast(Boxes, None)  # the point depends on no box
     q, step = arm.sample(5, seed=1), 1e-6
     p, J = Boxes._origin(none, arm, q, "panda_hand", np.array(tool))
@@ -236,7 +238,7 @@ def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, lin
 
 
 @pytest.mark.slow
-def test_where_many_things_differ_the_bound_comes_near_to_what_is_found() -> None:
+def test_with_many_differences_the_upper_bound_is_tightened_close_to_the_lower_bound() -> None:
     search, frame = search_of(robot("panda"), present(changed("panda", "rounded")), "panda_hand_tcp")
     lower, _ = search.largest_distances([frame])[0]
     upper, _ = upper_bounds(search.alignment, search.variables, frame, FINE)
@@ -253,7 +255,7 @@ def two_turns(place: str, inside: str) -> Robot:
     return loaded(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
 
 
-def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable_moved_both() -> None:
+def test_a_joint_that_mimics_in_only_one_model_is_bounded_as_a_separate_variable() -> None:
     a, b = two_turns("0", mimic("j1")), two_turns("-5", "")
     search, frame = search_of(a, b, "tool", AS_WRITTEN)
     q = a.sample(500, seed=0)
@@ -263,7 +265,7 @@ def test_a_joint_that_mimics_in_one_model_only_is_not_bounded_as_if_one_variable
     assert tighten(search, frame, 5.3, 7.0) >= attained
 
 
-def test_the_worst_configuration_names_a_joint_that_moves_on_its_own_in_b_only() -> None:
+def test_the_worst_configuration_names_a_joint_that_is_independent_only_in_b() -> None:
     a, b = two_turns("0", mimic("j1")), two_turns("0", "")
     found, turned = urdfkin.same(a, b), urdfkin.same(b, a)
     worst = present(found.worst)
@@ -275,7 +277,7 @@ def test_the_worst_configuration_names_a_joint_that_moves_on_its_own_in_b_only()
 
 
 @pytest.mark.slow
-def test_what_boxes_prove_is_proven_again() -> None:
+def test_a_bound_proven_by_boxes_is_confirmed_by_a_recheck() -> None:
     a, b = robot("so100"), present(changed("so100", "rounded"))
     found = urdfkin.same(a, b)
     plain, worst = present(urdfkin.same(a, b, boxes=0).worst), present(found.worst)
@@ -284,7 +286,7 @@ def test_what_boxes_prove_is_proven_again() -> None:
     assert recheck(certificate(found), a, b) == []
 
 
-def test_of_robots_that_nothing_moves_the_distance_is_told_too() -> None:
+def test_the_distance_between_robots_without_moving_joints_is_reported() -> None:
     text = urdf(joint("j", "fixed", "base", "mount", 'xyz="0.3 {} 0"', axis=""))
     found = urdfkin.same(text.format(0), text.format(0.004))
     assert (

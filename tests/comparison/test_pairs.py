@@ -30,7 +30,7 @@ MOVED = [what for what in pairs.UNLIKE if what not in ("other rule", "rounded")]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("turn", range(len(ROBOTS)), ids=ROBOTS)
-def test_what_is_the_same_robot_is_found_to_be_so(turn: int) -> None:
+def test_changes_that_preserve_the_robot_are_recognised(turn: int) -> None:
     what = list(pairs.ALIKE)[turn % len(pairs.ALIKE)]
     other = changed(ROBOTS[turn], what)
     if other is None:  # the change changes nothing
@@ -41,7 +41,7 @@ def test_what_is_the_same_robot_is_found_to_be_so(turn: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("turn", range(len(ROBOTS)), ids=ROBOTS)
-def test_what_is_not_is_found_out_and_the_joint_named(turn: int) -> None:
+def test_changes_of_the_motion_are_detected_and_the_joint_is_named(turn: int) -> None:
     what = MOVED[turn % len(MOVED)]
     tree = robot(ROBOTS[turn]).tree
     if not pairs.moving(tree):
@@ -55,14 +55,14 @@ def test_what_is_not_is_found_out_and_the_joint_named(turn: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "pr2", "talos", "baxter"])
-def test_a_follower_that_moves_by_a_tenth_more_is_found_out(name: str) -> None:
+def test_a_mimic_joint_with_a_larger_multiplier_is_detected(name: str) -> None:
     found = urdfkin.same(robot(name), changed(name, "other rule") or robot(name), bounds=False)
     assert [one.what for one in found.differences] == ["mimic rule"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "panda", "xarm7", "kinova", "go2", "laikago", "iris"])
-def test_a_robot_is_found_again_though_no_name_zero_sense_and_base_is_left(name: str) -> None:
+def test_a_robot_with_all_names_zeros_signs_and_the_base_changed_is_recognised(name: str) -> None:
     a = robot(name)
     b = urdfkin.load(to_urdf(pairs.renamed(pairs.everything(a.tree))), verify=False)
     found = urdfkin.same(a, b, bounds=False)
@@ -75,7 +75,7 @@ def test_a_robot_is_found_again_though_no_name_zero_sense_and_base_is_left(name:
 @pytest.mark.parametrize(
     "name", ["human", "icub", "romeo", "pr2", "tiago_pro", "tiago_dual", "g1_with_hands"]
 )
-def test_a_robot_whose_names_zeros_and_senses_are_random_is_found_in_seconds(name: str, seed: int) -> None:
+def test_a_robot_with_random_names_zeros_and_signs_is_recognised_in_seconds(name: str, seed: int) -> None:
     b = pairs.loaded(pairs.disguised(robot(name).tree, seed))
     began = time.process_time()
     found = urdfkin.same(robot(name), b, bounds=False)
@@ -85,7 +85,7 @@ def test_a_robot_whose_names_zeros_and_senses_are_random_is_found_in_seconds(nam
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "pr2", "talos"])
-def test_a_mimic_joint_that_moves_by_a_tenth_more_is_found_out_though_no_name_is_left(name: str) -> None:
+def test_a_mimic_joint_with_a_larger_multiplier_is_detected_despite_new_names(name: str) -> None:
     b = pairs.loaded(pairs.disguised(pairs.with_another_rule(robot(name).tree), 1))
     found = urdfkin.same(robot(name), b, bounds=False)
     assert {one.what for one in found.differences} == {"mimic rule"}
@@ -103,7 +103,7 @@ def test_a_table_with_other_signs_zeros_base_and_tool_is_the_same_robot(kinds: s
     assert found.verdict is Verdict.SAME_AFTER, found.differences
 
 
-def test_joints_of_one_name_are_each_others_however_many_hang_on_a_body() -> None:
+def test_joints_of_equal_names_are_matched_on_a_body_with_many_joints() -> None:
     a, b = robot("go2"), present(changed("go2", "axis bent"))
     found = urdfkin.same(a, b)
     assert [one.a for one in found.joints] == [one.b for one in found.joints]
@@ -111,7 +111,7 @@ def test_joints_of_one_name_are_each_others_however_many_hang_on_a_body() -> Non
 
 
 @pytest.mark.slow
-def test_a_vendors_table_off_by_its_last_digit_is_off_by_no_more() -> None:
+def test_a_vendors_table_with_a_rounded_last_digit_differs_by_no_more_than_this_digit() -> None:
     table = Path(__file__).parents[2] / "robots" / "dh" / "kinova.toml"
     found = urdfkin.same("kinova", table)
     assert found.verdict is Verdict.DIFFERS
@@ -119,7 +119,7 @@ def test_a_vendors_table_off_by_its_last_digit_is_off_by_no_more() -> None:
 
 
 @pytest.mark.slow
-def test_arms_that_mirror_each_other_are_told_apart_though_no_name_is_left() -> None:
+def test_mirrored_arms_are_distinguished_without_equal_names() -> None:
     def arm(side: str, y: float) -> str:
         a, b, c = (f"{side}_{name}" for name in "abc")
         first = joint(a, "continuous", "trunk", f"{a}_link", axis="0 1 0")
@@ -148,7 +148,7 @@ FOLLOWING = urdfs.robot(
 )
 
 
-def test_a_rule_that_differs_by_less_than_the_rounding_of_the_zeros_is_no_difference() -> None:
+def test_mimic_rules_that_differ_by_less_than_rounding_are_equal() -> None:
     found = urdfkin.same(FOLLOWING.format(0.5, 0.1), FOLLOWING.format(0.5, 0.1 + 2.5e-13))
     assert found.verdict is Verdict.SAME
     worst = max(frame.radians for frame in found.frames)
@@ -156,6 +156,8 @@ def test_a_rule_that_differs_by_less_than_the_rounding_of_the_zeros_is_no_differ
 
 
 @pytest.mark.parametrize(("multiplier", "offset"), [(0.5, 0.1 + 1e-12), (0.5 + 1e-12, 0.1)])
-def test_a_rule_that_differs_by_more_than_that_is_a_difference(multiplier: float, offset: float) -> None:
+def test_mimic_rules_that_differ_by_more_than_rounding_are_a_difference(
+    multiplier: float, offset: float
+) -> None:
     found = urdfkin.same(FOLLOWING.format(0.5, 0.1), FOLLOWING.format(multiplier, offset))
     assert found.verdict is Verdict.DIFFERS

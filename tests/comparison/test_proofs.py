@@ -98,7 +98,7 @@ def largest_distance(a: Robot, b: Robot, links: list[str]) -> tuple[float, float
 @pytest.mark.parametrize(
     "seed", [*range(100), *(pytest.param(k, marks=pytest.mark.long) for k in range(100, 1500))]
 )
-def test_no_sample_of_two_random_arms_is_beyond_a_proven_bound(seed: int) -> None:
+def test_no_sample_of_two_random_arms_exceeds_a_proven_bound(seed: int) -> None:
     a, b = random_pair(seed)
     found = urdfkin.same(a, b, boxes=2**10)
     off, turned = largest_distance(a, b, [f"l{i}" for i in range(len(a.tree.links))])
@@ -132,7 +132,7 @@ def test_a_joint_without_limits_behind_a_difference_leaves_no_bound() -> None:
     assert np.linalg.norm(off[:3, 3]) > 40.0, "the distance indeed exceeds 1 m"
 
 
-def test_a_robot_with_another_root_link_is_not_within_a_distance_that_its_root_exceeds() -> None:
+def test_within_is_false_if_a_different_root_link_exceeds_the_distance() -> None:
     a = loaded(urdf(joint("slide", "prismatic", "base", "tip", axis="1 0 0", more=limit(-2, 2))))
     b = loaded(urdf(joint("slide", "prismatic", "tip", "base", axis="-1 0 0", more=limit(-2, 2))))
     found = urdfkin.same(a, b)
@@ -150,7 +150,7 @@ def test_a_robot_with_another_root_link_is_not_within_a_distance_that_its_root_e
     assert any("not proven" in line for line in recheck(document, a, b))
 
 
-def test_the_slopes_of_two_slides_count_in_the_bound_of_a_box() -> None:
+def test_the_bound_of_a_box_includes_the_multipliers_of_both_prismatic_mimic_joints() -> None:
     arm = joint("turn", "revolute", "base", "arm", 'xyz="0 {} 0"', more=limit())
     rest = joint("slide", "prismatic", "arm", "tool", axis="1 0 0", more=limit(-9, 9) + "{}")
     lever = joint("lever", "revolute", "base", "handle", 'xyz="0 0 9"', more=limit())
@@ -178,7 +178,7 @@ def test_the_limits_of_a_mimic_joint_do_not_restrict_the_joint_that_it_mimics() 
     assert not found.within(0.02)
 
 
-def test_the_limits_of_a_mimicked_joint_that_only_one_model_has_count() -> None:
+def test_the_limits_of_a_mimicked_joint_in_only_one_model_are_used() -> None:
     mount = joint("mount", "fixed", "door", "tool", 'xyz="1 0 0"', axis="")
     lever = joint("lever", "revolute", "base", "handle", 'xyz="0 5 0"', "0 1 0", limit(-3, 3))
     a = loaded(urdf(hinge(limit(-0.1, 0.1)), mount))
@@ -189,7 +189,7 @@ def test_the_limits_of_a_mimicked_joint_that_only_one_model_has_count() -> None:
     assert tool.upper >= off
 
 
-def test_equal_robots_with_another_independent_joint_have_a_remark() -> None:
+def test_equal_robots_with_different_independent_joints_have_a_remark() -> None:
     fore = 'xyz="1 0 0"'
     a = loaded(
         urdf(
@@ -212,7 +212,7 @@ def test_equal_robots_with_another_independent_joint_have_a_remark() -> None:
     assert found.to_b([0.7]).tolist() == [1.4]
 
 
-def test_the_axes_of_joints_that_never_move_do_not_count() -> None:
+def test_the_axes_of_joints_that_never_move_are_not_compared() -> None:
     a, b = (
         loaded(
             urdf(
@@ -284,7 +284,9 @@ FORGED: dict[str, tuple[str, Callable[[Any], None], str]] = {
 
 
 @pytest.mark.parametrize("forged", FORGED)
-def test_a_recheck_rejects_a_certificate_with(forged: str, request: pytest.FixtureRequest) -> None:
+def test_a_recheck_rejects_a_certificate_with_forged_contents(
+    forged: str, request: pytest.FixtureRequest
+) -> None:
     pair, forge, words = FORGED[forged]
     a, b, found = request.getfixturevalue(pair)
     document = written(found)

@@ -200,7 +200,7 @@ def test_a_body_that_a_library_lacks_is_missing_and_a_link_without_a_prim_is_not
     assert found.missing == ("upper", "hand")
 
 
-def test_a_library_that_hangs_or_dies_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_library_that_hangs_or_crashes_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load(TEXTS["mimic"])
     monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "its process ended with -11"
@@ -209,7 +209,7 @@ def test_a_library_that_hangs_or_dies_is_reported(monkeypatch: pytest.MonkeyPatc
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "no answer in 0.2 s"
 
 
-def test_the_command_prints_and_writes_every_format(tmp_path: Path) -> None:
+def test_the_command_readers_prints_and_writes_every_format(tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(TEXTS["mimic"])
     done = run("readers", str(path), "--with", "mujoco,yourdfpy")

@@ -35,7 +35,7 @@ def other(name: str, what: str) -> Robot:
     return present(changed(name, what))
 
 
-def test_a_robot_is_itself_and_pinocchio_finds_no_distance() -> None:
+def test_a_robot_is_the_same_as_itself_and_pinocchio_finds_no_distance() -> None:
     found = urdfkin.same("panda", "panda")
     assert found
     assert found.verdict is Verdict.SAME
@@ -61,7 +61,7 @@ def _tried(
 
 @pytest.mark.parametrize("what", ["all of it, no name left", "rounded"])
 @pytest.mark.parametrize("name", ["panda", "polar"])
-def test_no_more_joints_and_links_agree_than_the_bodies_at_the_start_allow(
+def test_the_number_of_matches_does_not_exceed_the_bound_of_the_start_bodies(
     monkeypatch: pytest.MonkeyPatch, name: str, what: str
 ) -> None:
     tried = _tried(monkeypatch, robot(name), other(name, what))
@@ -69,7 +69,7 @@ def test_no_more_joints_and_links_agree_than_the_bodies_at_the_start_allow(
     assert all(found.matched <= self._most_matches(base) for self, base, found in tried)
 
 
-def test_bodies_from_which_less_can_agree_than_agrees_already_are_not_tried(
+def test_start_bodies_that_cannot_improve_the_match_are_not_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     text = robot("panda").urdf
@@ -78,7 +78,7 @@ def test_bodies_from_which_less_can_agree_than_agrees_already_are_not_tried(
     assert starts == {(0, 0), (0, 1), (0, 8), (0, 9)}  # without the bound: all ten bodies of B
 
 
-def test_limits_are_told_apart_from_motion() -> None:
+def test_different_limits_are_a_remark_and_not_a_difference_of_motion() -> None:
     found = urdfkin.same("ur5", "ur5_limited")
     assert found.verdict is Verdict.SAME
     assert {one.what for one in found.remarks} == {"limits"}
@@ -88,7 +88,7 @@ def test_limits_are_told_apart_from_motion() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["all of it", "axes flipped", "zeros shifted", "all renamed"])
 @pytest.mark.parametrize("name", ["panda", "talos", "polar"])
-def test_what_has_to_be_done_makes_them_move_alike(name: str, what: str) -> None:
+def test_the_listed_conversions_make_both_robots_move_alike(name: str, what: str) -> None:
     a, b = robot(name), other(name, what)
     found = urdfkin.same(a, b, bounds=False)
     assert found
@@ -96,14 +96,14 @@ def test_what_has_to_be_done_makes_them_move_alike(name: str, what: str) -> None
 
 
 @pytest.mark.slow
-def test_two_models_differ_whichever_is_called_a() -> None:
+def test_the_distance_does_not_depend_on_the_order_of_the_models() -> None:
     a, b = robot("elbow"), other("elbow", "tilted by 0.001")
     there, back = urdfkin.same(a, b).worst, urdfkin.same(b, a).worst
     there, back = present(there), present(back)
     assert (there.lower, there.upper) == pytest.approx((back.lower, back.upper), rel=5e-3)
 
 
-def test_a_follower_that_was_dropped_is_found() -> None:
+def test_a_missing_mimic_rule_is_detected() -> None:
     a, b = robot("panda"), urdfkin.load(robot("panda").urdf, mimic=False, verify=False)
     found = urdfkin.same(a, b)
     words = "joint panda_finger_joint2 is a mimic joint in A and an independent joint in B: 1.0"
@@ -112,7 +112,7 @@ def test_a_follower_that_was_dropped_is_found() -> None:
 
 
 @pytest.mark.slow
-def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() -> None:
+def test_a_joint_that_is_fixed_in_only_one_model_is_named_with_a_bound_of_the_effect() -> None:
     found = urdfkin.same("icub", "icub_reduced")
     joints = {f"joint neck_{way}" for way in ("pitch", "roll", "yaw")}
     assert {one.place for one in found.differences} == joints
@@ -120,7 +120,7 @@ def test_a_joint_that_is_fixed_in_one_model_is_named_and_its_effect_bounded() ->
     assert worst.lower <= worst.upper <= 1.05 * worst.lower
 
 
-def test_another_tool_is_something_to_be_done_not_a_difference() -> None:
+def test_a_different_tool_is_a_conversion_and_not_a_difference() -> None:
     tree = urdfkin.load("panda").tree
     at = tree.joint_index("panda_hand_tcp_joint")
     T = tree.joints[at].T_parent_joint @ pairs.pose([0.0, 0.0, 0.0], [0.0, 0.0, 0.125])
@@ -136,7 +136,7 @@ def test_another_tool_is_something_to_be_done_not_a_difference() -> None:
 
 
 @pytest.mark.slow
-def test_a_table_is_the_robot_that_it_was_made_of() -> None:
+def test_a_table_of_a_robot_is_the_same_robot() -> None:
     found = urdfkin.same("ur5", urdfkin.load("ur5").dh("tool0", "base"))
     assert found.differences == ()
     assert len(found.joints) == 6
@@ -157,7 +157,7 @@ def test_joints_can_be_paired_by_hand() -> None:
 
 
 @pytest.mark.parametrize(("name", "seconds"), [("panda", 1.0), ("talos", 5.0)])
-def test_it_is_quick(name: str, seconds: float) -> None:
+def test_a_comparison_of_equal_robots_takes_a_few_seconds_at_most(name: str, seconds: float) -> None:
     a, b = urdfkin.load(name), urdfkin.load(name)
     began = time.process_time()
     assert urdfkin.same(a, b)
@@ -173,14 +173,16 @@ def fingers(names: str, tilt: float, multiplier: float, offset: float) -> Robot:
     return urdfkin.load(urdfs.robot(first, second), verify=False)
 
 
-def test_a_mimic_rule_gives_the_zero_of_a_joint_on_whose_link_nothing_hangs() -> None:
+def test_a_mimic_rule_determines_the_zero_of_a_joint_with_an_empty_link() -> None:
     found = urdfkin.same(fingers("palm a b ja jb", 0, 1, 0), fingers("L0 L1 L2 k1 k2", -0.5, 1, 0.5))
     assert found.verdict is Verdict.SAME_AFTER, found.differences
     assert found.after == ("q[k1] = q[ja] - 0.5",)
 
 
 @pytest.mark.parametrize(("multiplier", "offset"), [(1.001, 0.0), (1, 0.001)])
-def test_links_of_one_name_fix_the_zero_that_a_mimic_rule_may_give(multiplier: float, offset: float) -> None:
+def test_links_of_equal_names_determine_the_zero_before_a_mimic_rule_does(
+    multiplier: float, offset: float
+) -> None:
     a, b = (fingers("palm a b ja jb", 0, *rule) for rule in ((1, 0), (multiplier, offset)))
     found = urdfkin.same(a, b, bounds=False)
     assert [one.what for one in found.differences] == ["mimic rule"]
@@ -195,7 +197,7 @@ def telescope(names: str, x: float) -> Robot:
     return urdfkin.load(urdfs.robot(*joints), verify=False)
 
 
-def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_prismatic_joints_with_equal_names_are_not_reordered(monkeypatch: pytest.MonkeyPatch) -> None:
     tried = list[tuple[str, ...]]()
     taken = Mechanism.reordered
 
@@ -213,7 +215,7 @@ def test_slides_whose_names_agree_are_tried_in_no_other_order(monkeypatch: pytes
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("compared", [urdfkin.same, urdfkin.diff])
-def test_a_robot_longer_than_a_double_can_square_is_refused(compared: Any) -> None:
+def test_a_robot_with_an_overflowing_square_of_a_length_is_refused(compared: Any) -> None:
     joints = (joint("j", "fixed", "a", "b", f'xyz="0 0 {z}"', axis="") for z in ("1", "1e308"))
     robots = [urdfkin.load(urdfs.robot(one), verify=False) for one in joints]
     with pytest.raises(urdfkin.InputError, match=r"model B, r: .*found 1e\+308 m"):
@@ -229,7 +231,7 @@ def compared() -> tuple[Robot, Robot, Any]:
     return a, b, written(urdfkin.same(a, b))
 
 
-def test_a_certificate_holds(compared: tuple[Robot, Robot, Any], tmp_path: Path) -> None:
+def test_a_written_certificate_passes_the_recheck(compared: tuple[Robot, Robot, Any], tmp_path: Path) -> None:
     a, b, document = compared
     (tmp_path / "c.json").write_text(json.dumps(document))
     assert recheck(SAME.read(tmp_path / "c.json"), a, b) == []
@@ -239,7 +241,7 @@ def test_a_certificate_holds(compared: tuple[Robot, Robot, Any], tmp_path: Path)
     ("name", "what"),
     [("elbow", None), pytest.param("panda", "all of it", marks=pytest.mark.slow)],
 )
-def test_a_certificate_of_one_robot_holds(name: str, what: str | None) -> None:
+def test_a_certificate_of_a_robot_and_a_modified_copy_passes_the_recheck(name: str, what: str | None) -> None:
     a = robot(name)
     b = a if what is None else other(name, what)
     assert certified(urdfkin.same(a, b), a, b)
@@ -292,14 +294,14 @@ FORGED: dict[str, Any] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("said", FORGED)
-def test_a_forged_certificate_does_not(compared: tuple[Robot, Robot, Any], said: str) -> None:
+def test_a_forged_certificate_fails_the_recheck(compared: tuple[Robot, Robot, Any], said: str) -> None:
     a, b, document = compared
     forged = copy.deepcopy(document)
     FORGED[said](forged)
     assert any(said in line for line in recheck(forged, a, b))
 
 
-def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
+def test_a_wrong_certificate_is_rejected_without_a_search_in_boxes(
     compared: tuple[Robot, Robot, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     a, b, document = compared
@@ -315,7 +317,7 @@ def test_a_certificate_that_does_not_hold_costs_no_search_in_boxes(
     assert asked == []
 
 
-def test_a_certificate_that_names_what_is_not_there_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
+def test_a_certificate_with_an_unknown_joint_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
     a, b, document = compared
     forged = copy.deepcopy(document)
     forged["joints"][0]["b"] = "elsewhere"
@@ -326,7 +328,7 @@ def test_a_certificate_that_names_what_is_not_there_is_refused(compared: tuple[R
 
 @pytest.mark.slow
 @pytest.mark.parametrize("end", ["upper", "lower"])
-def test_what_is_said_of_the_models_as_written_is_proven_again_too(end: str) -> None:
+def test_a_recheck_also_proves_the_distance_of_the_models_as_written(end: str) -> None:
     a, b = robot("elbow"), other("elbow", "axes flipped")
     document = written(urdfkin.same(a, b))
     assert recheck(document, a, b) == []
@@ -335,7 +337,7 @@ def test_what_is_said_of_the_models_as_written_is_proven_again_too(end: str) -> 
 
 
 @pytest.mark.parametrize("kind", ["planar", "floating"])
-def test_a_free_joint_goes_only_where_a_rigid_motion_takes_it(kind: str) -> None:
+def test_the_transform_of_a_free_joint_must_be_a_rigid_motion_of_the_joint(kind: str) -> None:
     kinds = JointKind(kind)
     lift, lower, mirror = np.eye(4), np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0])
     lift[2, 3], lower[2, 3] = 0.1, -0.1
@@ -344,7 +346,7 @@ def test_a_free_joint_goes_only_where_a_rigid_motion_takes_it(kind: str) -> None
     assert not JointTransform(mirror, mirror).holds_for(kinds)
 
 
-def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
+def test_a_certificate_of_a_different_version_is_refused(compared: tuple[Robot, Robot, Any]) -> None:
     a, _, document = compared
     words = "model B: the certificate belongs to another version of this robot"
     with pytest.raises(urdfkin.InputError, match=words):
@@ -355,7 +357,7 @@ def test_a_certificate_of_other_texts_is_refused(compared: tuple[Robot, Robot, A
 
 
 @pytest.mark.slow
-def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
+def test_the_exit_code_of_same_states_the_verdict(tmp_path: Path) -> None:
     files = {}
     for what in ("axes flipped", "tilted by 0.01"):
         files[what] = tmp_path / f"{what}.urdf"
@@ -381,7 +383,7 @@ def test_the_commands_exit_says_whether(tmp_path: Path) -> None:
     assert "another version of this robot" in refused.err
 
 
-def test_arguments_of_a_xacro_file_go_to_the_one_that_is_one(tmp_path: Path) -> None:
+def test_xacro_arguments_are_passed_only_to_the_xacro_file(tmp_path: Path) -> None:
     text = robot("elbow").urdf
     (tmp_path / "elbow.urdf").write_text(text)
     named = (
@@ -409,13 +411,13 @@ def test_arguments_of_a_xacro_file_go_to_the_one_that_is_one(tmp_path: Path) -> 
         (["panda", "panda", "--recheck", "/dev/null"], "not a JSON file"),
     ],
 )
-def test_what_cannot_be_compared_is_refused_in_a_line(words: list[str], said: str) -> None:
+def test_arguments_that_cannot_be_compared_are_refused_in_one_line(words: list[str], said: str) -> None:
     done = run("same", *words)
     assert done.code == 2
     assert said in done.err
 
 
-def test_the_schema_is_printed_and_is_one() -> None:
+def test_the_printed_schema_is_valid_and_fits_the_output() -> None:
     from jsonschema import Draft202012Validator
 
     done = run("same", "--schema")

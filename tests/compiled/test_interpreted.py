@@ -41,12 +41,12 @@ def in_both_ways(compute: Callable[[], FloatArray]) -> list[FloatArray]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_quantity_of_every_robot_has_the_bits_of_the_kernels(name: str) -> None:
+def test_every_quantity_of_every_robot_is_bitwise_equal_to_the_kernels_result(name: str) -> None:
     assert list(differing_interpreted(Subject.of(name))) == []
 
 
 @pytest.mark.parametrize("root_joint", [None, "floating", "planar"])
-def test_a_moving_base_a_free_root_and_an_imu_have_the_bits_of_the_kernels(root_joint: str | None) -> None:
+def test_results_with_a_moving_base_a_free_root_and_an_imu_are_bitwise_equal(root_joint: str | None) -> None:
     robot = urdfkin.load("ur5", root_joint=root_joint, verify=False)
     generator = np.random.default_rng(0)
     q, (v, a) = robot.sample(2, seed=1), generator.standard_normal((2, 2, robot.nv))
@@ -57,7 +57,7 @@ def test_a_moving_base_a_free_root_and_an_imu_have_the_bits_of_the_kernels(root_
     assert same(*in_both_ways(lambda: robot.imu(q, v, a, "tool0", base=base)))
 
 
-def test_the_sine_has_the_bits_of_the_kernels_for_angles_of_every_size() -> None:
+def test_the_sine_is_bitwise_equal_to_the_kernels_for_angles_of_every_size() -> None:
     robot = urdfkin.load("planar_two_link", verify=False)
     generator = np.random.default_rng(0)
     angles = generator.standard_normal((200, 2)) * 10.0 ** generator.uniform(-9.0, 9.0, (200, 2))
@@ -65,7 +65,7 @@ def test_the_sine_has_the_bits_of_the_kernels_for_angles_of_every_size() -> None
     assert same(*in_both_ways(lambda: robot.placement(angles, "tip")))
 
 
-def test_the_sine_of_a_number_that_is_not_finite_is_not_finite() -> None:
+def test_the_sine_of_a_number_that_is_not_finite_is_nan() -> None:
     for x in (math.inf, -math.inf, math.nan):
         assert all(math.isnan(y.x) for y in sine_cosine(None, 0, Number(x)))
 
@@ -77,7 +77,7 @@ def test_a_fused_product_is_rounded_once_and_overflows_without_an_error() -> Non
     assert math.isnan(fma(math.inf, 0.0, 1.0))
 
 
-def test_numbers_that_cannot_be_used_are_the_same_errors() -> None:
+def test_invalid_numbers_raise_the_same_errors_with_and_without_kernels() -> None:
     robot = urdfkin.load("planar_two_link", verify=False)
     for way in WAYS:
         with only(way):
@@ -88,7 +88,7 @@ def test_numbers_that_cannot_be_used_are_the_same_errors() -> None:
     assert issubclass(NotFiniteError, urdfkin.InputError)
 
 
-def test_a_certificate_does_not_depend_on_what_computed() -> None:
+def test_a_certificate_does_not_depend_on_the_use_of_kernels() -> None:
     certificates = []
     for way in WAYS:
         with only(way):
@@ -110,7 +110,7 @@ def test_a_command_for_one_configuration_imports_no_compiler_and_no_library_for_
     assert imported([line.replace("OWN", own) for line in lines], HEAVY) == {}
 
 
-def test_one_result_needs_no_cache(tmp_path: Path) -> None:
+def test_a_single_result_creates_no_cache(tmp_path: Path) -> None:
     done = process("jacobian", "elbow", XDG_CACHE_HOME=str(tmp_path / "none"))
     assert (done.code, "compil" in done.err) == (0, False)
     assert not (tmp_path / "none").exists()
@@ -134,7 +134,7 @@ def unspent(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     preload._end_beside()
 
 
-def test_a_kernel_on_disk_is_loaded_when_more_time_is_spent_without_it(
+def test_a_kernel_on_disk_is_loaded_after_enough_time_was_spent_without_the_kernel(
     unspent: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(preload, "_on_disk", lambda name: True)
@@ -162,7 +162,7 @@ def test_a_missing_kernel_is_compiled_in_the_background_and_a_large_batch_does_n
     assert preload.kernel("jacobians", more=preload.COMPILING) == "jacobians"
 
 
-def test_without_a_folder_for_kernels_no_process_starts(
+def test_without_a_kernel_cache_folder_no_compiling_process_starts(
     unspent: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(preload, "cache_folder", lambda: None)
@@ -187,7 +187,7 @@ print(process.pid, process.poll(), flush=True)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("end", ["", "import os; os._exit(0)", "import os, signal; os.kill(os.getpid(), 9)"])
-def test_the_process_that_compiles_ends_with_this_one(end: str, tmp_path: Path) -> None:
+def test_the_compiling_process_ends_with_the_parent_process(end: str, tmp_path: Path) -> None:
     done = python(_LONG + end, check=False, env=without_cache(tmp_path))
     pid, state = done.stdout.split()
     assert (state, done.stderr) == ("None", "")

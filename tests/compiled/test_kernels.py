@@ -93,7 +93,7 @@ def odd() -> KinematicTree:
 
 @pytest.mark.parametrize("reference", list(Reference))
 @pytest.mark.parametrize("link", ["base", "body", "wrist", "tyre"])
-def test_the_parts_add_up_to_the_recursions_acceleration(
+def test_the_parts_sum_to_the_acceleration_of_the_recursion(
     odd: KinematicTree, link: str, reference: Reference
 ) -> None:
     at = odd.link_index(link)
@@ -106,7 +106,7 @@ def test_the_parts_add_up_to_the_recursions_acceleration(
     assert np.abs(parts.base + parts.by_kind.sum(axis=-2) - whole).max() <= ROOM
 
 
-def test_a_joint_that_stands_still_contributes_nothing(odd: KinematicTree) -> None:
+def test_a_joint_without_velocity_and_acceleration_contributes_nothing(odd: KinematicTree) -> None:
     q, v, a = state(odd, 3, 3)
     slide = odd.v_index[odd.joint_index("slide")]
     v[:, slide] = a[:, slide] = 0.0
@@ -119,7 +119,9 @@ def test_a_joint_that_stands_still_contributes_nothing(odd: KinematicTree) -> No
     assert parts.by_joint[:, 3, 3:].all()
 
 
-def test_doubling_a_rate_and_an_acceleration_scales_each_kind_as_its_formula_says(odd: KinematicTree) -> None:
+def test_scaling_velocity_and_acceleration_scales_each_kind_of_term_by_the_formula(
+    odd: KinematicTree,
+) -> None:
     q, v, a = state(odd, 3, 4)
     wrist, slide = odd.link_index("wrist"), odd.v_index[odd.joint_index("slide")]
     once = acceleration_breakdown(odd, wrist, q, v, a).terms[:, 2]
@@ -134,7 +136,7 @@ def test_doubling_a_rate_and_an_acceleration_scales_each_kind_as_its_formula_say
         assert not now[:, KINDS.index(kind)].any()
 
 
-def test_a_batch_may_be_empty(odd: KinematicTree) -> None:
+def test_the_breakdown_of_an_empty_batch_is_empty(odd: KinematicTree) -> None:
     q, v, a = state(odd, 1, 5)
     assert acceleration_breakdown(odd, 5, q[:0], v[:0], a[:0]).total.shape == (0, 6)
 

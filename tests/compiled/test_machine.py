@@ -35,7 +35,7 @@ print("scipy.linalg" in sys.modules)
 
 
 @pytest.mark.long
-def test_scipy_is_imported_for_compiled_code_that_calls_blas_and_for_none_of_ours() -> None:
+def test_scipy_is_imported_only_for_compiled_code_that_calls_blas() -> None:
     # Kept from here on: compiling imports more.
     urdfkin.load("one_link", verify=False).prepare("tip").placement(np.zeros(1))
     done = subprocess.run(own_python(_TRIED), check=True, capture_output=True, text=True)
@@ -77,7 +77,7 @@ def outputs(robot: Robot) -> Iterator[tuple[str, tuple[int, ...], tuple[str, ...
 @pytest.mark.slow
 @pytest.mark.parametrize("n", COUNTS)
 @pytest.mark.parametrize("name", ["panda", "planar_and_floating_in_the_middle", "mimic_hand_40_sliding"])
-def test_a_batch_is_written_to_its_last_number_and_no_further(name: str, n: int) -> None:
+def test_a_batch_is_written_completely_and_not_beyond_the_output(name: str, n: int) -> None:
     robot = robot_of(name)
     q, v, a = (guarded(x.shape, x)[0] for x in state(robot, n, 1))
     for method, own, reference in [*outputs(robot), ("jacobian_rate", (6, robot.nv), ("world",))]:
@@ -89,7 +89,7 @@ def test_a_batch_is_written_to_its_last_number_and_no_further(name: str, n: int)
 
 
 @pytest.mark.parametrize("name", ["panda", "tree_8", "mimic_hand_40_sliding"])
-def test_a_single_configuration_is_written_to_its_last_number_and_no_further(name: str) -> None:
+def test_a_single_result_is_written_completely_and_not_beyond_the_output(name: str) -> None:
     robot = robot_of(name)
     q, v, a = (guarded(x.shape[1:], x[0])[0] for x in state(robot, 1, 2))
     for method, own, reference in outputs(robot):
@@ -135,7 +135,7 @@ def before_closed_memory(x: FloatArray) -> Iterator[FloatArray]:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="mprotect of the C library")
 @pytest.mark.parametrize("name", ["planar_two_link", "ur5", "panda", "talos"])
-def test_a_batch_is_read_to_its_last_number_and_no_further(name: str) -> None:
+def test_a_batch_is_not_read_beyond_the_inputs(name: str) -> None:
     robot = urdfkin.load(name, verify=False)
     frame = robot.link_frames[-1]
     for n in (1, LANES - 1, LANES, LANES + 1, 2 * LANES, 3 * LANES + 5):
@@ -194,7 +194,7 @@ def units_off(angles: FloatArray) -> FloatArray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("largest", [1e-3, 0.8, 4.0, 100.0, 1.6e6, 1e9])
-def test_sine_and_cosine_are_right_to_two_thirds_of_a_unit_in_the_last_place(largest: float) -> None:
+def test_sine_and_cosine_are_accurate_to_two_thirds_of_a_unit_in_the_last_place(largest: float) -> None:
     angles = np.random.default_rng(0).uniform(-largest, largest, 3000)
     assert np.abs(units_off(angles)).max() < 2.0 / 3.0
 

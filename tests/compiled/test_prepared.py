@@ -246,7 +246,7 @@ def test_unknown_names_raise_the_same_error_as_the_robot(panda: Robot) -> None:
                 refer(FRAME, reference)  # type: ignore[arg-type]
 
 
-def test_a_robot_where_nothing_moves_has_empty_jacobians() -> None:
+def test_a_robot_without_moving_joints_has_empty_jacobians() -> None:
     robot = urdfkin.load('<robot name="r"><link name="a"/></robot>', verify=False)
     fast = robot.prepare("a")
     assert fast.jacobian(np.zeros(0)).shape == (6, 0)

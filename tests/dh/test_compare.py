@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_what_cannot_matter_is_forgiven(seed: int, convention: str) -> None:
+def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, convention: str) -> None:
     path = chain(elbow(), "tip")
     reference = to_convention(disguised(dh_table(elbow(), "tip"), seed), convention)
     found = compare(path, reference)
@@ -38,7 +38,7 @@ def test_what_cannot_matter_is_forgiven(seed: int, convention: str) -> None:
 
 
 @pytest.mark.parametrize("kinds", ["PRRRRR", "RRPRRR", "RRRRRP", "RPRPRR"])
-def test_sliding_joints_are_fitted_as_well(kinds: str) -> None:
+def test_tables_with_prismatic_joints_are_fitted(kinds: str) -> None:
     tree = elbow(kinds)
     found = compare(chain(tree, "tip"), disguised(dh_table(tree, "tip"), 3))
     assert found.exact
@@ -46,7 +46,7 @@ def test_sliding_joints_are_fitted_as_well(kinds: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_patterns_of_coinciding_axes_crowd_no_other_out(seed: int) -> None:
+def test_an_arm_with_many_coinciding_axes_agrees_with_an_equivalent_table(seed: int) -> None:
     tree = arm(
         shift(0.4, -0.5, -0.3),
         rotation("z", math.pi) @ shift(0, 0, -0.3) @ rotation("z", -math.pi / 2) @ shift(0, 0, -0.15),
@@ -60,7 +60,7 @@ def test_patterns_of_coinciding_axes_crowd_no_other_out(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_x_beside_a_slide_stands_across_both_axes(seed: int) -> None:
+def test_x_beside_a_prismatic_joint_is_perpendicular_to_both_axes(seed: int) -> None:
     square, half = rotation("x", math.pi / 2), rotation("z", math.pi)
     tree = arm(
         rotation("x", 3.1) @ shift(0, 0, -0.12),
@@ -79,7 +79,7 @@ def test_x_beside_a_slide_stands_across_both_axes(seed: int) -> None:
 
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
 @settings(max_examples=20)
-def test_a_table_agrees_with_the_chain_it_came_from(tree: KinematicTree, seed: int) -> None:
+def test_a_table_agrees_with_the_chain_of_the_derivation(tree: KinematicTree, seed: int) -> None:
     path = chain(tree, "tip")
     assume(path.reach > 1e-3)
     found = compare(path, disguised(dh_table(tree, "tip"), seed))
@@ -95,7 +95,7 @@ WRONG = [pytest.param(*one, marks=() if one in FEW else pytest.mark.long) for on
 
 
 @pytest.mark.parametrize(("row", "cell"), WRONG, ids=str)
-def test_a_wrong_cell_is_named_with_its_size(row: int, cell: str) -> None:
+def test_a_wrong_cell_is_named_with_the_size_of_the_error(row: int, cell: str) -> None:
     table = dh_table(elbow(), "tip")
     wrong = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 2e-3})
     found = compare(chain(elbow(), "tip"), disguised(wrong, 1))
@@ -110,13 +110,13 @@ def test_a_wrong_cell_is_named_with_its_size(row: int, cell: str) -> None:
 
 
 @pytest.mark.parametrize(("row", "cell"), sorted(FREE))
-def test_a_cell_that_base_or_tool_takes_up_cannot_be_wrong(row: int, cell: str) -> None:
+def test_a_cell_that_the_fitted_base_or_tool_compensates_is_no_difference(row: int, cell: str) -> None:
     table = dh_table(elbow(), "tip")
     other = with_cells(table, row, **{cell: getattr(table.rows[row], cell) + 0.1})
     assert compare(chain(elbow(), "tip"), other).exact
 
 
-def test_the_fitted_table_takes_the_urdfs_own_coordinates() -> None:
+def test_the_fitted_table_uses_the_coordinates_of_the_urdf() -> None:
     path = chain(elbow(), "tip")
     found = compare(path, disguised(dh_table(elbow(), "tip"), 7))
     q: FloatArray = configurations(6)
@@ -124,20 +124,20 @@ def test_the_fitted_table_takes_the_urdfs_own_coordinates() -> None:
     assert found.reference.joint_names == path.joint_names
 
 
-def test_another_robot_differs_and_says_so() -> None:
+def test_a_table_of_a_different_robot_differs() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
     found = compare(chain(elbow(), "tip"), other)
     assert not found.agrees
     assert "DIFFERS" in document(found, units_of()).text()
 
 
-def test_a_table_of_other_joints_is_refused() -> None:
+def test_a_table_with_different_joints_is_refused() -> None:
     words = "found RRR in the table, RRRRRR in the URDF; choose a base and a tip"
     with pytest.raises(InputError, match=words):
         compare(chain(elbow(), "tip"), table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 3, "standard"))
 
 
-def test_the_text_names_row_cell_and_millimetres() -> None:
+def test_the_text_of_a_comparison_states_row_cell_and_millimetres() -> None:
     table = dh_table(elbow(), "tip")
     wrong = with_cells(table, 2, a=table.rows[2].a + 3e-4)
     text = document(compare(chain(elbow(), "tip"), wrong), units_of("degrees", "millimetres")).text()
@@ -191,7 +191,9 @@ def long(seeds: Iterable[int]) -> list[ParameterSet]:
 
 @pytest.mark.parametrize("seed", [*HARD, *range(400, 405), *long(range(405, 430))])
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_a_urdfs_own_table_agrees_exactly_however_near_its_axes_are(seed: int, convention: str) -> None:
+def test_the_table_of_a_urdf_agrees_exactly_even_with_nearly_coincident_axes(
+    seed: int, convention: str
+) -> None:
     tree = nearly_coincident(seed)
     reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
     found = compare(chain(tree, "tip"), reference)
@@ -200,7 +202,7 @@ def test_a_urdfs_own_table_agrees_exactly_however_near_its_axes_are(seed: int, c
 
 
 @pytest.mark.parametrize("seed", [0, 3, 8, *long({*range(12)} - {0, 3, 8})])
-def test_a_wrong_cell_beside_such_axes_is_still_found(seed: int) -> None:
+def test_a_wrong_cell_beside_nearly_coincident_axes_is_detected(seed: int) -> None:
     square = rotation("x", math.pi / 2)
     near = shift(1e-6, 0, 0.2) @ rotation("z", 0.4 * seed) @ rotation("x", 1e-5)
     steps = [shift(0, 0, 0.3), shift(0.05, 0.02, 0.1) @ square, shift(0.4, 0, 0.1) @ square, near]

@@ -34,7 +34,9 @@ UR5 = references()["ur5"]
 @pytest.mark.slow
 @given(trees(), conventions, st.sampled_from(["tip", "flange"]))
 @settings(max_examples=50)
-def test_a_convention_to_the_other_and_back_is_the_same_table(tree: Any, convention: str, last: str) -> None:
+def test_a_conversion_to_the_other_convention_and_back_gives_an_equal_table(
+    tree: Any, convention: str, last: str
+) -> None:
     table = dh_table(tree, "tip", convention=convention, last=last)
     other = "modified" if convention == "standard" else "standard"
     there = to_convention(table, other)
@@ -48,7 +50,9 @@ def test_a_convention_to_the_other_and_back_is_the_same_table(tree: Any, convent
 @pytest.mark.slow
 @given(trees(), conventions)
 @settings(max_examples=40)
-def test_the_tree_of_a_table_and_a_table_of_this_tree_place_the_tip_alike(tree: Any, convention: str) -> None:
+def test_a_table_converted_to_a_tree_and_back_gives_the_same_tip_placement(
+    tree: Any, convention: str
+) -> None:
     table = dh_table(tree, "tip", convention=convention)
     robot = to_tree(table)
     tip = robot.links[robot.frame_link("tip")]
@@ -69,7 +73,7 @@ STANFORD = [
 ]  # fmt: skip
 
 
-def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> None:
+def test_the_stanford_arm_converted_to_a_tree_and_back_has_the_same_cells() -> None:
     table = table_from_rows(STANFORD, "standard")
     again = dh_table(to_tree(table), "tip")
     np.testing.assert_allclose(
@@ -79,7 +83,7 @@ def test_the_stanford_arm_survives_the_way_to_a_tree_and_back_cell_by_cell() -> 
         np.testing.assert_allclose(end, np.eye(4), atol=1e-15)
 
 
-def test_a_leader_off_the_path_stays_a_coordinate_in_the_tree() -> None:
+def test_a_mimicked_joint_outside_the_path_remains_a_coordinate_of_the_tree() -> None:
     table = DHTable(DHConvention.STANDARD, (replace(ROW, a=0.3, mimic=Mimic("far", 2.0, 0.1)),))
     robot = to_tree(table)
     assert table.joint_names == ("far",)
@@ -116,7 +120,9 @@ def taken_for_a_coordinate_axis(tree: KinematicTree) -> bool:
 @pytest.mark.slow
 @given(trees(min_joints=1, mimics=False), conventions)
 @settings(max_examples=30)
-def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, convention: str) -> None:
+def test_a_urdf_converted_to_a_table_and_back_is_the_same_robot_for_pinocchio(
+    tree: KinematicTree, convention: str
+) -> None:
     assume(not taken_for_a_coordinate_axis(tree))
     table = dh_table(tree, "tip", convention=convention)
     q = configurations(tree.nq, 4)
@@ -132,7 +138,9 @@ def test_urdf_to_table_to_urdf_is_one_robot_to_pinocchio(tree: KinematicTree, co
      ("tiago", "base_link", "arm_tool_link"), ("talos", "left_sole_link", "imu_link")],
 )  # fmt: skip
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_a_robot_survives_a_way_to_a_table_and_back(name: str, base: str, tip: str, convention: str) -> None:
+def test_a_robot_converted_to_a_table_and_back_gives_the_same_placements(
+    name: str, base: str, tip: str, convention: str
+) -> None:
     robot = load(name)
     table = robot.dh(tip, base, convention)
     again = load(table)
@@ -152,7 +160,7 @@ SLIDING = table_from_rows([[0, "pi/2", 0.3, 0], [0, 0, 0.1, 0, "P"]], "standard"
 
 
 @pytest.mark.parametrize("name", [*references(), "a sliding joint without limits"])
-def test_a_table_is_a_robot(name: str) -> None:
+def test_a_table_can_be_loaded_as_a_robot(name: str) -> None:
     table = read_table(references()[name]) if name in references() else SLIDING
     robot = load(table)
     q = robot.sample(4)
@@ -161,7 +169,7 @@ def test_a_table_is_a_robot(name: str) -> None:
 
 
 @pytest.mark.parametrize("root_joint", [None, "floating"])
-def test_a_tables_file_is_a_source_like_any_other(tmp_path: Path, root_joint: str | None) -> None:
+def test_a_table_file_can_be_loaded_like_a_urdf(tmp_path: Path, root_joint: str | None) -> None:
     file = tmp_path / "arm.toml"
     file.write_bytes(UR5.read_bytes())
     robot, same = (load(source, root_joint=root_joint) for source in (file, read_table(UR5)))
@@ -172,14 +180,14 @@ def test_a_tables_file_is_a_source_like_any_other(tmp_path: Path, root_joint: st
     assert robot.origin.python.startswith(f"urdfkin.load({str(file)!r}")
 
 
-def test_a_table_is_validated_as_it_is_and_as_a_file() -> None:
+def test_a_table_and_a_table_file_can_be_validated() -> None:
     report = validate([str(UR5), read_table(UR5)], samples=2)
     assert report.passed
     assert [robot.source for robot in report.robots] == [str(UR5), "<table>"]
     assert report.robots[0].results == report.robots[1].results
 
 
-def test_a_urdf_that_is_not_the_tables_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_urdf_that_differs_from_the_table_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     table = read_table(UR5)
     other = replace(table, rows=(replace(table.rows[0], d=table.rows[0].d + 1e-9), *table.rows[1:]))
     monkeypatch.setattr(convert, "to_urdf", lambda _: to_urdf(other))
@@ -217,6 +225,6 @@ def test_an_inconsistent_row_is_refused(change: dict[str, Any], message: str) ->
         ({"tool": np.eye(3)}, r"\(4, 4\)"),
     ],
 )
-def test_two_rows_of_one_joint_and_a_bent_base_are_refused(change: dict[str, Any], message: str) -> None:
+def test_two_rows_of_one_joint_and_an_invalid_base_are_refused(change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         replace(DHTable(DHConvention.STANDARD, (ROW,)), **change)

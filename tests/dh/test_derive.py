@@ -51,7 +51,7 @@ def demand_short(table: DHTable, path: FrameChain) -> None:
     *map(st.sampled_from, (CONVENTIONS, ("tip", "flange"), ("last", "first", "each"))),
 )
 @settings(max_examples=700)
-def test_on_many_chains_the_table_is_exact_and_short(
+def test_the_tables_of_random_chains_are_exact_and_short(
     tree: Any, backwards: bool, convention: str, last: str, offset: str
 ) -> None:
     ends = ("l0", "tip") if backwards else ("tip", "l0")
@@ -62,7 +62,9 @@ def test_on_many_chains_the_table_is_exact_and_short(
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("tilt", [0.0101, 0.0129, 0.02, 0.04, 0.2])
-def test_a_first_axis_close_to_the_bases_x_keeps_within_the_tolerance(tilt: float, convention: str) -> None:
+def test_a_table_with_a_first_axis_close_to_the_x_axis_is_within_the_tolerance(
+    tilt: float, convention: str
+) -> None:
     for k in range(100):
         T = np.eye(4)
         T[:3, :3] = rotation_from_rpy([np.pi / 2, 0.0, np.pi / 2 + tilt * (1.0 + k * 1e-8)])
@@ -77,7 +79,7 @@ def test_a_first_axis_close_to_the_bases_x_keeps_within_the_tolerance(tilt: floa
 @pytest.mark.slow
 @given(trees(min_joints=1))
 @settings(max_examples=30)
-def test_the_same_chain_gives_the_same_table_to_the_bit(tree: KinematicTree) -> None:
+def test_equal_chains_give_bitwise_equal_tables(tree: KinematicTree) -> None:
     first, second = dh_table(tree, "tip"), dh_table(replace(tree), "tip")
     assert first.rows == second.rows
     assert first.base.tobytes() == second.base.tobytes()
@@ -121,7 +123,7 @@ def mp_shift(axis: int, length: Any) -> Any:
 @pytest.mark.slow
 @given(trees(min_joints=1, max_joints=5), st.sampled_from(CONVENTIONS))
 @settings(max_examples=30)
-def test_in_sixty_digits_cells_are_right_to_a_few_last_units(tree: KinematicTree, convention: str) -> None:
+def test_cells_are_accurate_to_a_few_units_in_the_last_place(tree: KinematicTree, convention: str) -> None:
     path, table = chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
     for q in configurations(len(path.joint_names), 3):
         values = path.coupling.values(q).tolist()
@@ -134,7 +136,7 @@ def test_in_sixty_digits_cells_are_right_to_a_few_last_units(tree: KinematicTree
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("power", range(1, 17))
-def test_a_pair_of_any_tilt_is_exact_and_short(power: int, convention: str) -> None:
+def test_axes_of_any_tilt_give_an_exact_and_short_table(power: int, convention: str) -> None:
     tilted = shift(0.4, 0.1, 0.05) @ rotation("x", 10.0**-power) @ rotation("y", 3.0 * 10.0**-power)
     tree = arm(rotation("x", 0.4) @ shift(0, 0, 0.3), tilted, tilted, rotation("x", 1.0), kinds="RRRR")
     path, table = chain(tree, "tip"), dh_table(tree, "tip", convention=convention)
@@ -145,7 +147,7 @@ def test_a_pair_of_any_tilt_is_exact_and_short(power: int, convention: str) -> N
 @pytest.mark.slow
 @given(st.floats(-3, 3), st.floats(-3, 3), st.integers(3, 15), st.floats(-0.5, 0.5), st.floats(0.05, 0.5))
 @settings(max_examples=40)
-def test_a_tiny_tilt_changes_the_lengths_of_a_parallel_pair_by_as_little(
+def test_a_tiny_tilt_of_parallel_axes_changes_the_cells_only_slightly(
     direction: float, turn: float, power: int, offset: float, a: float
 ) -> None:
     def table(tilt: float) -> DHTable:
@@ -159,7 +161,7 @@ def test_a_tiny_tilt_changes_the_lengths_of_a_parallel_pair_by_as_little(
             assert abs(getattr(before, name) - getattr(after, name)) <= 4 * 10.0**-power + 1e-14
 
 
-def test_strict_rows_have_four_parameters_and_are_as_exact_as_their_length_allows() -> None:
+def test_strict_rows_have_no_beta_and_are_exact_within_the_rounding_of_long_rows() -> None:
     tilted = shift(0.4, 0.1, 0.0) @ rotation("x", 1e-6)
     tree = arm(np.eye(4), tilted, rotation("x", 1.0))
     hayati, strict = dh_table(tree, "tip"), dh_table(tree, "tip", near_parallel="strict")
@@ -169,7 +171,7 @@ def test_strict_rows_have_four_parameters_and_are_as_exact_as_their_length_allow
     demand_exact(strict, chain(tree, "tip"))
 
 
-def test_a_strict_table_uses_the_freedom_of_a_sliding_axis_to_stay_short() -> None:
+def test_a_strict_table_with_a_prismatic_joint_beside_a_tilt_is_short() -> None:
     tilted = shift(0.4, 0.1, 0.0) @ rotation("x", 1e-6)
     for kinds in ("RPR", "PRR", "RRP"):
         steps = [np.eye(4), tilted, rotation("x", 1.0)]
@@ -196,7 +198,7 @@ def test_the_base_is_the_identity_and_d1_stays_in_the_table() -> None:
         assert table.rows[0].d == 0.3
 
 
-def test_parallel_axes_pass_their_offset_on_to_the_row_after_the_run() -> None:
+def test_the_option_parallel_offset_selects_the_row_of_the_offset_of_parallel_axes() -> None:
     link = shift(0.4, 0, 0.1)
     tree = arm(np.eye(4), link, link, rotation("x", math.pi / 2))
     expected = {"last": [0, 0, 0.2, 0], "first": [0.2, 0, 0, 0], "each": [0.1, 0.1, 0, 0]}
@@ -213,19 +215,19 @@ def test_an_offset_changes_sign_when_it_passes_an_antiparallel_axis() -> None:
     assert [row[2] for row in cells(dh_table(tree, "tip", parallel_offset="first"))] == [0.05, 0, 0, 0]
 
 
-def test_collinear_axes_copy_x() -> None:
+def test_collinear_axes_have_the_same_x_axis() -> None:
     tree = arm(np.eye(4), shift(0, 0, 0.2) @ rotation("z", 0.7), rotation("x", 1.0))
     assert cells(dh_table(tree, "tip"))[0] == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_x_is_turned_round_where_theta_would_exceed_a_right_angle() -> None:
+def test_x_is_reversed_if_theta_would_exceed_a_right_angle() -> None:
     back = arm(np.eye(4), shift(-0.4, 0, 0), rotation("x", 1.0))
     assert cells(dh_table(back, "tip"))[0] == (-0.4, 0.0, 0.0, 0.0)
     aside = arm(np.eye(4), shift(0, -0.4, 0), rotation("x", 1.0))
     assert cells(dh_table(aside, "tip"))[0] == (0.4, 0.0, 0.0, round(-math.pi / 2, 12))
 
 
-def test_a_rounded_right_angle_keeps_a_positive() -> None:
+def test_the_cell_a_is_positive_at_a_rounded_right_angle() -> None:
     for angle in (1.5707, 1.5708, -1.5708, 1.571):
         tree = arm(np.eye(4), rotation("z", angle) @ shift(0.4, 0, 0), rotation("x", 1.0))
         assert dh_table(tree, "tip").rows[0].a == pytest.approx(0.4)
@@ -241,20 +243,20 @@ def test_the_tool_is_the_identity_when_the_last_row_can_reach_the_tip() -> None:
     assert cells(flange)[-1] == (0.0, 0.0, 0.0, 0.0)
 
 
-def test_otherwise_d_reaches_the_foot_of_the_tip_and_the_tool_holds_the_rest() -> None:
+def test_if_the_last_row_cannot_reach_the_tip_the_tool_contains_the_rest() -> None:
     table = dh_table(arm(rotation("x", 1.0), np.eye(4), tip=shift(0.1, 0.2, 0.3)), "tip")
     assert cells(table)[-1] == (0.0, 0.0, 0.3, 0.0)
     np.testing.assert_allclose(table.tool, shift(0.1, 0.2, 0.0), atol=4 * EPS)
 
 
-def test_the_first_sliding_axis_goes_through_the_origin_of_the_base() -> None:
+def test_the_axis_of_a_first_prismatic_joint_passes_through_the_origin_of_the_base() -> None:
     tree = arm(shift(0.5, 0.2, 0.3), shift(0.1, 0, 0), rotation("x", math.pi / 2), kinds="PRR")
     table = dh_table(tree, "tip")
     np.testing.assert_array_equal(table.base, np.eye(4))
     assert table.rows[0].a == pytest.approx(math.hypot(0.6, 0.2))
 
 
-def test_the_last_sliding_axis_goes_through_the_tip_where_that_frees_the_tool() -> None:
+def test_the_axis_of_a_last_prismatic_joint_passes_through_the_tip_if_no_tool_remains() -> None:
     tree = arm(rotation("x", 1.0), rotation("x", 1.0) @ shift(0.1, 0, 0), kinds="RP", tip=shift(0, 0.2, 0.3))
     np.testing.assert_array_equal(dh_table(tree, "tip").tool, np.eye(4))
     demand_exact(dh_table(tree, "tip"), chain(tree, "tip"))
@@ -278,7 +280,7 @@ def test_a_path_without_joints_is_a_table_without_rows() -> None:
 @example(kinds="PPP")
 @given(st.text("RP", min_size=1, max_size=5))
 @settings(max_examples=40)
-def test_sliding_joints_may_stand_anywhere(kinds: str) -> None:
+def test_tables_with_prismatic_joints_at_any_position_are_exact(kinds: str) -> None:
     turns = (rotation("xyz"[i % 3], math.pi / 2 * (i % 2)) for i in range(len(kinds)))
     steps = (shift(0.1 * i, 0.2, 0.05) @ turn for i, turn in enumerate(turns))
     tree = arm(*steps, kinds=kinds, tip=shift(0.1, 0.2, 0.3))
@@ -302,12 +304,12 @@ def test_sliding_joints_may_stand_anywhere(kinds: str) -> None:
         ({"snap": 1.0}, r"`snap` must be (an angle|a finite)"),
     ],
 )
-def test_an_unknown_choice_says_what_there_is(option: dict[str, object], message: str) -> None:
+def test_an_unknown_option_value_lists_the_known_values(option: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         dh_table(arm(np.eye(4)), "tip", **option)  # type: ignore[arg-type]
 
 
-def test_a_flip_of_a_joint_that_is_not_on_the_path_offers_those_that_are() -> None:
+def test_a_flip_of_a_joint_outside_the_path_lists_similar_joints() -> None:
     with pytest.raises(UnknownNameError, match=r"unknown joint 'j3'.*did you mean j[12]"):
         dh_table(arm(np.eye(4), np.eye(4)), "tip", flip=["j3"])
 
@@ -316,7 +318,7 @@ def test_a_flip_of_a_joint_that_is_not_on_the_path_offers_those_that_are() -> No
 
 
 @pytest.mark.parametrize("twelfths", range(-24, 25))
-def test_a_multiple_of_fifteen_degrees_is_a_fraction_of_pi_and_reads_back_to_the_bit(twelfths: int) -> None:
+def test_a_multiple_of_fifteen_degrees_is_written_as_a_fraction_of_pi_and_read_exactly(twelfths: int) -> None:
     radians = twelfths * math.pi / 12.0
     text = Units().angle(radians)
     assert "pi" in text or text == "0"
@@ -324,14 +326,14 @@ def test_a_multiple_of_fifteen_degrees_is_a_fraction_of_pi_and_reads_back_to_the
     assert Units(Angles.DEGREES).angle(radians) == str(15 * twelfths)
 
 
-def test_a_rounded_right_angle_is_not_called_one() -> None:
+def test_a_rounded_right_angle_is_not_written_as_a_fraction_of_pi() -> None:
     assert pi_fraction(1.5707963) is None
     assert Units().angle(1.5708) == "1.5708"
     assert Units(Angles.DEGREES, digits=9).angle(1.5708) == "90.0002105"
 
 
 @given(st.floats(-10, 10))
-def test_any_number_reads_back(value: float) -> None:
+def test_every_written_number_is_read_exactly(value: float) -> None:
     assert read_number(repr(value), "x") == value
     assert read_number(value, "x") == value
 
@@ -348,12 +350,12 @@ def test_multiples_of_pi_are_read(text: str, value: float) -> None:
 
 
 @pytest.mark.parametrize("value", ["p", "pi/", "", "1,5", None, True, [1]])
-def test_what_is_no_number_is_refused_with_its_place(value: object) -> None:
+def test_a_value_that_is_not_a_number_is_refused_with_row_and_cell(value: object) -> None:
     with pytest.raises(InputError, match=r"row 2, alpha: this is not a number"):
         read_number(value, "row 2, alpha")
 
 
-def test_units_are_named() -> None:
+def test_units_are_selected_by_name() -> None:
     assert units_of("degrees", "millimetres") == Units(Angles.DEGREES, Lengths.MILLIMETRES)
     with pytest.raises(InputError, match="`radians` or `degrees`"):
         units_of("grad")
@@ -386,7 +388,7 @@ def test_placement_jacobian_and_acceleration_agree_with_pinocchio(tree: Any, con
         np.testing.assert_allclose(vel[i], J[i] @ v_own[i], atol=bound * rates, rtol=0)
 
 
-def test_batches_broadcast_and_lengths_are_checked() -> None:
+def test_batches_are_broadcast_and_numbers_of_values_are_checked() -> None:
     link = shift(0.3, 0.0, 0.1) @ rotation("x", 1.0)
     table = dh_table(arm(link, link, link), "tip")
     q = np.zeros((4, 1, 3))

@@ -20,7 +20,7 @@ LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_it_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
+def test_a_drawing_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
     text = drawing(dh_table(arm(LINK, LINK, LINK, kinds="RPR", tip=LINK), "tip", convention=convention))
     root = ET.fromstring(text)
     assert root.tag.endswith("svg")
@@ -32,7 +32,7 @@ def test_it_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_same_table_gives_the_same_file() -> None:
+def test_equal_tables_give_equal_drawings() -> None:
     table = dh_table(arm(LINK, LINK), "tip")
     assert drawing(table) == drawing(table)
     assert drawing(table) != drawing(table, [0.5, 0.5])

@@ -61,7 +61,7 @@ def check(
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("form", ["numpy", "c", "matlab", "sympy", "casadi"])
-def test_code_computes_what_pinocchio_computes(form: str, name: str, convention: str, tmp_path: Path) -> None:
+def test_exported_code_agrees_with_pinocchio(form: str, name: str, convention: str, tmp_path: Path) -> None:
     check(form, TREES[name](), convention, tmp_path, flip=["j2", "j3"] if name == "plain" else [])
 
 
@@ -75,22 +75,22 @@ def test_roboticstoolbox_code_agrees_with_pinocchio(form: str, convention: str, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_a_rigid_body_tree_of_stand_ins_computes_what_pinocchio_does(convention: str, tmp_path: Path) -> None:
+def test_matlab_rigid_body_tree_code_agrees_with_pinocchio(convention: str, tmp_path: Path) -> None:
     check("matlab-rst", TREES["plain"](), convention, tmp_path, flip=["j2", "j3"])
 
 
 @pytest.mark.slow
-def test_matlabs_symbols_compute_what_pinocchio_computes(tmp_path: Path) -> None:
+def test_symbolic_matlab_code_agrees_with_pinocchio(tmp_path: Path) -> None:
     check("matlab-symbolic", arm(rotation("x", math.pi / 2) @ shift(0.3, 0.1, 0)), "standard", tmp_path, 1)
 
 
 @pytest.mark.parametrize("form", ["roboticstoolbox", "ets", "matlab-rst"])
-def test_a_form_without_followers_says_so(form: str) -> None:
+def test_a_format_without_mimic_joints_refuses_mimic_joints(form: str) -> None:
     with pytest.raises(InputError, match="does not support mimic joints"):
         export(dh_table(coupled(), "tip"), form)
 
 
-def test_the_fifth_parameter_is_a_transform_of_its_own_and_limits_go_along() -> None:
+def test_beta_is_exported_as_a_separate_transform_and_limits_are_exported() -> None:
     text = export(dh_table(nearly_parallel(), "tip"), "roboticstoolbox")
     assert "ET.Ry(" in text
     assert "DHRobot" not in text
@@ -101,7 +101,7 @@ def test_the_fifth_parameter_is_a_transform_of_its_own_and_limits_go_along() -> 
         assert export(limited, form).count("qlim=[-1.5, 2.5]") == export(limited, form).count("qlim") == 1
 
 
-def test_numbers_in_symbols_are_those_that_somebody_wrote() -> None:
+def test_symbolic_code_contains_short_decimal_numbers_as_rationals() -> None:
     rows = [[0.425, 90, 0, 0], [1.0 / 3.0, 15, -0.1, -75], [0, 1e-7, 2, 0, "P"]]
     table = table_from_rows(rows, "standard", angles="degrees")
     lines = export(table, "sympy").splitlines()
@@ -117,7 +117,7 @@ def test_numbers_in_symbols_are_those_that_somebody_wrote() -> None:
 
 
 @pytest.mark.slow
-def test_what_sympy_makes_of_a_table_is_exact() -> None:
+def test_the_sympy_placement_of_a_table_is_exact() -> None:
     sympy = pytest.importorskip("sympy")
     scope: dict[str, Any] = {}
     exec(export(PLAIN, "sympy"), scope)
@@ -128,7 +128,7 @@ def test_what_sympy_makes_of_a_table_is_exact() -> None:
 
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_every_form_names_its_convention(form: str, convention: str) -> None:
+def test_every_format_names_the_convention_of_the_table(form: str, convention: str) -> None:
     text = export(dh_table(TREES["plain"](), "tip", convention=convention), form)
     other = "modified" if convention == "standard" else "standard"
     assert convention in text or form == "matlab-rst"
@@ -136,7 +136,7 @@ def test_every_form_names_its_convention(form: str, convention: str) -> None:
     assert text.endswith("\n")
 
 
-def test_an_unknown_form_offers_the_nearest() -> None:
+def test_an_unknown_format_lists_similar_names() -> None:
     with pytest.raises(UnknownNameError, match="did you mean markdown"):
         export(dh_table(TREES["plain"](), "tip"), "markdwon")
 
@@ -145,7 +145,7 @@ ROWS = [[0, 90, 0.3, 0], [0.4, 0, 0, -90], [0, 180, 0.1, 0, "P"]]
 PLAIN = table_from_rows(ROWS, "standard", angles="degrees")
 
 
-def test_the_terminal_table_reads_as_one_writes_it() -> None:
+def test_the_terminal_table_has_the_documented_layout() -> None:
     text = export(PLAIN, "terminal", units_of("degrees", "millimetres"))
     assert text.splitlines() == [
         "robot: base to tip, standard Denavit-Hartenberg parameters",
@@ -162,7 +162,7 @@ def test_the_terminal_table_reads_as_one_writes_it() -> None:
     ]
 
 
-def test_the_latex_table_has_its_convention_in_the_caption_and_escapes_names() -> None:
+def test_the_latex_table_states_the_convention_in_the_caption_and_escapes_names() -> None:
     text = export(PLAIN, "latex")
     assert "standard convention" in text
     assert r"\toprule" in text
@@ -170,14 +170,14 @@ def test_the_latex_table_has_its_convention_in_the_caption_and_escapes_names() -
     assert r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)" in text
 
 
-def test_followers_are_written_in_terms_of_their_leader() -> None:
+def test_mimic_joints_are_written_as_expressions_of_the_mimicked_joint() -> None:
     text = export(dh_table(coupled(), "tip"), "terminal")
     assert "-0.5 q1 " in text
     assert "with q1 = j1, q2 = j2, q3 = j3" in text
     assert "beta [rad]" in text
 
 
-def test_what_was_snapped_is_said_with_the_rows() -> None:
+def test_snapped_values_are_listed_with_rows_and_effect() -> None:
     tree = arm(np.eye(4), rotation("x", 1.5708) @ shift(0.3, 0, 0), tip=shift(0.2, 0, 0))
     text = export(dh_table(tree, "tip", snap=1e-4), "terminal")
     assert "row 1: origin of j2, turned by 3.67e-06 rad, tip moves by at most 7.35e-07 m" in text

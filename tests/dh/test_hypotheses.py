@@ -59,7 +59,7 @@ SLIPS: dict[str, tuple[dict[str, Any], str]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("slip", SLIPS)
 @pytest.mark.parametrize("name", ["kinova", "panda", "ur5"])
-def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) -> None:
+def test_each_mistake_of_units_or_columns_is_named_with_the_wrong_convention(name: str, slip: str) -> None:
     path, reference = published(name)
     options, words = SLIPS[slip]
     wrong = "modified" if str(reference.convention) == "standard" else "standard"
@@ -70,14 +70,14 @@ def test_each_slip_is_named_beside_the_wrong_convention(name: str, slip: str) ->
 
 
 @pytest.mark.parametrize("kinds", ["RRPRRR", "PRRRRR"])
-def test_a_slip_is_named_where_a_joint_slides(kinds: str) -> None:
+def test_wrong_units_are_named_for_an_arm_with_a_prismatic_joint(kinds: str) -> None:
     tree = elbow(kinds)
     found = present(diagnose(chain(tree, "tip"), written(dh_table(tree, "tip"), "standard", mm=True), 1e-6))
     assert found.interpretation.differences(found.stated) == "millimetres"
 
 
 @pytest.mark.slow
-def test_another_robots_table_fits_in_no_reading() -> None:
+def test_a_table_of_a_different_robot_fits_no_interpretation() -> None:
     reference = read_table(reference_path("ur3"))
     path = load("ur5").chain("tool0", "base")
     assert diagnose(path, written(reference, "standard"), TOLERANCE, 0.3) is None
@@ -85,11 +85,11 @@ def test_another_robots_table_fits_in_no_reading() -> None:
 
 
 @pytest.mark.parametrize("rows", [None, 3, ["abc"], [3.0]])
-def test_what_is_no_table_has_no_reading(rows: Any) -> None:
+def test_an_invalid_table_has_no_other_interpretation(rows: Any) -> None:
     assert list(other_interpretations({"convention": "standard", "rows": rows})) == []
 
 
-def test_the_fewest_slips_are_tried_first() -> None:
+def test_interpretations_with_the_fewest_changes_are_tried_first() -> None:
     data = written(dh_table(elbow(), "tip"), "standard")
     counts = [
         interpretation.difference_count(stated_interpretation(data))
@@ -100,7 +100,7 @@ def test_the_fewest_slips_are_tried_first() -> None:
 
 
 @pytest.mark.slow
-def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> None:
+def test_a_comparison_names_the_fitting_interpretation_and_exits_with_1(tmp_path: Path) -> None:
     file = tmp_path / "ur5.toml"
     rows: list[list[float]] = [
         [0, 90, 89.159], [-425, 0, 0], [-392.25, 0, 0], [0, 90, 109.15], [0, -90, 94.65], [0, 0, 82.3],
@@ -117,7 +117,7 @@ def test_the_command_says_what_would_fit_and_still_exits_1(tmp_path: Path) -> No
     assert re.search(words, refused.err)
 
 
-def test_a_table_alone_is_doubted_only_where_it_cannot_be_meant() -> None:
+def test_a_table_with_implausible_units_or_columns_causes_a_warning() -> None:
     deg = {"angles": "degrees"}
     assert "look like radians" in table_warnings(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
     assert (
@@ -129,7 +129,7 @@ def test_a_table_alone_is_doubted_only_where_it_cannot_be_meant() -> None:
         assert table_warnings(read_table(reference_path(name))) == []
 
 
-def test_load_warns_of_a_table_in_millimetres() -> None:
+def test_loading_a_table_that_looks_like_millimetres_causes_a_warning() -> None:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         load(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"), verify=False)
@@ -154,7 +154,9 @@ def nameless(file: Path, convention: str) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_a_table_without_convention_is_compared_in_the_one_that_fits(tmp_path: Path, convention: str) -> None:
+def test_a_table_without_convention_is_compared_in_the_convention_that_fits(
+    tmp_path: Path, convention: str
+) -> None:
     words = *UR5, "--compare", str(nameless(tmp_path / "ur5.toml", convention))
     result = run(*words)
     assert result.code == 0
@@ -163,7 +165,9 @@ def test_a_table_without_convention_is_compared_in_the_one_that_fits(tmp_path: P
 
 
 @pytest.mark.slow
-def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> None:
+def test_a_table_without_convention_and_in_wrong_units_is_refused_with_the_right_units(
+    tmp_path: Path,
+) -> None:
     file = nameless(tmp_path / "ur5.toml", "modified")
     file.write_text(file.read_text().replace('"-pi/2"', "-90").replace('"pi/2"', "90"))
     refused = run(*UR5, "--compare", str(file))
@@ -173,7 +177,7 @@ def test_a_table_without_convention_and_units_is_told_both(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_a_table_that_fits_in_no_convention_is_refused_with_how_far_it_is_off(tmp_path: Path) -> None:
+def test_a_table_that_fits_no_convention_is_refused_with_the_tip_errors(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")
     refused = run("ur3", *UR5[1:], "--compare", str(file))
     assert refused.code == 2
@@ -184,7 +188,7 @@ def test_a_table_that_fits_in_no_convention_is_refused_with_how_far_it_is_off(tm
 
 
 @pytest.mark.slow
-def test_a_mistake_tells_the_convention_too(tmp_path: Path) -> None:
+def test_a_mistake_in_a_table_without_convention_is_named_with_the_convention(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")
     file.write_text(file.read_text().replace("0.425, 0", '0.425, "pi/2"'))
     result = run(*UR5, "--compare", str(file))

@@ -63,7 +63,7 @@ def test_an_alpha_with_a_right_angle_too_many_is_named_alone(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [pytest.param("kinova", marks=pytest.mark.long), "panda", "ur5"])
-def test_rows_that_changed_places_are_named(name: str) -> None:
+def test_exchanged_and_reversed_rows_are_named(name: str) -> None:
     path, table = published(name)
     last = len(table.rows) - 1
     for i, j in ((0, 1), (1, 2), (last - 1, last)):
@@ -77,7 +77,7 @@ def test_rows_that_changed_places_are_named(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", references())
-def test_a_right_table_has_no_mistake(name: str) -> None:
+def test_a_correct_table_has_no_mistake(name: str) -> None:
     path, table = published(name)
     found = compare(path, table)
     assert found.mistakes == ()
@@ -87,7 +87,7 @@ def test_a_right_table_has_no_mistake(name: str) -> None:
 
 
 @pytest.mark.long
-def test_a_wrong_sign_is_named_where_the_table_leaves_out_its_tool() -> None:
+def test_a_wrong_sign_in_a_table_without_the_tool_is_named() -> None:
     path, table = published("panda")
     bare = replace(table, tool=np.eye(4))
     for row, cell, wrong in with_wrong_signs(bare):
@@ -96,7 +96,7 @@ def test_a_wrong_sign_is_named_where_the_table_leaves_out_its_tool() -> None:
         assert str(found.mistakes[0].fitted) == "tool"
 
 
-def test_a_table_on_other_frames_says_that_a_wrong_sign_can_hide() -> None:
+def test_a_table_in_other_frames_warns_that_a_fit_can_hide_a_wrong_sign() -> None:
     path, table = published("kinova")
     text = document(compare(path, table), units_of()).text()
     assert "These changes can hide a wrong sign." in text
@@ -114,7 +114,7 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     assert "Each of these changes makes the table right without a fit:" in document(found, units_of()).text()
 
 
-def test_a_wrong_sign_is_named_beside_a_difference_that_is_smaller() -> None:
+def test_a_wrong_sign_is_named_despite_a_smaller_difference() -> None:
     """A calibrated robot is off by a millimetre; the sign of a sheet is off by a hundred."""
     path, table = published("panda")
     near = with_cells(table, 6, a=table.rows[6].a + 1e-3)
@@ -124,7 +124,7 @@ def test_a_wrong_sign_is_named_beside_a_difference_that_is_smaller() -> None:
     assert 5e-4 < found.mistakes[0].metres < 2e-3
 
 
-def test_the_command_fails_for_a_wrong_sign_and_says_what_to_do(tmp_path: Path) -> None:
+def test_the_command_exits_with_1_for_a_wrong_sign_and_names_the_correction(tmp_path: Path) -> None:
     file = tmp_path / "slip.toml"
     text = reference_path("ur5").read_text()
     file.write_text(text.replace("d = 0.10915", "d = -0.10915"))

@@ -48,7 +48,7 @@ from urdfkin.robot.loading import load
 @pytest.mark.slow
 @given(trees(), st.sampled_from(CONVENTIONS), st.sampled_from(["toml", "json", "csv"]))
 @settings(max_examples=50)
-def test_a_written_table_reads_back_to_the_bit(tree: KinematicTree, convention: str, form: str) -> None:
+def test_a_written_table_is_read_exactly(tree: KinematicTree, convention: str, form: str) -> None:
     table = dh_table(tree, "tip", convention=convention)
     again = table_from_text(export(table, form), f".{form}")
     assert again.rows == table.rows
@@ -58,7 +58,7 @@ def test_a_written_table_reads_back_to_the_bit(tree: KinematicTree, convention: 
     np.testing.assert_array_equal(again.tool, table.tool)
 
 
-def test_a_broken_or_missing_file_is_named(tmp_path: Path) -> None:
+def test_an_invalid_or_missing_file_is_named_in_the_error(tmp_path: Path) -> None:
     bad = 'convention = "standard"\nrows = [["x", 0, 0, 0]]'
     for name, text, message in (
         ("broken.toml", "rows = [", "broken.toml: not valid TOML"),
@@ -130,7 +130,7 @@ SHEETS: dict[str, tuple[str, str, list[tuple[float, float, float, float, str]]]]
 
 
 @pytest.mark.parametrize("name", SHEETS)
-def test_a_sheet_is_read_as_its_author_meant_it(name: str, tmp_path: Path) -> None:
+def test_tables_in_common_layouts_are_read_correctly(name: str, tmp_path: Path) -> None:
     text, convention, rows = SHEETS[name]
     path = tmp_path / name
     path.write_text(text, "utf-8")
@@ -142,7 +142,7 @@ def test_a_sheet_is_read_as_its_author_meant_it(name: str, tmp_path: Path) -> No
     assert load(path, verify=False).nq == len(rows)
 
 
-def test_the_sign_of_a_variable_is_the_rows_sense() -> None:
+def test_the_sign_of_a_joint_variable_is_the_sense_of_the_row() -> None:
     assert table_from_text(SHEETS["paper.tex"][0], ".tex").rows[1].sense == -1
     text = 'convention = "standard"\nrows = [{theta = "-q1 + 90 deg", d = "107 mm"}]'
     (row,) = table_from_text(text, ".toml").rows
@@ -152,7 +152,7 @@ def test_the_sign_of_a_variable_is_the_rows_sense() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "csv"])
 @pytest.mark.parametrize("name", references())
-def test_what_urdfkin_prints_is_read_again(name: str, form: str) -> None:
+def test_a_printed_reference_table_is_read_with_the_same_placements(name: str, form: str) -> None:
     table = read_table(reference_path(name))
     for units in (units_of(), units_of("degrees", "millimetres")):
         again = table_from_text(export(table, form, units), SUFFIXES[form])
@@ -163,7 +163,7 @@ def test_what_urdfkin_prints_is_read_again(name: str, form: str) -> None:
         np.testing.assert_allclose(again.placement(q), table.placement(q), atol=1e-9)
 
 
-def test_a_robot_called_robot_is_no_key_of_a_sheet() -> None:
+def test_a_robot_with_the_name_robot_is_read_from_a_printed_table() -> None:
     table = table_from_rows([[0.3, 0, 0, 0]], "standard")
     assert table.robot == "robot"
     assert table_from_text(export(table, "terminal"), ".txt").robot == "robot"
@@ -172,7 +172,9 @@ def test_a_robot_called_robot_is_no_key_of_a_sheet() -> None:
 @pytest.mark.slow
 @given(trees(min_joints=1), *map(st.sampled_from, (("standard", "modified"), ("terminal", "markdown"))))
 @settings(max_examples=40)
-def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: str, form: str) -> None:
+def test_a_printed_table_of_a_random_robot_is_read_with_the_same_placements(
+    tree: KinematicTree, convention: str, form: str
+) -> None:
     table = dh_table(tree, "tip", convention=convention)
     again = table_from_text(export(table, form, units_of(digits=17)), SUFFIXES[form])
     assert again.joint_names == table.joint_names
@@ -183,7 +185,7 @@ def test_the_printed_form_of_any_robot_is_read(tree: KinematicTree, convention: 
 @pytest.mark.parametrize(
     "text", ["", "1_0", "nan", "1 2", "--1", "1/0", "q1 + q2", "pi deg", "3 *", "* 3", "٣", "1e999"]
 )
-def test_what_is_no_cell_is_refused(text: str) -> None:
+def test_an_invalid_cell_is_refused(text: str) -> None:
     with pytest.raises(InvalidCellError):
         parse_cell(text)
 
@@ -191,19 +193,19 @@ def test_what_is_no_cell_is_refused(text: str) -> None:
 @pytest.mark.slow
 @given(st.text(max_size=30))
 @settings(max_examples=300)
-def test_any_text_is_a_cell_or_is_refused(text: str) -> None:
+def test_every_text_is_a_finite_cell_or_is_refused(text: str) -> None:
     with contextlib.suppress(InvalidCellError):
         assert math.isfinite(parse_cell(text).number)
 
 
-def test_the_last_digit_of_a_cell_with_a_unit_is_known() -> None:
+def test_the_last_digit_of_a_cell_with_a_unit_is_converted() -> None:
     data = mapping_from_text("a;alpha;d;theta\n311,1 mm;90°;0,25;0\n", ".csv", "sheet")
     assert last_digits({"convention": "standard", **data})[0] == {
         "a": pytest.approx(5e-5), "alpha": 0.0, "d": pytest.approx(5e-3), "theta": 0.0,
     }  # fmt: skip
 
 
-def test_a_urdf_may_end_in_txt(tmp_path: Path) -> None:
+def test_a_urdf_with_the_suffix_txt_is_not_a_table(tmp_path: Path) -> None:
     urdf, table = tmp_path / "robot.txt", tmp_path / "table.txt"
     urdf.write_text("  <robot name='r'><link name='l'/></robot>")
     table.write_text(SHEETS["narrow.txt"][0])
@@ -211,7 +213,7 @@ def test_a_urdf_may_end_in_txt(tmp_path: Path) -> None:
     assert is_table_file(table)
 
 
-def test_a_table_given_as_robot_is_written_as_it_stands(tmp_path: Path) -> None:
+def test_dh_prints_a_table_file_unchanged_or_converted(tmp_path: Path) -> None:
     path, out = str(reference_path("kinova")), tmp_path / "again.csv"
     result = run(path, "--degrees")
     assert "q1 + 180" in result.text
@@ -245,7 +247,7 @@ def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
 
 
 @pytest.mark.parametrize("form", ["to_markdown", "to_latex", "to_html"])
-def test_a_table_in_a_form_has_radians_metres_and_ten_digits_unless_asked(form: str) -> None:
+def test_markdown_latex_and_html_use_radians_metres_and_ten_digits_by_default(form: str) -> None:
     write = getattr(table_from_rows([[math.sqrt(2.0), 0.1, math.sqrt(0.5), 0.0]], "standard"), form)
     assert write() == write("radians", "metres", 10)
     assert "1.4142135624" not in write()
@@ -285,7 +287,7 @@ def damaged(draw: st.DrawFn) -> tuple[str, str]:
 
 
 @pytest.mark.slow
-def test_a_damaged_table_is_refused_with_a_message_or_read_and_compared() -> None:
+def test_a_damaged_table_is_refused_with_a_message_or_compared() -> None:
     path, outcomes = load("ur5").chain("tool0", "base"), Counter[str]()
 
     @settings(max_examples=100)
@@ -386,13 +388,13 @@ def of_rows(rows: str, keys: dict[str, str]) -> str:
         ("[{a = 1}]", {"convention": ""}, "does not name its convention"),
     ],
 )  # fmt: skip
-def test_a_wrong_table_says_where_and_what(
+def test_an_error_in_a_table_is_reported_with_position_and_reason(
     rows: str, keys: dict[str, str], message: str, tmp_path: Path
 ) -> None:
     assert re.search(message, refused(tmp_path, of_rows(rows, keys)))
 
 
-def test_a_robot_that_is_null_is_an_error_and_a_csv_that_a_spreadsheet_wrote_is_none(tmp_path: Path) -> None:
+def test_a_null_robot_name_is_an_error_and_a_csv_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
     text = json.dumps({"convention": "standard", "robot": None, "rows": [[0.1, 0, 0, 0]]})
     assert "robot: a name must be text: found None" in refused(tmp_path, text, ".json")
     file = tmp_path / "sheet.csv"
@@ -429,16 +431,18 @@ def test_a_robot_that_is_null_is_an_error_and_a_csv_that_a_spreadsheet_wrote_is_
         ("a;alpha;d;theta\n90 deg;0;0;0\n", "row 1, a: a must be a length"),
     ],
 )
-def test_a_wrong_csv_says_where_and_what(text: str, message: str, tmp_path: Path) -> None:
+def test_an_error_in_a_csv_table_is_reported_with_position_and_reason(
+    text: str, message: str, tmp_path: Path
+) -> None:
     assert message in refused(tmp_path, f"# convention: standard\n{text}", ".csv")
 
 
 @pytest.mark.parametrize("rows", [UR5, [[0.1, 0.7, 0.2, "pi/2"]], [[0, 0, 0.3, 0.5236], [0.4, "pi", 0, 0]]])
-def test_a_right_list_is_no_other_order(rows: list[list[Any]]) -> None:
+def test_correct_rows_are_not_mistaken_for_a_different_column_order(rows: list[list[Any]]) -> None:
     assert len(table_from_rows(rows, "standard").rows) == len(rows)
 
 
-def test_lengths_hold_for_base_tool_limits_and_followers() -> None:
+def test_units_apply_to_base_tool_limits_and_mimic_joints() -> None:
     data = {
         "convention": "standard", "angles": "degrees", "lengths": "millimetres",
         "base": [[1, 0, 0, 100], [0, 1, 0, 0], [0, 0, 1, 250]],
@@ -458,7 +462,7 @@ def test_lengths_hold_for_base_tool_limits_and_followers() -> None:
     assert (present(rule).multiplier, present(rule).offset) == (2.0, 0.01)
 
 
-def test_lists_arrays_and_short_names_of_units_are_understood() -> None:
+def test_lists_arrays_and_short_names_of_units_are_accepted() -> None:
     rows = np.array([[0.4, 0.0, 0.1, 0.0], [0.3, np.pi / 2, 0.0, 0.0]])
     for written in (rows, list(rows), [[np.float32(0.5), np.int64(0), 0, 0]]):
         table = table_from_rows(written, "standard")
@@ -469,7 +473,7 @@ def test_lists_arrays_and_short_names_of_units_are_understood() -> None:
     assert (mixed.rows[0].alpha, mixed.rows[0].theta) == (math.pi / 2, math.radians(10.5))
 
 
-def test_a_leader_elsewhere_on_the_robot_is_a_coordinate_and_survives_being_written() -> None:
+def test_a_mimicked_joint_outside_the_path_is_a_coordinate_also_after_writing() -> None:
     robot = load("panda")
     table = robot.dh("panda_rightfinger", "panda_link0")
     names = {row.joint for row in table.rows}
@@ -520,7 +524,7 @@ _PLACES = _places(_GOOD)
 @pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from(_PLACES), _ANYTHING), min_size=1, max_size=3))
 @settings(max_examples=600)
-def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
+def test_any_value_at_any_position_gives_a_table_or_an_error_of_urdfkin(
     changes: list[tuple[tuple[Any, ...], Any]],
 ) -> None:
     data = json.loads(json.dumps(_GOOD))
@@ -542,19 +546,19 @@ def test_anything_at_any_place_is_a_table_or_an_error_of_ours(
 @pytest.mark.slow
 @given(st.text(max_size=60), st.sampled_from([".toml", ".json", ".csv"]))
 @settings(max_examples=300)
-def test_any_text_is_a_table_or_an_error_of_ours(text: str, suffix: str) -> None:
+def test_any_text_gives_a_table_or_an_error_of_urdfkin(text: str, suffix: str) -> None:
     for head in ("", "# convention: standard\na,alpha,d,theta\n", 'convention = "standard"\n'):
         with contextlib.suppress(UrdfkinError):
             table_from_text(head + text, suffix)
 
 
-def test_nesting_without_end_is_an_error_of_ours() -> None:
+def test_extremely_deep_nesting_gives_an_error_of_urdfkin() -> None:
     for suffix, text in ((".json", "[" * 200_000), (".toml", f"rows = {'[' * 20_000}")):
         with pytest.raises(InputError, match="not valid"):
             table_from_text(text, suffix)
 
 
-def test_digits_are_read_from_every_shipped_reference() -> None:
+def test_the_last_digits_of_every_shipped_reference_table_are_read() -> None:
     for path in references().values():
         found = last_digits(read_mapping(path))
         assert len(found) == len(read_table(path).rows)

@@ -45,7 +45,7 @@ def exponential(screws: FloatArray, q: FloatArray) -> FloatArray:
     return T
 
 
-def test_the_books_ur5_is_where_the_book_says() -> None:
+def test_the_screws_of_the_books_ur5_give_the_placement_in_the_book() -> None:
     arm, q = screws_from(SPACE, M), [0, -np.pi / 2, 0, 0, np.pi / 2, 0]
     T = np.array([[0, -1, 0, 0.095], [1, 0, 0, 0.109], [0, 0, 1, 0.988], [0, 0, 0, 1.0]])
     np.testing.assert_allclose(arm.placement(q), T, atol=1e-15)
@@ -55,7 +55,7 @@ def test_the_books_ur5_is_where_the_book_says() -> None:
 @pytest.mark.slow
 @given(trees(min_joints=1, max_joints=6, tame=True))
 @settings(max_examples=20)
-def test_space_and_body_screws_are_the_chain(tree: KinematicTree) -> None:
+def test_space_and_body_screws_give_the_placements_of_the_chain(tree: KinematicTree) -> None:
     path = chain(tree, "tip")
     screws = screws_of(path)
     q = np.linspace(-1, 1, len(path.joint_names))
@@ -68,7 +68,7 @@ def test_space_and_body_screws_are_the_chain(tree: KinematicTree) -> None:
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "kinova", "talos"])
-def test_a_robots_screws_are_checked_and_lead_back(name: str) -> None:
+def test_the_screws_of_a_robot_are_checked_and_can_be_loaded(name: str) -> None:
     robot = load(name)
     screws = robot.screws()
     again = load(screws)
@@ -79,7 +79,7 @@ def test_a_robots_screws_are_checked_and_lead_back(name: str) -> None:
     np.testing.assert_allclose(found, screws.placement(own), atol=1e-14)
 
 
-def test_a_wrong_screw_is_found_by_pinocchio() -> None:
+def test_a_wrong_screw_is_detected_by_pinocchio() -> None:
     robot = load("ur5")
     screws = robot.screws()
     wrong = np.array(screws.space)
@@ -89,7 +89,7 @@ def test_a_wrong_screw_is_found_by_pinocchio() -> None:
 
 
 @pytest.mark.parametrize("form", ["toml", "json"])
-def test_a_written_file_is_a_robot(form: str, tmp_path: Path) -> None:
+def test_a_written_screw_file_can_be_loaded_as_a_robot(form: str, tmp_path: Path) -> None:
     path = tmp_path / f"arm.{form}"
     good("screws ur5 --base base --tip tool0 --format", form, "-o", str(path))
     robot, ur5 = load(path), load("ur5")
@@ -102,7 +102,7 @@ def test_a_written_file_is_a_robot(form: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
+def test_exported_code_contains_the_screws_as_columns(tmp_path: Path) -> None:
     arm = screws_from(SPACE, M)
     names: dict[str, Any] = {}
     exec(write_screws(arm, "numpy"), names)
@@ -136,12 +136,12 @@ def test_code_has_the_screws_as_columns(tmp_path: Path) -> None:
         ([[0, 0, 1, 0, 0, np.nan]], M, "finite"),
     ],
 )
-def test_what_is_no_screw_says_why(screws: Any, home: Any, message: str) -> None:
+def test_an_invalid_screw_is_refused_with_the_reason(screws: Any, home: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         screws_from(screws, home)
 
 
-def test_a_file_of_screws_with_a_slip_says_where(tmp_path: Path) -> None:
+def test_an_error_in_a_screw_file_is_reported_with_the_position(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     path.write_text("M = [[1,0,0,0],[0,1,0,0],[0,0,1,0]]\nspace = [['x']]\n")
     with pytest.raises(InputError, match=r"arm.toml, space: screws and M must be lists of numbers"):

@@ -64,7 +64,9 @@ def test_no_configuration_moves_the_tip_by_more_than_declared(seed: int, noise: 
 @pytest.mark.slow
 @given(trees(min_joints=1), st.sampled_from([1e-6, 1e-3, 0.05]))
 @settings(max_examples=50)
-def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float) -> None:
+def test_snapping_a_random_chain_moves_the_tip_within_the_declared_bound(
+    tree: KinematicTree, tolerance: float
+) -> None:
     table = dh_table(tree, "tip", snap=tolerance)
     q = configurations(tree.nq, 20)
     own = chain(tree, "tip").coupling.select(tree, q)
@@ -79,7 +81,7 @@ def test_snapping_any_chain_keeps_its_word(tree: KinematicTree, tolerance: float
 @pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(max_examples=40)
-def test_the_declared_bound_is_not_idle(seed: int) -> None:
+def test_the_declared_bound_is_at_most_thirty_times_the_measured_error(seed: int) -> None:
     tree = nearly_round(seed, 1e-4, slides=False)
     snap = present(dh_table(tree, "tip", snap=3e-4).snap)
     assume(snap.metres > 1e-6)
@@ -90,7 +92,7 @@ def test_the_declared_bound_is_not_idle(seed: int) -> None:
 @pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(max_examples=30)
-def test_angles_that_are_nearly_round_become_round(seed: int) -> None:
+def test_angles_close_to_multiples_of_fifteen_degrees_are_snapped(seed: int) -> None:
     table = dh_table(nearly_round(seed, 1e-6), "tip", snap=1e-4)
     for row in table.rows:
         for angle in (row.alpha, row.theta):
@@ -100,7 +102,7 @@ def test_angles_that_are_nearly_round_become_round(seed: int) -> None:
         assert row.beta == 0.0
 
 
-def test_a_bound_with_a_sliding_joint_grows_with_its_travel() -> None:
+def test_the_bound_with_a_prismatic_joint_grows_with_the_travel() -> None:
     tilted = rotation("x", math.pi / 2 + 1e-5) @ shift(0.3, 0, 0)
     tree = arm(tilted, shift(0.1, 0, 0.2), kinds="RP", tip=shift(0, 0, 0.1))
     snap = present(dh_table(tree, "tip", snap=1e-4).snap)
@@ -110,14 +112,14 @@ def test_a_bound_with_a_sliding_joint_grows_with_its_travel() -> None:
     assert far - near == pytest.approx(5.0 * snap.per_metre["j2"])
 
 
-def test_an_exact_right_angle_is_nothing_to_snap() -> None:
+def test_an_exact_right_angle_is_not_changed_by_snapping() -> None:
     table = dh_table(arm(np.eye(4), rotation("x", math.pi / 2) @ shift(0.3, 0, 0)), "tip", snap=1e-3)
     assert table.snap is not None
     assert table.snap.changes == ()
     assert (table.snap.metres, table.snap.radians) == (0.0, 0.0)
 
 
-def test_snapping_touches_no_angle_beyond_its_tolerance() -> None:
+def test_snapping_changes_no_angle_beyond_the_tolerance() -> None:
     table = dh_table(arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", math.pi / 2 + 2e-3)), "tip", snap=1e-3)
     assert table.rows[0].alpha == pytest.approx(math.pi / 2 + 2e-3)
     assert present(table.snap).changes == ()
@@ -129,12 +131,12 @@ def test_snapping_touches_no_angle_beyond_its_tolerance() -> None:
 OFF = 1e-5
 
 
-def test_a_change_moves_the_tip_by_its_angle_times_its_lever() -> None:
+def test_the_tip_movement_of_a_change_is_the_angle_times_the_lever() -> None:
     assert SnapChange(0, "origin of a", 1e-3, 4.0).tip == 4e-3
     assert SnapChange(0, "origin of a", 1e-3, 0.0).tip == 0.0
 
 
-def test_an_angle_at_the_first_joint_is_seen_along_the_whole_way_and_one_at_the_last_along_the_rest() -> None:
+def test_the_lever_of_a_snapped_angle_is_the_length_of_the_remaining_chain() -> None:
     for (first, last), lever in [((OFF, 0.0), 3.0 + 0.5), ((0.0, OFF), 0.5)]:
         bent = (rotation("x", math.pi / 2 + tilt) for tilt in (first, last))
         steps = (way @ turn for way, turn in zip((shift(0, 0, 1.0), shift(3.0, 0, 0)), bent, strict=True))
@@ -146,7 +148,7 @@ def test_an_angle_at_the_first_joint_is_seen_along_the_whole_way_and_one_at_the_
 
 
 @pytest.mark.parametrize("beyond", [0.0, 3.0])
-def test_an_angle_made_of_two_fixed_ones_is_seen_from_the_joint_behind_it(beyond: float) -> None:
+def test_the_lever_of_two_combined_fixed_angles_begins_at_the_next_joint(beyond: float) -> None:
     """Neither origin is nearly round, both together are."""
     joints = [
         (z_joint("a"), "l0", "l1"),
@@ -174,21 +176,21 @@ def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
 @pytest.mark.parametrize(
     ("limit", "travel"), [(None, 1.0), (Limit(-0.5, 3.0, 1.0, 1.0), 3.0), (Limit(-4.0, 3.0, 1.0, 1.0), 4.0)]
 )
-def test_the_travel_of_what_slides_lengthens_the_lever(limit: Limit | None, travel: float) -> None:
+def test_the_travel_of_a_prismatic_joint_lengthens_the_lever(limit: Limit | None, travel: float) -> None:
     snap = present(dh_table(sliding(limit), "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"b": pytest.approx(OFF, rel=1e-9)}
     assert snap.metres == pytest.approx(OFF * (2.0 + travel), rel=1e-9)
     assert snap.bound({"b": np.array([0.0, -5.0])}) == pytest.approx([2.0 * OFF, 7.0 * OFF], rel=1e-9)
 
 
-def test_a_statement_adds_up_what_is_said_of_each_change() -> None:
+def test_a_snap_report_sums_the_bounds_of_all_changes() -> None:
     changes = (SnapChange(1, "x", 1e-3, 2.0, ("s",)), SnapChange(-1, "y", 2e-3, 5.0))
     said = SnapReport(1e-2, changes, 0.0, 0.0, {"s": 1e-3})
     assert said.rows == (-1, 1)
     assert said.bound({"s": np.array([0.0, -10.0])}) == pytest.approx([0.012, 0.022])
 
 
-def test_what_several_changes_move_for_each_metre_of_a_slider_adds_up() -> None:
+def test_the_bounds_per_metre_of_a_prismatic_joint_are_summed_over_changes() -> None:
     slide = shift(1.0, 0, 0) @ rotation("x", math.pi / 2 + 2 * OFF)
     tree = arm(rotation("x", math.pi / 2 + OFF), slide, kinds="RP")
     snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
@@ -197,7 +199,7 @@ def test_what_several_changes_move_for_each_metre_of_a_slider_adds_up() -> None:
 
 @pytest.mark.parametrize("psi", [-2.5, -0.4, 0.3, 1.1, 3.0])
 @pytest.mark.parametrize("tilt", [0.0, OFF, math.pi - OFF, math.pi, 1.0])
-def test_a_pose_that_is_snapped_turns_by_no_more_than_is_said(tilt: float, psi: float) -> None:
+def test_a_snapped_pose_rotates_by_at_most_the_reported_angle(tilt: float, psi: float) -> None:
     A = shift(1, 2, 3) @ rotation("z", 0.7) @ rotation("x", tilt) @ rotation("z", psi)
     pose, angle = _snap_pose(A, 10 * OFF)
     assert angle <= 2 * OFF
@@ -206,7 +208,7 @@ def test_a_pose_that_is_snapped_turns_by_no_more_than_is_said(tilt: float, psi: 
 
 
 @pytest.mark.parametrize(("convention", "row"), [("standard", 0), ("modified", 1)])
-def test_a_constant_shows_in_the_row_of_its_convention(convention: str, row: int) -> None:
+def test_the_row_of_a_constant_depends_on_the_convention(convention: str, row: int) -> None:
     tree = arm(np.eye(4), shift(0.3, 0, 0) @ rotation("x", 1.0), tip=shift(0.1, 0.2, 0) @ rotation("y", 0.3))
     table = dh_table(tree, "tip", convention=convention)
     assert [row_of_constant(table, k) for k in range(3)] == [-1, row, 2]
@@ -215,7 +217,7 @@ def test_a_constant_shows_in_the_row_of_its_convention(convention: str, row: int
 
 
 @pytest.mark.parametrize(("pivot", "sliders"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")])
-def test_the_joints_that_slide_from_the_pivot_on_lengthen_a_lever(pivot: int, sliders: str) -> None:
+def test_prismatic_joints_behind_the_pivot_lengthen_the_lever(pivot: int, sliders: str) -> None:
     path = chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
     found = _change(path, pivot, "something", OFF)
     assert found.sliders == tuple(sliders.split())

@@ -47,7 +47,7 @@ def table(lengths: dict[str, float], offsets: list[float], signs: list[int], til
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_the_parameters_of_any_arm_come_back(seed: int) -> None:
+def test_the_opw_parameters_of_a_random_arm_are_identified(seed: int) -> None:
     rng = np.random.default_rng(seed)
     lengths = drawn(rng)
     for name in rng.choice(["a1", "a2", "b"], seed % 3, replace=False):
@@ -64,7 +64,7 @@ def test_the_parameters_of_any_arm_come_back(seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_calibrated_arm_is_refused_with_its_distance_or_taken_for_one() -> None:
+def test_a_calibrated_arm_is_an_opw_arm_only_within_a_tolerance() -> None:
     lengths = dict(zip(NAMES, (0.1, -0.1, 0.0, 0.4, 0.5, 0.5, 0.1), strict=True))
     path = load(table(lengths, [0.0] * 6, [1] * 6, tilt=2e-3), verify=False).chain("tip", "base")
     with pytest.raises(InputError, match=r"not ortho-parallel.*error of [0-9.]+ mm and 0.00[0-9]+ rad"):
@@ -75,13 +75,13 @@ def test_a_calibrated_arm_is_refused_with_its_distance_or_taken_for_one() -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_an_arm_of_another_kind_is_refused(name: str) -> None:
+def test_an_arm_that_is_not_an_opw_arm_is_refused(name: str) -> None:
     with pytest.raises(InputError, match=r"OPW arm must have six|not ortho-parallel"):
         opw_of(load(name, verify=False).chain())
 
 
 @pytest.mark.slow
-def test_the_command_writes_what_the_solvers_read(tmp_path: Path) -> None:
+def test_the_command_prints_opw_parameters_in_the_format_of_the_solvers(tmp_path: Path) -> None:
     result = good("structure kinova --opw 0.001")
     assert "is off by at most" in result.text + result.err
     lines = dict(line.split(": ", 1) for line in result.text.splitlines() if line.startswith("opw_"))
@@ -123,7 +123,7 @@ def axes(robot: Robot, tip: str) -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TIPS)
-def test_eaik_solves_for_the_poses_of_h_and_p(name: str) -> None:
+def test_eaik_solves_inverse_kinematics_with_the_exported_h_and_p(name: str) -> None:
     eaik = pytest.importorskip("eaik.IK_HP")
     robot = load(name)
     given = axes(robot, TIPS[name])
@@ -142,7 +142,7 @@ def test_eaik_solves_for_the_poses_of_h_and_p(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TIPS)
-def test_ik_geo_solves_for_the_poses_of_h_and_p(name: str) -> None:
+def test_ik_geo_solves_inverse_kinematics_with_the_exported_h_and_p(name: str) -> None:
     ik_geo = pytest.importorskip("ik_geo")
     robot = load(name)
     given = axes(robot, TIPS[name])
@@ -178,7 +178,7 @@ def test_opw_kinematics_solves_for_the_poses_of_a_catalogue_arm() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_opw_kinematics_solves_for_the_poses_of_any_arm_of_the_kind(seed: int) -> None:
+def test_opw_kinematics_solves_for_the_poses_of_random_opw_arms(seed: int) -> None:
     rng = np.random.default_rng(seed)
     lengths, signs = drawn(rng), [int(sign) for sign in rng.choice([-1, 1], 6)]
     robot = load(table(lengths, list(rng.uniform(-3, 3, 6)), signs))
@@ -186,7 +186,7 @@ def test_opw_kinematics_solves_for_the_poses_of_any_arm_of_the_kind(seed: int) -
 
 
 @pytest.mark.slow
-def test_the_robotics_toolbox_solves_with_the_elementary_transforms() -> None:
+def test_the_robotics_toolbox_solves_inverse_kinematics_with_the_exported_ets() -> None:
     pytest.importorskip("roboticstoolbox", exc_type=ImportError)
     robot = load("ur5")
     scope: dict[str, Any] = {}

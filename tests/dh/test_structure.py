@@ -33,7 +33,7 @@ def of_rows(rows: list[list[object]] | list[list[float]]) -> Structure:
     return of_tree(to_tree(table_from_rows(rows, "standard")))
 
 
-def test_a_puma_has_a_spherical_wrist_and_is_what_opw_solves() -> None:
+def test_a_puma_has_a_spherical_wrist_and_can_be_solved_by_opw() -> None:
     found = of_rows(PUMA)
     assert [(kind.name, kind.is_exact) for kind in found.kinds] == [("spherical wrist", True)]
     assert found.freedoms == 6
@@ -43,7 +43,7 @@ def test_a_puma_has_a_spherical_wrist_and_is_what_opw_solves() -> None:
 
 
 @pytest.mark.parametrize("offset", [1e-4, 3e-3])
-def test_a_wrist_that_misses_its_point_says_by_how_much(offset: float) -> None:
+def test_an_inexact_spherical_wrist_is_reported_with_the_distance(offset: float) -> None:
     rows = [[*row] for row in PUMA]
     rows[4][0] = offset  # the last axis passes the other two at this distance
     kind = of_rows(rows).kinds[0]
@@ -55,7 +55,7 @@ def test_a_wrist_that_misses_its_point_says_by_how_much(offset: float) -> None:
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.0066])
-def test_three_parallel_axes_are_told_with_their_tilt(tilt: float) -> None:
+def test_three_parallel_axes_are_reported_with_the_tilt(tilt: float) -> None:
     rows: list[list[float]] = [
         [0, H, 0.18, 0], [-0.61, tilt, 0, 0], [-0.57, 0, 0, 0], [0, H, 0.17, 0], [0, -H, 0.12, 0],
         [0, 0, 0.1, 0],
@@ -68,7 +68,7 @@ def test_three_parallel_axes_are_told_with_their_tilt(tilt: float) -> None:
     assert found.solvers == (f"Pieper, three axes are parallel, two meet: {solvers}",)
 
 
-def test_a_scara_and_a_gantry_are_known() -> None:
+def test_a_scara_and_a_gantry_are_recognised() -> None:
     scara = of_rows([[0.3, 0, 0.2, 0, "R"], [0.25, math.pi, 0, 0, "R"], [0, 0, 0, 0, "P"], [0, 0, 0, 0, "R"]])
     assert (scara.joints, scara.freedoms, scara.kinds[0].name) == ("RRPR", 4, "SCARA")
     square = rotation("x", H)
@@ -77,7 +77,7 @@ def test_a_scara_and_a_gantry_are_known() -> None:
 
 
 @pytest.mark.parametrize("name", ["kinova", "talos", "panda"])
-def test_a_spherical_joints_centre_stays_where_pinocchio_puts_it(name: str) -> None:
+def test_the_centre_of_a_spherical_joint_does_not_move_according_to_pinocchio(name: str) -> None:
     robot = load(name)
     screws = robot.screws()
     found = structure(screws)
@@ -96,7 +96,7 @@ def test_a_spherical_joints_centre_stays_where_pinocchio_puts_it(name: str) -> N
     np.testing.assert_allclose(centres, np.broadcast_to(centres[0], (20, 3)), atol=1e-12)
 
 
-def test_the_command_says_it_and_what_it_rests_on() -> None:
+def test_the_command_prints_the_structure_and_the_check() -> None:
     result = good("structure ur5 --tip tool0")
     assert "three parallel axes: shoulder_lift_joint, elbow_joint, wrist_1_joint, exactly" in result.text
     assert "agrees within rounding" in result.text

@@ -36,7 +36,7 @@ def branching(draw: st.DrawFn) -> KinematicTree:
 @pytest.mark.slow
 @given(st.one_of(branching(), trees(min_joints=1)))
 @settings(max_examples=30)
-def test_every_link_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
+def test_every_link_has_the_placement_that_pinocchio_computes(tree: KinematicTree) -> None:
     table, q, oracle = tree_parameters(tree), configurations(tree.nq, 4), TreeOracle(tree)
     found = table.placements(q)
     reach = table.reach(q)
@@ -66,7 +66,7 @@ def test_gamma_and_b_are_zero_on_the_first_moving_child(tree: KinematicTree) -> 
             assert (row.gamma, row.b) == (0.0, 0.0)
 
 
-def test_along_a_chain_the_table_is_the_modified_one() -> None:
+def test_for_a_chain_the_table_equals_the_modified_table() -> None:
     bent, last = shift(0.05, 0, 0.1) @ rotation("x", math.pi / 2), rotation("x", -1.0) @ shift(0.02, 0, 0.3)
     tree = arm(shift(0, 0, 0.3), bent, shift(0.4, 0, 0.1), last)
     modified = dh_table(tree, "tip", convention="modified")
@@ -77,12 +77,12 @@ def test_along_a_chain_the_table_is_the_modified_one() -> None:
         assert np.abs(np.subtract(mine, other.cells)).max() <= 1e-14
 
 
-def test_a_floating_joint_is_refused_with_what_to_do() -> None:
+def test_a_floating_joint_is_refused_with_a_remedy() -> None:
     with pytest.raises(InputError, match=r"joint root_joint: a floating joint .* without root_joint"):
         tree_parameters(with_root_joint(arm(np.eye(4)), JointKind.FLOATING))
 
 
-def test_the_table_is_written_with_its_antecedents() -> None:
+def test_the_written_table_contains_the_antecedents() -> None:
     tree = arm(shift(0, 0, 0.3), shift(0.05, 0, 0) @ rotation("x", math.pi / 2), kinds="RP")
     table = tree_parameters(tree)
     lines = document(table, units_of("degrees", "millimetres")).text().splitlines()

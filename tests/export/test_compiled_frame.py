@@ -30,7 +30,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C com
 @needs_compiler
 @pytest.mark.filterwarnings("ignore::urdfkin.urdf.findings.UrdfWarning")
 @pytest.mark.parametrize("name", ["panda", "planar_and_floating_in_the_middle"])
-def test_what_it_computes_is_pinocchios_and_one_alone_is_as_in_a_batch(name: str) -> None:
+def test_compiled_results_agree_with_pinocchio_and_are_equal_in_single_calls_and_batches(name: str) -> None:
     robot = urdfkin.load("panda" if name == "panda" else urdf_of(name))
     fast = robot.compiled(robot.tip_frame, "local_world_aligned")
     inputs = state(robot, 37, 5)
@@ -53,7 +53,7 @@ def arm() -> Robot:
     return urdfkin.load("planar_two_link", verify=False)
 
 
-def test_it_takes_any_batch_and_writes_where_it_is_told(arm: Robot) -> None:
+def test_a_compiled_frame_accepts_any_batch_shape_and_writes_into_out(arm: Robot) -> None:
     fast, frame = arm.compiled(arm.tip_frame), arm.tip_frame
     q = np.linspace(-1.0, 1.0, 24).reshape(3, 4, 2)
     expected = arm.jacobian(q, frame)
@@ -70,7 +70,7 @@ def test_it_takes_any_batch_and_writes_where_it_is_told(arm: Robot) -> None:
     assert fast.jacobian(np.empty((0, 2))).shape == (0, 6, 2)
 
 
-def test_results_that_go_past_the_caches_are_those_of_small_batches_wherever_they_begin(arm: Robot) -> None:
+def test_results_of_a_large_batch_equal_those_of_small_batches_at_any_alignment_of_out(arm: Robot) -> None:
     fast, n = arm.compiled(arm.tip_frame), 30_000  # results of 2.9 MB
     q = arm.sample(n, seed=3)
     expected = np.concatenate([fast.jacobian(q[i : i + 1000]) for i in range(0, n, 1000)])
@@ -81,7 +81,7 @@ def test_results_that_go_past_the_caches_are_those_of_small_batches_wherever_the
         assert (np.delete(room, slice(first, first + 12 * n)) == np.pi).all()
 
 
-def test_angles_of_any_size_are_those_of_the_library_for_one_lane_alone(arm: Robot) -> None:
+def test_a_very_large_angle_is_correct_and_leaves_the_other_lanes_unchanged(arm: Robot) -> None:
     fast, q = arm.compiled(arm.tip_frame), np.tile([0.3, -0.4], (11, 1))
     before = fast.placement(q)
     q[5] = 1e9, -3e15
@@ -90,7 +90,7 @@ def test_angles_of_any_size_are_those_of_the_library_for_one_lane_alone(arm: Rob
     assert np.abs(after[5] - arm.placement(q[5], arm.tip_frame)).max() < 1e-15
 
 
-def test_what_is_no_configuration_is_refused_as_everywhere(arm: Robot) -> None:
+def test_a_compiled_frame_refuses_values_that_are_not_finite_and_wrong_shapes(arm: Robot) -> None:
     fast = arm.compiled(arm.tip_frame)
     for bad in ([np.nan, 0.0], np.full((20, 2), np.inf)):
         with pytest.raises(InputError, match="finite"):
@@ -109,7 +109,7 @@ def test_what_is_no_configuration_is_refused_as_everywhere(arm: Robot) -> None:
         arm.compiled("nowhere")
 
 
-def test_arrays_that_need_no_conversion_give_the_bits_and_the_errors_of_all_others() -> None:
+def test_arrays_with_and_without_conversion_give_equal_results_and_errors() -> None:
     robot = urdfkin.load("ur5", verify=False)
     fast, n = robot.compiled("tool0"), 37
     q, v, a = robot.sample(n, seed=1), *np.random.default_rng(1).standard_normal((2, n, 6))
@@ -143,7 +143,7 @@ def test_arrays_that_need_no_conversion_give_the_bits_and_the_errors_of_all_othe
         fast.acceleration(q, v, a, out=out, threads=0)
 
 
-def test_a_number_that_is_not_finite_is_refused_in_rows_that_no_register_divides() -> None:
+def test_nan_is_refused_at_every_place_of_rows_that_do_not_fill_the_registers() -> None:
     free = urdfkin.load("panda", mimic=False)
     fast, inputs = free.compiled(free.tip_frame), np.zeros((3, 20, 9))
     fast.acceleration(*inputs)
@@ -154,7 +154,7 @@ def test_a_number_that_is_not_finite_is_refused_in_rows_that_no_register_divides
         inputs[place] = 0.0
 
 
-def test_it_is_made_once_and_a_copy_makes_its_own(arm: Robot) -> None:
+def test_a_compiled_frame_is_cached_and_an_unpickled_copy_gives_equal_results(arm: Robot) -> None:
     fast = arm.compiled(arm.tip_frame)
     assert arm.compiled(arm.tip_frame) is fast
     assert arm.compiled(arm.tip_frame, "local") is not fast
@@ -162,7 +162,9 @@ def test_it_is_made_once_and_a_copy_makes_its_own(arm: Robot) -> None:
     assert copy.jacobian(np.zeros(2)).tobytes() == fast.jacobian(np.zeros(2)).tobytes()
 
 
-def test_without_a_compiler_the_walk_computes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_a_compiled_frame_returns_the_results_of_the_robot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def none(code: object) -> object:
         raise NoCompilerError("cc is not installed")
 
@@ -175,9 +177,7 @@ def test_without_a_compiler_the_walk_computes(monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.slow
 @needs_compiler
-def test_machine_code_that_computes_something_else_is_not_used(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_machine_code_with_wrong_results_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def wrong(code: Any) -> object:
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
         literal = c.literal

@@ -87,7 +87,7 @@ def test_kernels_of_wide_rows_and_of_other_joints_compute_true_values(robot: str
         ("results);\n        write_rows", "results); results[7] *= T(1.0001);\n        write_rows"),
     ],
 )
-def test_a_changed_kernel_fails_the_check_on_the_gpu_only(right: str, wrong: str, tmp_path: Path) -> None:
+def test_a_changed_kernel_fails_only_the_check_on_the_gpu(right: str, wrong: str, tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
     text = path.read_text("utf-8")
     assert text.count(right) == 1
@@ -120,7 +120,9 @@ int main()
 
 @pytest.mark.slow
 @pytest.mark.parametrize("blocks", ["1u << 20", "2"])
-def test_a_batch_of_any_size_has_the_bits_of_single_configurations(blocks: str, tmp_path: Path) -> None:
+def test_a_batch_of_any_size_gives_the_results_of_single_configurations_bit_for_bit(
+    blocks: str, tmp_path: Path
+) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
     text = path.read_text("utf-8")
     assert text.count("MOST_BLOCKS = 1u << 20;") == 1
@@ -134,7 +136,9 @@ def test_a_batch_of_any_size_has_the_bits_of_single_configurations(blocks: str, 
 @_NVCC
 @pytest.mark.long
 @pytest.mark.parametrize("real", ["double", "float"])
-def test_cudas_compiler_compiles_it_without_a_warning(nvcc: str, real: str, tmp_path: Path) -> None:
+def test_cudas_compiler_compiles_an_exported_file_without_a_warning(
+    nvcc: str, real: str, tmp_path: Path
+) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), "cuda", tmp_path)
     name, built = path.stem.upper(), tmp_path / "check"
     macros = [f"-D{name}_MAIN", f"-D{name}_REAL={real}"]
@@ -164,7 +168,7 @@ def test_the_benchmarks_program_prints_a_time_of_each_quantity_precision_and_bat
     assert benchmark_gpu.table(measured).count("\n") == 1 + len(measured)
 
 
-def test_the_share_of_the_bandwidth_counts_the_bytes_of_inputs_and_results() -> None:
+def test_the_fraction_of_the_bandwidth_counts_the_bytes_of_inputs_and_results() -> None:
     written = code(urdfkin.load("planar_two_link"), quantities=("jacobian", "acceleration"))
     jacobian, acceleration = written.functions
     assert benchmark_gpu.bytes_of(written, jacobian, "double") == 8 * (2 + 12)
@@ -227,7 +231,7 @@ def test_cudas_compiler_compiles_the_benchmark(capsys: pytest.CaptureFixture[str
 @_NVCC
 @pytest.mark.long
 @pytest.mark.usefixtures("nvcc")
-def test_the_check_takes_cudas_compiler_where_there_is_a_gpu(
+def test_the_check_uses_cudas_compiler_if_a_gpu_is_present(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checking, "_has_gpu", lambda: True)
@@ -240,7 +244,7 @@ def test_the_check_takes_cudas_compiler_where_there_is_a_gpu(
 @pytest.mark.long
 @pytest.mark.usefixtures("nvcc")
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
-def test_the_cmake_lines_of_the_file_build_its_library_for_a_program_in_c(tmp_path: Path) -> None:
+def test_the_cmake_lines_of_an_exported_file_build_a_library_for_a_c_program(tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "cuda", tmp_path)
     name = path.stem
     lines = path.read_text("utf-8").partition(" * CMake:")[2].partition(" */")[0].splitlines()

@@ -76,7 +76,7 @@ def test_expressions_are_equal_to_the_chain_at_fifty_digits(rpy: str, axis: str)
 
 
 @pytest.mark.slow
-def test_placements_of_symbols_have_no_double_and_multiples_of_pi_vanish() -> None:
+def test_symbolic_placements_contain_no_double_and_multiples_of_pi_are_simplified() -> None:
     sympy, scope = algebra(arm("1.5707963267948966 0 -0.5235987755982988"), "placement")
     q = sympy.symbols("q:2", real=True)
     T = scope["placement"](q)
@@ -90,7 +90,7 @@ def test_placements_of_symbols_have_no_double_and_multiples_of_pi_vanish() -> No
 
 
 @pytest.mark.slow
-def test_the_jacobian_is_the_derivative_of_the_placement_exactly() -> None:
+def test_the_exact_jacobian_is_the_symbolic_derivative_of_the_placement() -> None:
     sympy, scope = algebra(urdfkin.load("planar_two_link"), "placement", "jacobian")
     q = sympy.symbols("q:2", real=True)
     p = scope["placement"](q)[:3, 3]
@@ -100,7 +100,7 @@ def test_the_jacobian_is_the_derivative_of_the_placement_exactly() -> None:
 
 
 @pytest.mark.slow
-def test_the_file_states_the_angles_that_became_multiples_of_pi() -> None:
+def test_an_exact_file_states_the_angles_that_became_multiples_of_pi() -> None:
     text = arm("1.5707963267948966 0 -0.5235987755982988").export("sympy-exact", quantities=["placement"])
     assert "2 different angles are multiples of pi, changed by at most 7.3e-17 rad" in text
     assert "the expressions below evaluated at 50 digits:" in text
@@ -243,7 +243,7 @@ COUNTS: dict[str, tuple[Callable[[FloatArray], Matrix], float]] = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", COUNTS)
-def test_no_part_of_an_exports_joint_rounds_more_than_the_table_says_nor_much_less(name: str) -> None:
+def test_the_largest_roundings_of_exported_code_are_those_in_the_table(name: str) -> None:
     part, counted = COUNTS[name]
     assert 0.8 * counted < most(all_conspiring, part) <= counted
     table = (roundings.__doc__ or "").partition("**An export**")[2].partition("**MuJoCo**")[0]
@@ -251,7 +251,7 @@ def test_no_part_of_an_exports_joint_rounds_more_than_the_table_says_nor_much_le
 
 
 @pytest.mark.long
-def test_an_exports_roundings_are_within_the_count_as_urdfkins_own_are() -> None:
+def test_the_roundings_of_a_joint_in_exported_code_are_within_the_count_of_the_bound() -> None:
     assert COUNTS["a constant of which something is left out"][1] < PARTS["Pinocchio's"][1]
     assert COUNTS["a joint"][1] + PARTS["a joint of Pinocchio's"][1] <= roundings.ROUNDINGS
     own = most(deviation, lambda x: joint(x, fused=False))
@@ -261,7 +261,9 @@ def test_an_exports_roundings_are_within_the_count_as_urdfkins_own_are() -> None
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 @pytest.mark.parametrize("real", ["double", "float"])
 @pytest.mark.parametrize("fusing", ["off", "fast"])
-def test_the_sines_of_c_are_right_to_one_eps(real: str, fusing: str, tmp_path: Path) -> None:
+def test_the_sines_and_cosines_of_the_c_code_have_errors_of_at_most_one_eps(
+    real: str, fusing: str, tmp_path: Path
+) -> None:
     source, library = tmp_path / "sines.c", tmp_path / "sines.so"
     head = f"#include <tgmath.h>\ntypedef {real} real;\n#define INLINE static\n"
     head += "#define SELDOM static\n#define R(x) ((real)(x))\n#define LANES 8\n"
@@ -288,7 +290,7 @@ def test_the_sines_of_c_are_right_to_one_eps(real: str, fusing: str, tmp_path: P
     assert SINE == 2.0 * roundings.SINGLE_POLYNOMIAL
 
 
-def test_no_more_is_left_out_of_a_constant_than_half_an_eps_of_its_largest_number() -> None:
+def test_at_most_half_an_eps_of_the_largest_number_is_omitted_from_a_constant() -> None:
     for largest in (1.0, 0.3, 7e5, 5e-324):
         for share in (0.0, 0.49, 0.51, 1e3):
             row = largest, -share * EPS * largest, 0.0

@@ -73,7 +73,7 @@ def test_an_expression_has_the_value_of_its_arithmetic(steps: list[tuple[str, in
 
 @pytest.mark.slow
 @given(written())
-def test_no_operation_is_made_for_nothing(steps: list[tuple[str, int, int]]) -> None:
+def test_a_graph_contains_no_redundant_operation(steps: list[tuple[str, int, int]]) -> None:
     graph = Graph()
     for node in needed(done(steps, (graph.input("q", i) for i in range(3)))):
         constants = [x for x in node.of if not isinstance(x, Node)]
@@ -88,7 +88,7 @@ def test_no_operation_is_made_for_nothing(steps: list[tuple[str, int, int]]) -> 
             assert node.operands[0].op != "neg"
 
 
-def test_what_was_written_before_is_the_same_again() -> None:
+def test_equal_expressions_are_the_same_node() -> None:
     graph = Graph()
     x, y, z = (graph.input("q", i) for i in range(3))
     assert x * y + z is z + y * x
@@ -98,7 +98,7 @@ def test_what_was_written_before_is_the_same_again() -> None:
     assert graph.sine_cosine(x)[0] is graph.sine_cosine(x)[0]
 
 
-def test_an_equation_notes_its_numbers_on_what_it_makes_itself_or_through_another() -> None:
+def test_each_operation_of_an_equation_records_the_numbers_of_the_equation() -> None:
     graph = Graph()
     x = tuple(graph.input("q", i) for i in range(3))
     y = tuple(graph.input("v", i) for i in range(3))
@@ -117,7 +117,9 @@ ODD = (
 @pytest.mark.slow
 @pytest.mark.parametrize("reference", list(Reference))
 @pytest.mark.parametrize("name", [*ODD, "panda"])
-def test_every_quantity_is_pinocchios_within_the_bound(name: str, reference: Reference) -> None:
+def test_every_exported_quantity_agrees_with_pinocchio_within_the_bound(
+    name: str, reference: Reference
+) -> None:
     robot = robot_of(name)
     frame = robot.tip_frame
     drawn = draw(robot.tree, 20, np.random.default_rng(3), with_special=True)
@@ -131,7 +133,7 @@ def test_every_quantity_is_pinocchios_within_the_bound(name: str, reference: Ref
 
 
 @pytest.mark.parametrize("quantity", ["placement", "jacobian", "acceleration"])
-def test_an_expression_that_is_wrong_is_never_written(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_expression_is_not_written(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load("ur5")
     proof = code(robot, quantities=(quantity,)).proof
     (line,) = proof.certificate.lines
@@ -148,7 +150,7 @@ def plan_of(robot: Robot) -> CompiledTree:
     return robot.plan([robot.tree.frame_link(robot.tip_frame)])
 
 
-def test_each_joints_sine_and_cosine_stand_there_once_and_no_more_than_are_needed() -> None:
+def test_sine_and_cosine_of_each_needed_joint_are_computed_once() -> None:
     robot = urdfkin.load("panda", verify=False)
     plan, aligned = robot.plan([robot.tree.frame_link("panda_hand")]), Reference.LOCAL_WORLD_ALIGNED
     place, jacobian = (function_of(plan, row, aligned) for row in (exported()[0], JACOBIAN))
@@ -157,7 +159,7 @@ def test_each_joints_sine_and_cosine_stand_there_once_and_no_more_than_are_neede
     assert len(jacobian.angles) == 6, "how the last joint turns moves no axis"
 
 
-def test_it_takes_fewer_operations_than_the_recursion_for_any_robot() -> None:
+def test_exported_code_has_fewer_operations_than_the_general_recursion() -> None:
     robot = urdfkin.load("panda", verify=False)
     plan = robot.plan([robot.tree.frame_link("panda_hand")])
     for row in (JACOBIAN, ACCELERATION):
@@ -168,7 +170,7 @@ def test_it_takes_fewer_operations_than_the_recursion_for_any_robot() -> None:
         assert function.operations - sines < 0.75 * recursion
 
 
-def test_statements_are_in_an_order_in_which_they_can_be_computed() -> None:
+def test_each_operand_is_computed_before_use() -> None:
     plan = plan_of(robot_of("planar_and_floating_in_the_middle"))
     function = function_of(plan, ACCELERATION, Reference.LOCAL)
     done = set[Node]()
@@ -178,7 +180,7 @@ def test_statements_are_in_an_order_in_which_they_can_be_computed() -> None:
     assert {node for node in function.results if isinstance(node, Node)} <= done
 
 
-def test_a_robot_with_huge_and_tiny_links_keeps_its_tiny_ones() -> None:
+def test_tiny_link_lengths_are_exported_beside_huge_ones() -> None:
     function = function_of(plan_of(robot_of("sizes")), exported()[0], Reference.LOCAL)
     lengths = {x for node in function.nodes for x in node.of if isinstance(x, float)}
     assert any(0.0 < x < 1e-5 for x in lengths)
@@ -203,7 +205,7 @@ def evaluated(text: str, values: dict[str, float]) -> dict[str, float]:
     return values
 
 
-def test_a_documents_formulas_compute_what_the_robot_does() -> None:
+def test_the_formulas_of_a_latex_document_have_the_results_of_the_robot() -> None:
     robot = urdfkin.load("ur5")
     document = write(code(robot, "tool0", ALL), "latex")
     q, v, a = (x[0] for x in state(robot, 1, 4))
@@ -224,7 +226,7 @@ def test_a_documents_formulas_compute_what_the_robot_does() -> None:
             assert abs(own[f"{letter}_{{{i + 1},{k + 1}}}"] - expected) < 1e-12
 
 
-def test_braces_and_environments_of_a_document_are_closed() -> None:
+def test_braces_and_environments_of_a_latex_document_are_closed() -> None:
     document = write(code(urdfkin.load("planar_two_link")), "latex")
     assert document.count(r"\begin{") == document.count(r"\end{")
     assert document.replace(r"\{", "").count("{") == document.replace(r"\}", "").count("}")

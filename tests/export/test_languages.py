@@ -51,7 +51,7 @@ def refuses(function: Any, wrong: Any, right: Any, error: type[Exception], words
 
 @pytest.mark.slow
 @pytest.mark.parametrize("to", RUN)
-def test_an_arms_file_computes_its_fifty_digit_values(to: str, tmp_path: Path) -> None:
+def test_the_exported_file_of_an_arm_agrees_with_values_of_fifty_digits(to: str, tmp_path: Path) -> None:
     need(to)
     found = check(file(code(urdfkin.load("ur5", verify=False), quantities=_THREE), to, tmp_path))
     assert found.good, found.lines
@@ -77,7 +77,7 @@ def test_the_fifty_digits_of_a_test_vector_are_those_of_the_true_value() -> None
         ("0.6666666666666666666666666666666666666666666666666666666", f"0.{'6' * 49}7"),
     ],
 )  # fmt: skip
-def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_its_end(number: Any, text: str) -> None:
+def test_a_ball_is_written_with_fifty_digits_without_trailing_zeros(number: Any, text: str) -> None:
     with precision(90):
         ball = arb(number)
         assert decimal(ball) == text
@@ -88,7 +88,7 @@ def test_a_ball_is_written_with_fifty_digits_and_without_zeros_at_its_end(number
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["c", "cuda", "numpy", "array", "torch", "sympy-exact"])
 @pytest.mark.parametrize("name", ["planar_and_floating_in_the_middle", "sizes", "mimic_hand_40_sliding"])
-def test_files_of_other_joints_of_odd_sizes_and_of_a_hand_compute_true_values(
+def test_exported_files_of_all_joint_kinds_extreme_lengths_and_a_hand_compute_true_values(
     to: str, name: str, tmp_path: Path
 ) -> None:
     need(to)
@@ -101,7 +101,9 @@ def test_files_of_other_joints_of_odd_sizes_and_of_a_hand_compute_true_values(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["c", "numpy", "sympy-exact"])
-def test_a_small_robots_file_does_so_in_every_reference(to: str, tmp_path: Path) -> None:
+def test_the_exported_file_of_a_small_robot_computes_true_values_in_every_reference_frame(
+    to: str, tmp_path: Path
+) -> None:
     need(to)
     robot = urdfkin.load("planar_two_link")
     for reference in Reference:
@@ -122,7 +124,9 @@ def test_a_small_robots_file_does_so_in_every_reference(to: str, tmp_path: Path)
         ("gcc", ["-std=c11", "-O3", "-march=native", "-ffp-contract=fast"]),
     ],
 )
-def test_c_compiles_without_warning_if_eight_are_one(compiler: str, options: Any, tmp_path: Path) -> None:
+def test_c_code_compiles_without_a_warning_with_every_compiler_and_option(
+    compiler: str, options: Any, tmp_path: Path
+) -> None:
     written = code(robot_of("mimic_hand_40_sliding"), quantities=("jacobian", "acceleration"))
     path, name = file(written, "c", tmp_path), written.name.upper()
     for more in ([], [f"-D{name}_PORTABLE"], [f"-D{name}_REAL=float"]):
@@ -132,7 +136,7 @@ def test_c_compiles_without_warning_if_eight_are_one(compiler: str, options: Any
 
 
 @pytest.mark.slow
-def test_c_touches_nothing_that_is_not_its_own(tmp_path: Path) -> None:
+def test_c_code_has_no_invalid_memory_access_and_no_undefined_behaviour(tmp_path: Path) -> None:
     need("c")
     path = file(code(robot_of("planar_and_floating_in_the_middle"), quantities=_THREE), "c", tmp_path)
     said = built(path, "cc", "-std=c99", "-g", "-fsanitize=address,undefined")
@@ -158,7 +162,7 @@ def test_options_that_let_compilers_reorder_sums_are_refused(to: str, compiler: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("to", RUN)
-def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None:
+def test_the_check_of_a_file_detects_a_changed_constant(to: str, tmp_path: Path) -> None:
     need(to)
     path = file(code(urdfkin.load("ur5"), quantities=("placement", "acceleration")), to, tmp_path)
     old, new = ("1569, 4000", "1570, 4000") if to == "sympy-exact" else (r"0\.39225", "0.39226")
@@ -173,7 +177,7 @@ def test_a_constant_that_was_changed_is_noticed(to: str, tmp_path: Path) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])
-def test_every_constant_of_a_function_is_noticed_if_changed_by_a_billionth(to: str, tmp_path: Path) -> None:
+def test_the_check_of_a_file_detects_a_change_of_any_constant_by_a_billionth(to: str, tmp_path: Path) -> None:
     need(to)
     text = file(code(robot_of("panda"), quantities=_THREE), to, tmp_path).read_text("utf-8")
     functions = [x for x in ast.parse(text).body if isinstance(x, ast.FunctionDef) and x.name in _THREE]
@@ -193,7 +197,7 @@ def test_every_constant_of_a_function_is_noticed_if_changed_by_a_billionth(to: s
 
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["c", "cuda", "numpy", "array", "torch", "matlab", "sympy-exact"])
-def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> None:
+def test_a_frame_that_no_joint_moves_can_be_exported(to: str, tmp_path: Path) -> None:
     need(to)
     robot = urdfkin.load("planar_two_link")
     assert check(file(code(robot, robot.link_names[0]), to, tmp_path)).good
@@ -202,7 +206,7 @@ def test_a_frame_that_nothing_moves_has_code_too(to: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_a_file_can_say_so_without_urdfkin(tmp_path: Path) -> None:
+def test_an_exported_python_file_can_check_the_results_without_urdfkin(tmp_path: Path) -> None:
     path = file(code(urdfkin.load("ur5"), quantities=("jacobian",)), "numpy", tmp_path)
     imports = re.findall(r"^(?:from|import) .*$", path.read_text("utf-8"), re.MULTILINE)
     assert "urdfkin" not in "".join(imports)
@@ -211,7 +215,7 @@ def test_a_file_can_say_so_without_urdfkin(tmp_path: Path) -> None:
     assert done.stdout.startswith("good jacobian: 4 test vectors")
 
 
-def test_numpys_functions_take_any_batch(tmp_path: Path) -> None:
+def test_numpys_functions_accept_any_batch(tmp_path: Path) -> None:
     robot = robot_of("panda")
     own = module(robot, "numpy", tmp_path)
     q, v, a = state(robot, 6, 1)
@@ -247,7 +251,7 @@ def test_the_file_for_any_array_computes_true_values_in_a_namespace(name: str, t
 
 
 @pytest.mark.parametrize("to", ["array", "jax", "torch"])
-def test_no_array_is_written_in_place(to: str) -> None:
+def test_exported_functions_modify_no_array_in_place(to: str) -> None:
     tree = ast.parse(write(code(robot_of("planar_and_floating_in_the_middle"), quantities=_THREE), to))
     functions = [x for x in tree.body if isinstance(x, ast.FunctionDef) and x.name in _THREE]
     assert len(functions) == len(_THREE)
@@ -287,7 +291,9 @@ def test_numpys_functions_refuse_a_wrong_length_and_convert_whole_numbers(tmp_pa
         ({"q": 1.0}, "object"), (np.array(["2026-11-24"] * 2, dtype="datetime64[D]"), r"datetime64\[D\]"),
     ],
 )  # fmt: skip
-def test_numpys_functions_refuse_numbers_that_are_not_real(wrong: Any, found: str, tmp_path: Path) -> None:
+def test_numpys_functions_refuse_inputs_that_are_not_real_numbers(
+    wrong: Any, found: str, tmp_path: Path
+) -> None:
     velocity = module("planar_two_link", "numpy", tmp_path, "velocity").velocity
     refuses(velocity, wrong, [0.0, 0.0], TypeError, rf"needs real numbers: found {found}$")
 
@@ -310,7 +316,7 @@ def test_nan_in_an_input_reaches_every_result_that_depends_on_it(to: str, tmp_pa
 
 
 @pytest.mark.parametrize("installed", [True, False])
-def test_functions_of_any_array_refuse_what_is_no_array(
+def test_functions_of_any_array_refuse_an_input_that_is_no_array(
     installed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not installed:
@@ -366,7 +372,7 @@ def test_numbas_functions_refuse_a_wrong_length(tmp_path: Path) -> None:
     assert velocity(q[:2], q[:2]).shape == (6,)
 
 
-def test_a_namespace_that_makes_float32_of_float64_is_an_error_of_the_check(tmp_path: Path) -> None:
+def test_the_check_refuses_an_array_namespace_that_converts_float64_to_float32(tmp_path: Path) -> None:
     own = module("planar_two_link", "array", tmp_path, "placement")
     narrow = SimpleNamespace(float64=np.float64, float32=np.float32)
     narrow.asarray = lambda x, dtype: np.asarray(x, dtype=np.float32)
@@ -460,7 +466,7 @@ def test_gradients_through_any_array_are_the_hessian_within_its_bound(tmp_path: 
         assert np.all(np.abs(found - right) <= within)
 
 
-def test_functions_of_pytorch_refuse_what_is_no_tensor_of_floating_numbers(
+def test_functions_of_pytorch_refuse_an_input_that_is_no_tensor_of_floating_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     try:
@@ -497,7 +503,7 @@ def test_a_module_of_pytorch_has_the_quantities_and_their_derivatives() -> None:
     assert torch.equal(moving(q, v), own.velocity(q, v))
 
 
-def test_pytorch_that_is_not_installed_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pytorch_the_error_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     found = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "torch" else found(name))
     words = r"robot\.torch needs PyTorch: found no module torch; pip install torch"
@@ -518,7 +524,7 @@ def test_the_check_of_an_imported_file_of_jax_computes_in_double_precision(tmp_p
 
 
 @pytest.mark.slow
-def test_jax_differentiates_maps_and_compiles_it(tmp_path: Path) -> None:
+def test_jax_differentiates_vectorizes_and_compiles_exported_functions(tmp_path: Path) -> None:
     jax: Any = pytest.importorskip("jax")
     jax.config.update("jax_enable_x64", True)
     robot = robot_of("panda")
@@ -533,7 +539,7 @@ def test_jax_differentiates_maps_and_compiles_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_casadis_and_sympys_symbols_differentiate_to_the_jacobian(tmp_path: Path) -> None:
+def test_derivatives_of_placements_in_casadi_and_sympy_are_the_jacobian(tmp_path: Path) -> None:
     casadi: Any = pytest.importorskip("casadi")
     sympy: Any = pytest.importorskip("sympy")
     robot, q, x, y = urdfkin.load("planar_two_link"), [0.3, -0.7], casadi.SX.sym("q", 2), sympy.symbols("q:2")
@@ -546,7 +552,7 @@ def test_casadis_and_sympys_symbols_differentiate_to_the_jacobian(tmp_path: Path
     assert np.abs(np.array(symbolic, dtype=float) - J).max() < 1e-15
 
 
-def test_what_is_not_a_file_of_ours_is_refused(tmp_path: Path) -> None:
+def test_the_check_refuses_a_file_that_urdfkin_export_did_not_write(tmp_path: Path) -> None:
     other = tmp_path / "other.c"
     other.write_text("int main(void) { return 0; }\n")
     with pytest.raises(InputError, match="this file was not written by `urdfkin export`"):
@@ -558,7 +564,7 @@ def test_what_is_not_a_file_of_ours_is_refused(tmp_path: Path) -> None:
         check(broken)
 
 
-def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
+def test_an_invalid_export_is_refused_with_the_valid_choices() -> None:
     robot = urdfkin.load("planar_two_link")
     asked: tuple[tuple[tuple[Any, ...], type[Exception], str], ...] = (
         (("fortran",), UnknownNameError, "language"),
@@ -580,7 +586,9 @@ def test_what_cannot_be_exported_is_refused_with_what_can() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["numpy", "c", "casadi", "matlab"])
 @pytest.mark.parametrize("form", ["dh", "screws"])
-def test_a_table_and_screws_are_code_in_each_language_and_checked(form: str, to: str, tmp_path: Path) -> None:
+def test_dh_tables_and_screws_are_exported_in_each_language_and_checked(
+    form: str, to: str, tmp_path: Path
+) -> None:
     need(to)
     path = tmp_path / f"arm{LANGUAGES[to][1]}"
     path.write_text(urdfkin.load("ur5").export(to, "tool0", form=form), encoding="utf-8")
@@ -594,7 +602,7 @@ def test_a_table_and_screws_are_code_in_each_language_and_checked(form: str, to:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["dh", "screws"])
-def test_the_code_of_a_form_computes_what_pinocchio_computes(form: str, tmp_path: Path) -> None:
+def test_the_code_of_a_dh_table_or_of_screws_agrees_with_the_robot(form: str, tmp_path: Path) -> None:
     robot = urdfkin.load("panda")
     path = tmp_path / "arm.py"
     path.write_text(robot.export("numpy", "panda_hand", form=form), encoding="utf-8")
@@ -614,7 +622,7 @@ NAN = {
 
 
 @pytest.mark.parametrize("to", NAN)
-def test_a_result_that_is_nan_is_noticed_although_right_ones_follow(to: str, tmp_path: Path) -> None:
+def test_the_check_of_a_file_detects_a_nan_before_correct_results(to: str, tmp_path: Path) -> None:
     text, (right, wrong) = urdfkin.load("ur5").export(to, "tool0", ["placement"]), NAN[to]
     assert right in text
     path = tmp_path / f"arm.{'py' if to == 'numpy' else to}"
@@ -624,14 +632,14 @@ def test_a_result_that_is_nan_is_noticed_although_right_ones_follow(to: str, tmp
 
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["numpy", "c", "casadi", "matlab"])
-def test_a_table_in_a_language_is_the_same_file_as_the_robot_in_the_form_dh(to: str) -> None:
+def test_the_dh_command_and_export_with_the_form_dh_write_the_same_file(to: str) -> None:
     table = command("dh", "ur5", "--tip", "tool0", "--format", to)
     assert table.code == 0
     assert table.out == command("export", "ur5", "--frame", "tool0", "--form", "dh", "--to", to).out
 
 
 @pytest.mark.slow
-def test_what_nobody_checked_says_so_in_its_first_line(tmp_path: Path) -> None:
+def test_an_unverified_export_states_this_in_the_first_line(tmp_path: Path) -> None:
     robot = urdfkin.load("planar_two_link")
     for to in LANGUAGES:
         first = robot.export(to, verify=False).splitlines()[0]
@@ -642,7 +650,7 @@ def test_what_nobody_checked_says_so_in_its_first_line(tmp_path: Path) -> None:
     assert not found.verified
 
 
-def test_an_export_is_not_entered_in_the_robots_own_account() -> None:
+def test_an_export_adds_no_line_to_the_robots_certificate() -> None:
     robot = urdfkin.load("planar_two_link")
     robot.export("numpy")
     assert not robot.certificate().lines

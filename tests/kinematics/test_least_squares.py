@@ -23,7 +23,7 @@ def slopes(x: FloatArray, seen: float) -> FloatArray:
     return np.array([[seen, 10.0], [-1.0, 0.0]])
 
 
-def test_the_minimum_of_a_curved_valley_is_found() -> None:
+def test_least_squares_finds_the_minimum_of_the_rosenbrock_function() -> None:
     found, left = least_squares(np.array([-1.2, 1.0]), left_over, slopes, np.add)
     np.testing.assert_allclose(found, 1.0, atol=1e-12)
     assert left == float(np.linalg.norm(residuals(found))) < 1e-12
@@ -41,7 +41,7 @@ def test_no_step_is_longer_than_the_limit() -> None:
     np.testing.assert_allclose(found, 1.0, atol=1e-12)
 
 
-def test_without_parameters_the_start_is_the_result() -> None:
+def test_least_squares_without_parameters_returns_the_start() -> None:
     start = np.zeros(2)
     found, left = least_squares(start, left_over, lambda *_: np.empty((2, 0)), np.add)
     assert found is start

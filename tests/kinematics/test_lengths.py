@@ -84,7 +84,7 @@ def test_longer_inputs_never_give_shorter_results(name: str, data: st.DataObject
 
 
 @given(sizes, sizes)
-def test_a_product_is_no_less_than_the_smallest_normal_number_unless_a_factor_is_zero(
+def test_a_product_of_lengths_is_at_least_the_smallest_normal_number_unless_a_factor_is_zero(
     x: float, y: float
 ) -> None:
     with np.errstate(over="ignore", under="ignore"):
@@ -95,7 +95,7 @@ def test_a_product_is_no_less_than_the_smallest_normal_number_unless_a_factor_is
 @pytest.mark.slow
 @given(trees(max_joints=6), st.integers(0, 2**32), st.sampled_from([1.0, 1e-3, 1e3, 1e-170]))
 @settings(max_examples=40)
-def test_no_motion_of_any_link_of_any_tree_exceeds_its_size(
+def test_the_motion_of_any_link_of_any_tree_is_within_the_computed_magnitude(
     tree: KinematicTree, seed: int, speed: float
 ) -> None:
     plan = compile_tree(tree, range(len(tree.links)))

@@ -65,7 +65,7 @@ def test_results_have_the_leading_shape_of_the_inputs(quantity: str, shape: tupl
 @pytest.mark.slow
 @settings(max_examples=30)
 @given(st.data())
-def test_q_v_a_and_base_broadcast_as_numpy_does(data: st.DataObject) -> None:
+def test_q_v_a_and_base_broadcast_as_in_numpy(data: st.DataObject) -> None:
     robot = load("panda", verify=False)
     full = data.draw(st.lists(st.integers(0, 4), max_size=3).map(tuple), label="shape")
     shapes = [_thinned(data, full) for _ in range(6)]
@@ -188,7 +188,7 @@ def test_an_out_may_be_a_memory_mapped_file(tmp_path: Path) -> None:
     assert (out == robot.jacobian(q, "tool0")).all()
 
 
-def test_a_q_of_views_of_out_is_read_before_out_is_written() -> None:
+def test_a_q_that_consists_of_views_of_out_is_read_before_out_is_written() -> None:
     robot = load("ur5")
     expected = robot.velocity(robot.sample(2, 1), np.ones(6), "tool0")
     out = robot.sample(2, 1)
@@ -261,7 +261,7 @@ def test_one_configuration_with_many_rates_is_not_copied() -> None:
 
 
 @pytest.mark.parametrize("representation", ["ZYZ", "xyz", "quaternion"])
-def test_an_analytical_jacobian_is_the_same_by_parts_threads_and_into_an_array(representation: str) -> None:
+def test_analytical_jacobians_are_equal_in_parts_with_threads_and_in_out(representation: str) -> None:
     robot, frame, n = load("ur5", verify=False), "tool0", 2 * PART + 5
     q, _, _ = state(robot, n, 12)
     one = robot.analytical_jacobian(q[:PART], frame, representation, nearest=0.0, threads=1)
@@ -288,7 +288,7 @@ def test_the_sample_nearest_to_a_singularity_is_named(threads: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reference", list(Reference))
-def test_a_breakdown_is_the_same_by_parts_threads_and_into_an_array(reference: Reference) -> None:
+def test_acceleration_breakdowns_are_equal_in_parts_with_threads_and_in_out(reference: Reference) -> None:
     robot, n = robot_of("planar_and_floating_in_the_middle"), 2 * PART + 5
     q, v, a = state(robot, n, 13)
     base = BaseMotion(velocity=np.linspace(-1.0, 1.0, 6 * n).reshape(n, 6))
@@ -367,19 +367,21 @@ def all_frames_faults(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("joints", [*range(1, 21), 30, 33, 64, 70])
-def test_a_chain_of_any_width(joints: int) -> None:
+def test_chains_of_any_number_of_joints_have_equal_results_in_single_calls_and_batches(joints: int) -> None:
     robot = chain(joints)
     assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, joints))) == []
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_robot_of_every_kind(name: str) -> None:
+def test_robots_of_every_kind_have_equal_results_in_single_calls_and_batches(name: str) -> None:
     robot = robot_of(name)
     assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, 2))) == []
 
 
 @pytest.mark.parametrize("floating", [False, True])
-def test_planar_floating_and_following_joints(floating: bool) -> None:
+def test_planar_floating_and_mimic_joints_have_equal_results_in_single_calls_and_batches(
+    floating: bool,
+) -> None:
     robot = mixed(floating)
     assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, 3))) == []
 
@@ -394,7 +396,7 @@ def test_each_tip_of_a_tree(branches: int, joints: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tree_8", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle"])
-def test_each_frame_of_a_tree_is_the_same_among_all_and_by_itself(name: str) -> None:
+def test_each_frame_has_equal_results_alone_and_in_a_call_for_all_frames(name: str) -> None:
     robot = robot_of(name)
     assert list(all_frames_faults(robot, *state(robot, LANES + 1, 5))) == []
 
@@ -411,7 +413,7 @@ def test_large_angles_do_not_change_other_rows(size: float) -> None:
         assert list(faults(robot, robot.tip_frame, q, v, a)) == []
 
 
-def test_the_signs_of_zeros_and_the_smallest_numbers() -> None:
+def test_signed_zeros_and_denormal_numbers_give_equal_results_in_single_calls_and_batches() -> None:
     for robot in (robot_of("panda"), mixed(floating=False), chain(9)):
         values = np.array([0.0, -0.0, 5e-324, -5e-324, 1e-310, np.finfo(float).tiny, np.pi, -np.pi / 2])
         generator = np.random.default_rng(7)

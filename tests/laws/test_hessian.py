@@ -99,14 +99,14 @@ def test_the_hessian_times_the_rates_is_the_jacobian_rate(name: str, reference: 
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "mimic_hand_40_sliding"])
-def test_how_two_joints_move_a_point_does_not_depend_on_their_order(name: str) -> None:
+def test_the_linear_rows_of_the_hessian_are_symmetric_in_the_joints(name: str) -> None:
     robot = urdfkin.load(name, verify=False) if name == "ur5" else robot_of(name)
     H = robot.hessian(state(robot, 5, 5)[0], robot.tip_frame)
     np.testing.assert_allclose(H[:, :3], H[:, :3].swapaxes(-1, -2), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5"])
-def test_which_of_two_joints_turns_first_does_matter_by_the_product_of_their_axes(name: str) -> None:
+def test_the_asymmetry_of_the_angular_rows_of_the_hessian_is_the_cross_product_of_the_axes(name: str) -> None:
     robot = urdfkin.load(name, verify=False)
     q = state(robot, 5, 5)[0]
     H = robot.hessian(q, robot.tip_frame)
@@ -115,7 +115,7 @@ def test_which_of_two_joints_turns_first_does_matter_by_the_product_of_their_axe
     np.testing.assert_allclose(H[:, 3:] - H[:, 3:].swapaxes(-1, -2), curl, rtol=0, atol=1e-14)
 
 
-def test_on_a_planar_arm_the_angular_rows_are_zero() -> None:
+def test_the_angular_rows_of_the_hessian_of_a_planar_arm_are_zero() -> None:
     arm = urdfkin.load("planar_two_link", verify=False)
     assert not arm.hessian(arm.sample(5), arm.tip_frame)[:, 3:].any()
     spatial = urdfkin.load("ur5", verify=False)
@@ -137,7 +137,7 @@ def test_hessians_in_two_references_differ_by_the_motion_of_axes_and_point(name:
         np.testing.assert_allclose(local[:, rows], turned, rtol=0, atol=1e-12 * max(1.0, np.abs(J).max()))
 
 
-def test_a_base_moves_the_hessian_as_it_moves_the_jacobian() -> None:
+def test_the_placement_of_the_base_rotates_the_hessian() -> None:
     robot = urdfkin.load("panda")
     q = robot.sample(4)
     T = pose([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [1.0, 2.0, 3.0])
@@ -177,7 +177,9 @@ def pinocchios(model: Any, q: FloatArray, reference: Any) -> tuple[FloatArray, F
 
 
 @pytest.mark.parametrize("reference", [pin.LOCAL, pin.WORLD, pin.LOCAL_WORLD_ALIGNED])
-def test_pinocchios_array_has_eigens_order_and_says_numpys(reference: Any) -> None:
+def test_the_array_of_hessians_from_pinocchio_has_column_major_order_labelled_as_row_major(
+    reference: Any,
+) -> None:
     model = pin.buildModelFromXML(urdfkin.load("ur5", verify=False).urdf)
     said, is_so = pinocchios(model, np.linspace(0.1, 1.3, 6), reference)
     assert np.abs(said - is_so).max() > 0.1
@@ -185,7 +187,7 @@ def test_pinocchios_array_has_eigens_order_and_says_numpys(reference: Any) -> No
     assert np.abs(said.ravel("K").reshape(nv, nv, 6).T - is_so).max() < 1e-8
 
 
-def test_pinocchio_has_columns_of_one_joint_change_each_other_in_local_behind_another() -> None:
+def test_pinocchios_local_hessian_of_a_free_flyer_behind_a_joint_has_wrong_columns() -> None:
     model = pin.Model()
     arm = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "arm")
     ball = model.addJoint(arm, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "ball")

@@ -45,7 +45,7 @@ def close(one: FloatArray, other: FloatArray, *sizes: FloatArray) -> bool:
 
 
 @pytest.mark.parametrize("reference", list(Reference))
-def test_the_velocity_is_the_jacobian_times_the_rates(robot: Robot, reference: Reference) -> None:
+def test_the_velocity_is_the_jacobian_times_the_joint_velocities(robot: Robot, reference: Reference) -> None:
     q, v, _ = state(robot, 17, 1)
     for frame in frames(robot):
         J = robot.jacobian(q, frame, reference)
@@ -53,7 +53,7 @@ def test_the_velocity_is_the_jacobian_times_the_rates(robot: Robot, reference: R
         assert close(np.einsum("nij,nj->ni", J, v), velocity, J)
 
 
-def test_references_are_related_by_the_motion_of_a_rigid_body(robot: Robot) -> None:
+def test_results_in_the_reference_frames_are_related_by_rigid_body_motion(robot: Robot) -> None:
     q, v, a = state(robot, 17, 3)
     for frame in frames(robot):
         T = robot.placement(q, frame)
@@ -102,7 +102,7 @@ def test_the_power_and_the_joint_torques_of_a_wrench_do_not_depend_on_the_refere
     assert close(np.einsum("nj,nj->n", torques[ALIGNED], v), powers[ALIGNED], size)
 
 
-def test_rates_twice_as_fast_double_velocities_and_quadruple_accelerations_exactly(robot: Robot) -> None:
+def test_doubled_joint_velocities_double_velocities_and_quadruple_accelerations_exactly(robot: Robot) -> None:
     q, v, a = state(robot, 5, 6)
     for frame in frames(robot):
         for reference in Reference:
@@ -131,7 +131,7 @@ def test_frames_joined_by_fixed_joints_move_as_one_body(robot: Robot) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle"])
-def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint(name: str) -> None:
+def test_a_moving_base_gives_the_results_of_a_floating_root_joint(name: str) -> None:
     robot, free = robot_of(name), robot_of(name, root_joint="floating")
     q, v, a = state(robot, 6, 8)
     generator = np.random.default_rng(9)
@@ -153,7 +153,7 @@ def test_a_moving_base_is_the_same_robot_on_a_floating_root_joint(name: str) -> 
 
 
 @pytest.mark.parametrize("name", ["panda", "mimic_hand_40_sliding", "followers_of_followers", "tree_8"])
-def test_the_jacobian_of_coupled_joints_is_that_of_free_ones_times_g(name: str) -> None:
+def test_the_jacobian_with_mimic_joints_is_the_jacobian_of_free_joints_times_g(name: str) -> None:
     coupled, free = robot_of(name), robot_of(name, mimic=False)
     mimic_joints = [joint for joint in coupled.tree.joints if joint.mimic]
     assert mimic_joints
@@ -199,7 +199,7 @@ def room(bound: Bound) -> FloatArray:
 
 
 @pytest.mark.parametrize("name", [*catalogue(), *sorted(set(NAMES) - set(catalogue()))])
-def test_the_jacobian_and_its_rate_make_the_acceleration(name: str) -> None:
+def test_the_acceleration_is_the_sum_of_the_terms_of_the_jacobian_and_of_the_jacobian_rate(name: str) -> None:
     robot = urdfkin.load(name, verify=False) if name in catalogue() else robot_of(name)
     tree = robot.tree
     generator = np.random.default_rng(5)
@@ -269,7 +269,7 @@ def assert_converges(error: FloatArray, reach: float, order: int) -> None:
 )
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", NAMES)
-def test_the_jacobian_and_the_acceleration_are_limits_of_differences_of_second_order_along_constant_rates(
+def test_central_differences_converge_to_jacobian_and_acceleration_with_second_order(
     name: str, seed: int, order: int
 ) -> None:
     linear, angular, reach = errors(name, seed, order)
@@ -277,7 +277,9 @@ def test_the_jacobian_and_the_acceleration_are_limits_of_differences_of_second_o
     assert_converges(angular, 1.0, order)
 
 
-def test_a_jacobian_that_is_slightly_wrong_does_not_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_convergence_check_detects_an_error_of_1e_7_in_a_jacobian(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     linear, _, reach = errors("panda", 0, order=1)
     with pytest.raises(AssertionError):
         assert_converges(linear + 1e-7, reach, 1)

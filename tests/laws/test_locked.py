@@ -99,7 +99,7 @@ def demand_the_columns(robot: Robot, names: list[str], q: FloatArray, rng: np.ra
 
 
 @pytest.mark.parametrize("name", LOCKS)
-def test_results_of_a_locked_robot_are_the_columns_of_the_whole_robot(name: str) -> None:
+def test_results_of_a_locked_robot_are_columns_of_the_complete_robots_results(name: str) -> None:
     robot, rng = robot_of(name), np.random.default_rng(1)
     names = list(LOCKS[name] or lockable(robot)[::2])
     for q in robot.sample(3, seed=2):
@@ -135,7 +135,9 @@ def test_a_locked_robot_on_a_moving_base_agrees_with_pinocchio(name: str) -> Non
 @settings(max_examples=60, deadline=None)
 @given(st.data())
 @pytest.mark.filterwarnings("ignore::urdfkin.NotVerifiedWarning")
-def test_any_tree_with_any_joints_locked_is_the_whole_tree_at_these_values(data: st.DataObject) -> None:
+def test_any_tree_with_locked_joints_equals_the_complete_tree_at_the_locked_values(
+    data: st.DataObject,
+) -> None:
     robot = loaded(data.draw(trees(max_joints=6)), verify=False)
     names = [name for name in lockable(robot) if data.draw(st.booleans())]
     q = robot.sample(1, seed=data.draw(st.integers(0, 99)))[0]
@@ -160,7 +162,7 @@ def test_a_link_may_have_the_name_of_a_locked_joint(
     assert locked.certificate().verified
 
 
-def test_a_slide_that_is_locked_back_to_its_parent_keeps_its_rounding_in_the_bound() -> None:
+def test_the_bound_of_a_prismatic_joint_locked_at_the_parent_origin_includes_rounding() -> None:
     p, origin = np.array([0.1, 0.7, -0.3]), 'xyz="0.1 0.7 -0.3" rpy="0.4 -1.1 2.2"'
     length = math.hypot(*p)
     axis = rotation_from_rpy([0.4, -1.1, 2.2]).T @ p
@@ -178,7 +180,7 @@ def test_a_slide_that_is_locked_back_to_its_parent_keeps_its_rounding_in_the_bou
 # -- independence ------------------------------------------------------------------------------------
 
 
-def test_pinocchio_reads_the_whole_text_and_reduces_its_model() -> None:
+def test_pinocchio_reads_the_complete_text_and_reduces_the_model_of_a_locked_robot() -> None:
     whole = robot_of("panda")
     locked = whole.locked({"panda_finger_joint1": 0.04})
     assert locked.urdf == whole.urdf
@@ -191,7 +193,7 @@ def test_pinocchio_reads_the_whole_text_and_reduces_its_model() -> None:
 
 @pytest.mark.parametrize("oracle", [PINOCCHIO, MUJOCO])
 @pytest.mark.parametrize("slip", ["value", "mimic", "sense", "free"])
-def test_the_oracle_finds_a_wrongly_locked_tree(slip: str, oracle: OracleLibrary) -> None:
+def test_both_oracles_detect_a_wrongly_locked_tree(slip: str, oracle: OracleLibrary) -> None:
     robot = robot_of("panda").locked({"panda_finger_joint1": 0.03, "panda_joint7": 0.5})
     robot.verifier.library = oracle
     other = {
@@ -209,7 +211,7 @@ def test_the_oracle_finds_a_wrongly_locked_tree(slip: str, oracle: OracleLibrary
         robot.placement(robot.neutral(), ["panda_rightfinger", "panda_hand_tcp"], verify=True)
 
 
-def test_a_mimic_joint_that_stays_at_zero_is_found() -> None:
+def test_an_error_that_leaves_a_locked_mimic_joint_at_zero_is_detected() -> None:
     whole = robot_of("panda")
     robot = whole.locked({"panda_finger_joint1": 0.03})
     joints = list(robot.tree.joints)
@@ -230,7 +232,7 @@ def test_with_free_mimic_joints_a_lock_holds_only_the_named_joint() -> None:
 # -- other forms of the same robot -------------------------------------------------------------------
 
 
-def test_all_ways_to_lock_give_the_same_robot() -> None:
+def test_every_way_to_lock_a_joint_gives_the_same_robot() -> None:
     panda = urdfkin.load("panda")
     arm, lock = [f"panda_joint{i}" for i in range(1, 8)], {"panda_finger_joint1": 0.04}
     first = panda.locked(lock)
@@ -254,7 +256,7 @@ def test_all_ways_to_lock_give_the_same_robot() -> None:
     assert (twice.nq, panda.nq) == (6, 8)
 
 
-def test_the_rest_of_the_joints_are_locked_at_zero_or_at_a_pose() -> None:
+def test_the_joints_that_are_not_listed_are_locked_at_zero_or_at_a_pose() -> None:
     panda = urdfkin.load("panda")
     ready = panda.locked("ready, panda_joint7=30deg", joints=["panda_joint2", "panda_joint1"])
     assert ready.joint_names == ("panda_joint1", "panda_joint2")
@@ -316,7 +318,7 @@ def test_a_robot_from_another_format_can_be_locked(source: str) -> None:
     assert locked.verifier.reading == whole.verifier.reading
 
 
-def test_calibration_of_a_locked_robot_writes_the_origins_of_the_whole_text() -> None:
+def test_calibration_of_a_locked_robot_writes_the_origins_in_the_complete_text() -> None:
     whole = urdfkin.load("panda")
     true = urdfkin.load(whole.urdf.replace('xyz="0 0 0.107"', 'xyz="0 0.001 0.107"'))
     lock = {"panda_joint7": 0.6, "panda_finger_joint1": 0.02}
@@ -366,7 +368,7 @@ def test_an_invalid_lock_raises_an_error(options: dict[str, Any], words: str) ->
     "options",
     [{"joints": ["FL_hip_joint"]}, {"lock": {"root_joint": [0.0] * 7}}, {"lock": {"root_joint.x": 1.0}}],
 )
-def test_a_floating_joint_is_not_locked(options: dict[str, Any]) -> None:
+def test_a_floating_joint_cannot_be_locked(options: dict[str, Any]) -> None:
     with pytest.raises(urdfkin.InputError, match="a floating joint has no single value to lock"):
         urdfkin.load("a1", root_joint="floating").locked(**options)
 
@@ -393,7 +395,9 @@ def test_a_mimic_joint_outside_its_limits_is_refused_unless_no_value_satisfies_i
 
 @pytest.mark.parametrize("convention", ["isaaclab", "isaaclab3", "mujoco", "newton", "alphabetical"])
 @pytest.mark.parametrize("name", ["a1", "go2", "talos", "baxter"])
-def test_a_lock_only_removes_a_joint_from_the_order_of_another_tool(name: str, convention: str) -> None:
+def test_a_lock_only_removes_the_locked_joint_from_the_joint_order_of_another_tool(
+    name: str, convention: str
+) -> None:
     robot = urdfkin.load(name, verify=False, mimic=False)
     order = robot.convention(convention).joint_names
     middle = robot.sample(1)[0]
@@ -402,14 +406,14 @@ def test_a_lock_only_removes_a_joint_from_the_order_of_another_tool(name: str, c
         assert locked.convention(convention).joint_names == tuple(x for x in order if x != name_of)
 
 
-def test_a_convention_that_lists_a_locked_joint_leaves_it_out(tmp_path: Path) -> None:
+def test_a_convention_omits_a_locked_joint_from_the_joint_order(tmp_path: Path) -> None:
     file = tmp_path / "map.toml"
     file.write_text('joints = ["joint_2", "joint_1"]\n')
     arm = urdfkin.load("planar_two_link", lock={"joint_1": 0.2})
     assert arm.convention(file).joint_names == ("joint_2",)
 
 
-def test_the_code_of_a_locked_robots_table_names_the_lock() -> None:
+def test_exported_code_of_a_locked_robot_states_the_locked_joint() -> None:
     arm = urdfkin.load("ur5", lock={"elbow_joint": 0.5})
     for form in ("tree", "dh", "screws"):
         assert "Joint elbow_joint is locked at 0.5" in arm.export("c", "tool0", ["placement"], form=form)

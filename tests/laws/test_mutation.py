@@ -75,13 +75,13 @@ def robots() -> list[Robot]:
 
 
 @pytest.mark.long
-def test_the_equations_as_they_are_agree_with_pinocchio(robots: list[Robot]) -> None:
+def test_the_unmodified_equations_agree_with_pinocchio(robots: list[Robot]) -> None:
     assert max(map(farthest, robots)) < 30.0
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("equation", "term"), list(terms()))
-def test_a_term_of_an_equation_that_is_off_by_1e_10_is_caught(
+def test_a_relative_error_of_1e_10_in_any_term_of_an_equation_is_detected(
     robots: list[Robot], equation: str, term: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
@@ -127,7 +127,7 @@ def test_a_wrong_axis_or_mimic_rule_is_caught(before: str, after: str, frame: st
         robot.placement(robot.sample(20, 1), frame)
 
 
-def test_pinocchio_reads_the_text_itself() -> None:
+def test_the_pinocchio_oracle_reads_the_robots_text_and_not_the_tree() -> None:
     # What the oracle computes follows the text it was given; of the tree only names and layout enter.
     robot = urdfkin.load("panda")
     moved = robot.urdf.replace('xyz="0 0 0.333"', 'xyz="0 0 0.433"')

@@ -44,7 +44,7 @@ def walker() -> KinematicTree:
 @pytest.mark.slow
 @given(trees())
 @settings(max_examples=50)
-def test_every_path_of_a_tree_is_placed_as_pinocchio_places_it(tree: KinematicTree) -> None:
+def test_the_placement_of_every_path_of_a_tree_agrees_with_pinocchio(tree: KinematicTree) -> None:
     oracle = TreeOracle(tree)
     q = configurations(tree.nq, 4)
     ends = [tree.links[0], tree.links[-1], tree.links[len(tree.links) // 2]]
@@ -62,7 +62,7 @@ def test_a_path_through_the_common_ancestor_goes_up_and_then_down(walker: Kinema
     assert [j.backwards for j in path.joints] == [True, True, False, False]
 
 
-def test_a_joint_passed_backwards_has_its_axis_reversed_and_keeps_its_sign(walker: KinematicTree) -> None:
+def test_a_joint_passed_backwards_has_a_reversed_axis_and_an_unchanged_sign(walker: KinematicTree) -> None:
     there, back = chain(walker, "left_shin", "left_thigh"), chain(walker, "left_thigh", "left_shin")
     np.testing.assert_array_equal(there.axes(), [[0.0, 0.0, 1.0]])
     np.testing.assert_array_equal(back.axes(), [[0.0, 0.0, -1.0]])
@@ -72,7 +72,7 @@ def test_a_joint_passed_backwards_has_its_axis_reversed_and_keeps_its_sign(walke
 @pytest.mark.slow
 @given(trees(min_joints=1))
 @settings(max_examples=50)
-def test_a_chain_and_its_reverse_undo_each_other(tree: KinematicTree) -> None:
+def test_the_placement_of_a_reversed_chain_is_the_inverse(tree: KinematicTree) -> None:
     there, back = chain(tree, "tip", "l0"), chain(tree, "l0", "tip")
     q = configurations(tree.nq, 4)
     T_there, T_back = (path.placement(path.coupling.select(tree, q)) for path in (there, back))
@@ -104,7 +104,7 @@ def test_a_missing_name_raises_an_error(walker: KinematicTree) -> None:
         chain(walker, "left_foot").placement({"left_knee": 0.4})
 
 
-def test_interorigin_vectors_add_up_from_the_first_joint_to_the_tip(walker: KinematicTree) -> None:
+def test_the_sum_of_interorigin_vectors_leads_from_the_first_joint_to_the_tip(walker: KinematicTree) -> None:
     path = chain(walker, "left_foot", "right_thigh")
     q = configurations(len(path.joint_names), 5)
     total = path.origins(q)[:, 0] + path.interorigin(q).sum(axis=-2)
@@ -121,13 +121,15 @@ def test_the_lengths_bound_the_distance_between_origins(tree: KinematicTree) -> 
         assert (np.array(distances) <= path.lengths * (1 + 8 * EPS) + 1e-300).all()
 
 
-def test_a_path_over_a_floating_joint_says_what_to_do(walker: KinematicTree) -> None:
+def test_the_error_about_a_path_over_a_floating_joint_contains_a_remedy(walker: KinematicTree) -> None:
     with pytest.raises(InputError, match=r"joint float: a floating joint .*'balloon' outwards"):
         chain(walker, "balloon", "pelvis")
     assert chain(walker, "balloon", "balloon").joints == ()
 
 
-def test_the_wrong_number_of_coordinates_names_the_right_ones(walker: KinematicTree) -> None:
+def test_the_error_about_a_wrong_number_of_coordinates_lists_the_expected_coordinates(
+    walker: KinematicTree,
+) -> None:
     with pytest.raises(InputError, match="left_hip, left_knee"):
         chain(walker, "left_foot").placement(np.zeros(3))
     with pytest.raises(InputError, match="numbers for walker"):
@@ -155,7 +157,7 @@ def moved(name: str, T: FloatArray) -> Callable[..., FloatArray]:
         ("tool", shift(0.0, 1e-12, 0.0), "an origin 1e-12 m off, a direction 0"),
     ],
 )
-def test_an_origin_or_a_direction_off_by_itself_is_a_disagreement(
+def test_a_wrong_origin_alone_or_a_wrong_direction_alone_is_a_disagreement(
     frame: str, T: FloatArray, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = urdfs.robot(
@@ -181,7 +183,7 @@ PATH = Path((A, *(step for motion in MOTIONS for step in (motion, A))))
 AMOUNTS = np.random.default_rng(0).uniform(-1.0, 1.0, (4, len(MOTIONS)))
 
 
-def test_the_frames_of_a_path_are_the_products_of_its_steps() -> None:
+def test_the_frames_of_a_path_are_products_of_the_elementary_motions() -> None:
     T, frames = np.broadcast_to(A, (4, 4, 4)), PATH.frames(AMOUNTS)
     for k, motion in enumerate(MOTIONS):
         T = T @ elementary(motion.axis, motion.turns, AMOUNTS[:, k])
@@ -190,7 +192,7 @@ def test_the_frames_of_a_path_are_the_products_of_its_steps() -> None:
         np.testing.assert_allclose(frames[:, 2 * k + 2], T, atol=1e-15)
 
 
-def test_the_columns_of_a_path_are_difference_quotients() -> None:
+def test_the_jacobian_columns_of_a_path_are_difference_quotients() -> None:
     poses, columns = PATH.columns(AMOUNTS)
     for k in range(len(MOTIONS)):
         step = 1e-6 * np.eye(len(MOTIONS))[k]
@@ -201,6 +203,6 @@ def test_the_columns_of_a_path_are_difference_quotients() -> None:
     np.testing.assert_array_equal(poses, PATH.poses(AMOUNTS))
 
 
-def test_a_motion_by_zero_changes_nothing() -> None:
+def test_an_elementary_motion_by_zero_is_the_identity() -> None:
     zero = Path((A, *MOTIONS)).poses(np.zeros(len(MOTIONS)))
     np.testing.assert_array_equal(zero, A)

@@ -56,7 +56,7 @@ def test_each_function_warns_of_degrees(ur5: Robot, way: str) -> None:
     assert caught[0].filename == __file__
 
 
-def test_the_warning_is_the_line_about_the_limits(ur5: Robot) -> None:
+def test_the_warning_about_degrees_contains_the_line_about_the_limits(ur5: Robot) -> None:
     (first, *_) = ur5.limit_violations(DEGREES)
     assert degrees_lines(ur5.tree, np.array(DEGREES))[0] == first
     with pytest.warns(urdfkin.DegreesWarning) as caught:
@@ -75,7 +75,7 @@ def test_the_warning_is_the_line_about_the_limits(ur5: Robot) -> None:
         [3.0, -3.0, 1.0, 0.0, 0.0, 7.0],
     ],
 )
-def test_plausible_angles_and_nonsense_cause_no_warning(ur5: Robot, q: Any) -> None:
+def test_plausible_angles_and_absurdly_large_values_cause_no_warning(ur5: Robot, q: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", urdfkin.DegreesWarning)
         ur5.to_pinocchio(q)
@@ -120,7 +120,7 @@ def test_a_command_prints_one_line_about_degrees(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_plot_of_a_trajectory_in_degrees_says_so(tmp_path: Any) -> None:
+def test_a_plot_of_a_trajectory_in_degrees_prints_a_warning(tmp_path: Any) -> None:
     names = urdfkin.load("ur5").coordinate_names
     file = tmp_path / "t.csv"
     rows = [[k / 10.0, *(k / 10.0 * x for x in DEGREES)] for k in range(11)]
@@ -130,7 +130,7 @@ def test_a_plot_of_a_trajectory_in_degrees_says_so(tmp_path: Any) -> None:
     assert "elbow_joint: 90 is outside" in done.err
 
 
-def test_calibrate_refuses_degrees_even_by_force_unless_they_are_radians(ur5: Robot) -> None:
+def test_calibrate_refuses_degrees_even_with_force_unless_radians_is_true(ur5: Robot) -> None:
     q = ur5.sample(30)
     T = ur5.placement(q, "tool0")
     for force in (False, True):

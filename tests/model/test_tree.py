@@ -44,17 +44,17 @@ def test_a_mimic_joint_has_the_index_of_the_mimicked_joint(hand: KinematicTree) 
     assert hand.q_index[hand.joint_index("thumb")] == 1
 
 
-def test_a_joints_frame_is_its_child_links_frame(hand: KinematicTree) -> None:
+def test_the_frame_of_a_joint_is_the_frame_of_the_child_link(hand: KinematicTree) -> None:
     assert hand.frame_link("tip") == hand.frame_link("tip_link") == 2
     assert hand.frame_names[:4] == ("palm", "finger", "finger_link", "tip")
 
 
-def test_an_unknown_frame_offers_the_nearest_names(hand: KinematicTree) -> None:
+def test_the_error_about_an_unknown_frame_lists_the_nearest_names(hand: KinematicTree) -> None:
     with pytest.raises(UnknownNameError, match=r"unknown frame 'tip_lnk'; did you mean tip_link"):
         hand.frame_link("tip_lnk")
 
 
-def test_a_name_of_a_link_and_of_a_joint_elsewhere_must_be_told_apart() -> None:
+def test_a_name_of_a_link_and_of_an_unrelated_joint_needs_a_prefix() -> None:
     tree = build_tree("r", "a", [(joint("b"), "a", "c"), (joint("d"), "c", "b")])
     with pytest.raises(InputError, match=r"write 'link:b' or 'joint:b'"):
         tree.frame_link("b")
@@ -62,7 +62,7 @@ def test_a_name_of_a_link_and_of_a_joint_elsewhere_must_be_told_apart() -> None:
     assert [tree.frame_name(link) for link in range(3)] == ["a", "c", "link:b"]
 
 
-def test_the_path_leads_from_the_root_outwards(hand: KinematicTree) -> None:
+def test_a_path_lists_the_joints_from_the_root_outwards(hand: KinematicTree) -> None:
     assert [hand.joints[i].name for i in hand.path(hand.link_index("nail"))] == ["finger", "tip", "mount"]
     assert [hand.links[i] for i in hand.leaves()] == ["nail", "thumb_link"]
 
@@ -136,7 +136,9 @@ def both(name: str, root: str | None) -> tuple[Robot, Any]:
 
 @pytest.mark.parametrize("size", [1e-9, 1e-3, 0.49, 0.51, 2.5])
 @pytest.mark.parametrize(("name", "root"), SUBJECTS)
-def test_a_step_is_pinocchios_and_its_difference_leads_back(name: str, root: str | None, size: float) -> None:
+def test_integrate_agrees_with_pinocchio_and_difference_is_the_inverse(
+    name: str, root: str | None, size: float
+) -> None:
     robot, model = both(name, root)
     q = robot.sample(20, seed=3)
     v = np.random.default_rng(4).uniform(-1.0, 1.0, (20, robot.nv))
@@ -173,7 +175,7 @@ def test_small_steps_at_constant_rates_add_up_to_a_large_step(name: str, root: s
     np.testing.assert_allclose(robot.difference(robot.integrate(q, v), walked), 0.0, atol=1e-13)
 
 
-def test_the_frames_velocity_is_the_difference_quotient_along_a_step() -> None:
+def test_the_velocity_of_a_frame_is_the_difference_quotient_along_an_integration_step() -> None:
     robot, _ = both("a1", "floating")
     q, v = robot.sample(1, seed=5)[0], np.random.default_rng(6).uniform(-1.0, 1.0, robot.nv)
     h = 1e-5
@@ -181,7 +183,7 @@ def test_the_frames_velocity_is_the_difference_quotient_along_a_step() -> None:
     np.testing.assert_allclose((ahead - behind) / (2 * h), robot.velocity(q, v, "FL_foot")[:3], atol=1e-8)
 
 
-def test_batches_broadcast_or_are_refused() -> None:
+def test_batches_of_integrate_and_difference_broadcast_or_are_refused() -> None:
     robot, _ = both("a1", "planar")
     q, v = robot.sample(4), np.ones((3, 1, robot.nv))
     assert robot.integrate(q, v).shape == (3, 4, robot.nq)
@@ -304,6 +306,6 @@ def test_from_pinocchio_refuses_an_invalid_cosine_and_sine(at: int) -> None:
 
 
 @pytest.mark.parametrize("length", [5, 7, 9])
-def test_a_configuration_of_another_length_is_refused(length: int) -> None:
+def test_a_configuration_of_the_wrong_length_is_refused(length: int) -> None:
     with pytest.raises(InputError, match="wrong length"):
         from_pinocchio(with_everything(), np.zeros(length), mimic=True)

@@ -59,7 +59,7 @@ def test_a_page_has_no_serious_violation_no_error_no_horizontal_scrolling_and_no
     assert look(desk, pages[name], width, dark, axe) == []
 
 
-def test_the_audit_finds_faults(tmp_path: Path, desk: Browser) -> None:
+def test_the_audit_detects_faults_of_a_page(tmp_path: Path, desk: Browser) -> None:
     bad = tmp_path / "bad.html"
     bad.write_text(
         "<!doctype html><html><title>t</title><style>*:focus{outline:0}</style><p style='width:900px;"
@@ -85,7 +85,7 @@ def test_the_tab_key_reaches_controls_with_a_name_and_a_visible_focus(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_html_has_no_error(name: str, pages: dict[str, Page]) -> None:
+def test_the_html_of_a_page_has_no_error(name: str, pages: dict[str, Page]) -> None:
     jar = html_checker()
     if jar is None:
         pytest.skip("the Nu HTML checker or Java is not installed: see scripts/audit_pages.py")

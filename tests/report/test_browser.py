@@ -157,7 +157,7 @@ def test_the_overview_sorts_both_ways_and_filters_rows(browser: Browser) -> None
     assert browser.probe("find", "") == ["2 of 2", [False, False]]
 
 
-def test_a_link_unfolds_its_robot(browser: Browser) -> None:
+def test_a_link_to_a_robot_unfolds_the_robot(browser: Browser) -> None:
     browser.js("document.querySelectorAll('#overview a')[1].click()")
     browser.settle()
     assert browser.js("return document.querySelector('#robot-1').open")
@@ -177,7 +177,9 @@ def test_the_button_selects_the_next_theme_of_the_page_and_the_view(browser: Bro
     assert browser.js(paper) == seen[0][1]
 
 
-def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path], fleet: Path) -> None:
+def test_a_name_that_contains_html_is_shown_as_text(
+    desk: Browser, pages: dict[str, Path], fleet: Path
+) -> None:
     desk.open(pages["hostile"])
     desk.probe("unfoldAll")
     desk.settle()
@@ -194,7 +196,9 @@ def test_a_hostile_name_does_nothing(desk: Browser, pages: dict[str, Path], flee
 
 
 @pytest.mark.parametrize("width", [1280, 980, 760])
-def test_no_column_is_cut_and_no_card_is_alone(width: int, pages: dict[str, Path], tmp_path: Path) -> None:
+def test_no_table_is_wider_than_the_page_and_each_row_of_cards_has_at_least_three(
+    width: int, pages: dict[str, Path], tmp_path: Path
+) -> None:
     with opened(tmp_path, width=width, height=1000) as browser:
         browser.open(pages["arms"])
         browser.js("document.querySelector('details.robot').open = true")
@@ -256,7 +260,7 @@ def test_a_page_with_two_thousand_robots_loads_and_filters_fast(desk: Browser, f
     assert desk.errors() == []
 
 
-def test_a_robots_details_come_from_its_file_when_it_is_unfolded(desk: Browser, fleet: Path) -> None:
+def test_an_unfolded_robot_loads_details_from_a_separate_file(desk: Browser, fleet: Path) -> None:
     desk.requests()
     desk.open(fleet)
     desk.js("location.hash = '#robot-1234'")

@@ -87,7 +87,7 @@ def test_a_failed_run_and_fewer_samples_are_regressions() -> None:
     assert (False, "samples: 2 -> 6") in words(new, arms())
 
 
-def test_a_changed_joint_is_a_change_even_if_it_is_tiny() -> None:
+def test_a_tiny_change_of_a_joint_is_reported() -> None:
     new: Any = arms()
     joint = new["robots"][1]["model"]["joints"][2]
     axis = joint["axis"]
@@ -111,7 +111,7 @@ def test_a_changed_joint_is_a_change_even_if_it_is_tiny() -> None:
     assert told["axis"].endswith("rotated by 10 prad")
 
 
-def test_a_joint_that_follows_another_way_is_gone_or_new_is_told() -> None:
+def test_a_changed_mimic_rule_and_a_missing_or_new_joint_are_reported() -> None:
     before, after = (cast("Any", arms())["robots"][1]["model"] for _ in range(2))
     before["joints"][2]["mimic"] = None
     after["joints"][2]["mimic"] = {"leader": "wheel", "multiplier": -2.0, "offset": 0.25}
@@ -126,7 +126,7 @@ def test_a_joint_that_follows_another_way_is_gone_or_new_is_told() -> None:
     assert (False, "ur5: joint other: nothing -> revolute") in lines
 
 
-def test_a_wider_bound_and_tables_that_are_compared_no_more_are_regressions() -> None:
+def test_a_wider_bound_and_tables_no_longer_compared_are_regressions() -> None:
     new: Any = arms()
     check = new["robots"][0]["checks"][1]
     check["bound"][1] *= 3.0

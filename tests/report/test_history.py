@@ -41,7 +41,7 @@ def test_runs_are_ordered_by_start_and_a_copy_counts_once(month: Path) -> None:
     assert found.exit_code == 0
 
 
-def test_a_robot_has_a_point_for_each_run_that_contains_it(month: Path) -> None:
+def test_the_history_of_a_robot_has_a_point_for_each_run_with_the_robot(month: Path) -> None:
     found = history([month])
     assert {name: marks(found, points) for name, points in found.robots.items()} == {
         "panda": "✓✓✓✓✗✓✓✓", "ur5": "✓✓✓✓✓✓✓✓", "broken.urdf": "····✗···",
@@ -89,7 +89,7 @@ def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_a_store_is_a_run(tmp_path: Path) -> None:
+def test_a_store_counts_as_a_run_in_the_history(tmp_path: Path) -> None:
     validate("planar_two_link", samples=2, store=tmp_path / "nightly" / "store")
     put(tmp_path / "nightly" / "a.json", run_on(1, arms()))
     found = history([tmp_path / "nightly"])
@@ -130,7 +130,7 @@ def test_the_number_and_size_of_reports_are_limited(month: Path, monkeypatch: py
         history([month])
 
 
-def test_no_report_at_all_is_an_error_with_the_remedy(tmp_path: Path) -> None:
+def test_a_history_without_a_report_is_an_error_with_the_remedy(tmp_path: Path) -> None:
     err = refused("report history", str(tmp_path))
     assert "no report to show" in err
     assert "urdfkin validate ROBOT --json FILE" in err

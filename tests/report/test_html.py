@@ -103,7 +103,7 @@ def test_a_page_without_matplotlib_states_that_plots_are_missing(monkeypatch: py
     assert 'class="plot"' not in text
 
 
-def test_equal_documents_give_equal_pages_and_a_robot_adds_little() -> None:
+def test_equal_documents_give_equal_pages_and_a_robot_adds_at_most_140_kilobytes() -> None:
     assert as_html(arms()) == as_html(arms())
     two, one = arms(), arms()
     del one["robots"][0]

@@ -40,7 +40,7 @@ def assert_is_the_robots(
 
 
 @pytest.mark.parametrize("reference", REFERENCES)
-def test_it_is_what_the_robots_methods_give_and_pinocchio_confirms(reference: str) -> None:
+def test_a_frame_motion_has_the_results_of_the_robots_methods_and_is_checked(reference: str) -> None:
     robot = urdfkin.load("panda")
     x = frame_motion(robot, state(robot), robot.tip_frame, reference)
     assert_is_the_robots(x, robot, *state(robot))
@@ -48,7 +48,9 @@ def test_it_is_what_the_robots_methods_give_and_pinocchio_confirms(reference: st
     assert all(check.units.shape == (N,) for check in x.checks.values())
 
 
-def test_a_disagreement_is_shown_and_not_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disagreement_of_a_frame_motion_is_stored_and_raises_no_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     robot = urdfkin.load("panda")
     right = PinocchioOracle.velocities
     monkeypatch.setattr(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-10))
@@ -58,7 +60,7 @@ def test_a_disagreement_is_shown_and_not_raised(monkeypatch: pytest.MonkeyPatch)
     assert (x.checks["placement"].share < 1.0).all()
 
 
-def test_manipulability_is_the_root_of_the_determinant() -> None:
+def test_manipulability_is_the_square_root_of_the_determinant_of_j_times_j_transposed() -> None:
     robot = urdfkin.load("ur5")
     x = frame_motion(robot, state(robot), robot.tip_frame)
     for rows in ROWS.values():
@@ -69,7 +71,7 @@ def test_manipulability_is_the_root_of_the_determinant() -> None:
     np.testing.assert_allclose(x.singular_values.prod(axis=1), x.manipulability(), rtol=1e-12)
 
 
-def test_a_frame_that_nothing_moves_has_no_manipulability() -> None:
+def test_the_manipulability_of_a_frame_that_no_joint_moves_is_zero() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(N, 0)
     still = np.zeros_like(q)
@@ -78,9 +80,7 @@ def test_a_frame_that_nothing_moves_has_no_manipulability() -> None:
 
 @pytest.mark.parametrize("reference", REFERENCES)
 @pytest.mark.parametrize("rows", ROWS)
-def test_manipulability_is_the_same_for_one_configuration_and_for_a_batch_and_is_the_robots(
-    rows: str, reference: str
-) -> None:
+def test_manipulability_is_equal_for_one_configuration_and_in_a_batch(rows: str, reference: str) -> None:
     robot = urdfkin.load(SLIDE)
     q, still = np.array([[0.3, 0.0], [0.3, 1.0]]), np.zeros((2, 2))
     both = frame_motion(robot, (q, still, still), "c", reference).manipulability(ROWS[rows])

@@ -20,7 +20,7 @@ def robot() -> Robot:
     return urdfkin.load("ur5")
 
 
-def test_a_line_runs_from_rest_to_rest_and_halfway_at_half_time(robot: Robot) -> None:
+def test_a_line_starts_and_ends_at_rest_and_is_halfway_at_half_time(robot: Robot) -> None:
     x = line(robot, robot.neutral(), END, 2.0, 101)
     np.testing.assert_array_equal(x.q[0], robot.neutral())
     np.testing.assert_allclose(x.q[-1], END, rtol=1e-15)
@@ -30,7 +30,7 @@ def test_a_line_runs_from_rest_to_rest_and_halfway_at_half_time(robot: Robot) ->
     assert not x.q.flags.writeable
 
 
-def test_a_lines_rates_are_its_derivatives(robot: Robot) -> None:
+def test_velocities_and_accelerations_of_a_line_are_derivatives(robot: Robot) -> None:
     # The error of fourth-order differences of a quintic is h^4 times the fifth derivative.
     x = line(robot, robot.neutral(), END, 1.5, 401)
     h = x.t[1]
@@ -40,13 +40,15 @@ def test_a_lines_rates_are_its_derivatives(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize(("duration", "samples"), [(0.0, 10), (-1.0, 10), (float("nan"), 10), (1.0, 2)])
-def test_a_line_without_time_or_samples_is_refused(robot: Robot, duration: float, samples: int) -> None:
+def test_a_line_without_a_positive_duration_or_enough_samples_is_refused(
+    robot: Robot, duration: float, samples: int
+) -> None:
     with pytest.raises(InputError, match="duration"):
         line(robot, robot.neutral(), END, duration, samples)
 
 
 @pytest.mark.parametrize("root", ["floating", "planar"])
-def test_a_floating_base_goes_along_a_line_whose_rates_are_those_of_its_frames(root: str) -> None:
+def test_velocities_on_a_line_of_a_floating_base_are_derivatives_of_frame_positions(root: str) -> None:
     robot = urdfkin.load("a1", root_joint=root, verify=False)
     ends = robot.sample(2, seed=8)
     x = line(robot, ends[0], ends[1], 2.0, 2001)
@@ -74,7 +76,9 @@ def columns_of(robot: Robot, *, rates: bool) -> dict[str, np.ndarray]:
     return columns
 
 
-def test_a_table_with_rates_reads_back_to_the_bit_in_any_order(robot: Robot, tmp_path: Path) -> None:
+def test_a_trajectory_table_with_velocities_is_read_back_exactly_in_any_column_order(
+    robot: Robot, tmp_path: Path
+) -> None:
     columns = columns_of(robot, rates=True)
     shuffled = {name: columns[name] for name in sorted(columns, reverse=True)}
     x = read_trajectory(robot, write(tmp_path / "x.csv", robot, shuffled))
@@ -84,7 +88,9 @@ def test_a_table_with_rates_reads_back_to_the_bit_in_any_order(robot: Robot, tmp
     assert x.rates == "as given"
 
 
-def test_a_table_without_rates_is_differentiated(robot: Robot, tmp_path: Path) -> None:
+def test_velocities_missing_in_a_trajectory_table_are_central_differences(
+    robot: Robot, tmp_path: Path
+) -> None:
     x = read_trajectory(robot, write(tmp_path / "x.csv", robot, columns_of(robot, rates=False)))
     direct = line(robot, robot.neutral(), END, 2.0, 41)
     np.testing.assert_allclose(x.v[2:-2], direct.v[2:-2], atol=0.02)
@@ -110,7 +116,7 @@ def test_a_table_without_rates_is_differentiated(robot: Robot, tmp_path: Path) -
         (lambda text: "\n".join(text.splitlines()[:3]), "at least 3 samples"),
     ],
 )
-def test_a_spoiled_table_is_refused_by_name_and_a_missing_one_too(
+def test_an_invalid_or_missing_trajectory_table_is_refused_with_the_reason(
     spoil: object, message: str, robot: Robot, tmp_path: Path
 ) -> None:
     path = write(tmp_path / "x.csv", robot, columns_of(robot, rates=False))
@@ -124,7 +130,7 @@ def test_a_spoiled_table_is_refused_by_name_and_a_missing_one_too(
 
 
 @pytest.mark.parametrize("samples", [41, 100, 1001])
-def test_the_estimated_errors_of_differences_are_near_the_true_ones(
+def test_the_estimated_errors_of_central_differences_are_near_the_true_errors(
     samples: int, robot: Robot, tmp_path: Path
 ) -> None:
     direct = line(robot, robot.neutral(), END, 2.0, samples)
@@ -136,7 +142,7 @@ def test_the_estimated_errors_of_differences_are_near_the_true_ones(
     assert "largest errors about" in found.derivation()
 
 
-def test_accelerations_alone_are_differences_of_the_given_velocities(robot: Robot, tmp_path: Path) -> None:
+def test_missing_accelerations_are_differences_of_the_given_velocities(robot: Robot, tmp_path: Path) -> None:
     columns = columns_of(robot, rates=True)
     given = {name: x for name, x in columns.items() if not name.startswith("a:")}
     found = read_trajectory(robot, write(tmp_path / "x.csv", robot, given))
@@ -149,7 +155,7 @@ def test_accelerations_alone_are_differences_of_the_given_velocities(robot: Robo
         read_trajectory(robot, write(tmp_path / "x.csv", robot, without))
 
 
-def test_times_that_are_too_large_for_their_steps_are_told(robot: Robot, tmp_path: Path) -> None:
+def test_times_too_large_for_the_time_steps_are_reported(robot: Robot, tmp_path: Path) -> None:
     columns = columns_of(robot, rates=False)
     (note,) = read_trajectory(
         robot, write(tmp_path / "x.csv", robot, columns | {"t": 1.7e9 + columns["t"]})
@@ -182,7 +188,7 @@ def test_times_that_are_too_large_for_their_steps_are_told(robot: Robot, tmp_pat
         ("time_ns", 3e-8),
     ],
 )
-def test_a_heading_may_end_with_a_unit(heading: str, value: float) -> None:
+def test_a_column_heading_may_end_with_a_unit(heading: str, value: float) -> None:
     # The name of the joint `wheel_deg` ends like a unit.
     units = {"t": "s", "elbow": "rad", "lift": "m", "wheel_deg": "rad"}
     units |= {"v:elbow": "rad/s", "a:elbow": "rad/s^2"}
@@ -190,7 +196,7 @@ def test_a_heading_may_end_with_a_unit(heading: str, value: float) -> None:
     assert found.tolist() == [value]
 
 
-def test_a_joint_may_have_the_name_of_a_time() -> None:
+def test_a_joint_may_have_the_name_of_a_time_column() -> None:
     found = read_columns("t,time\n1,2\n", "x.csv", "q", ["time"], ["t"], units={"t": "s", "time": "rad"})
     assert {name: x.tolist() for name, x in found.items()} == {"t": [1.0], "time": [2.0]}
 
@@ -206,13 +212,13 @@ def test_a_joint_may_have_the_name_of_a_time() -> None:
         ("time_deg", "use s, sec"),
     ],
 )
-def test_a_unit_that_does_not_fit_is_refused_with_those_that_do(heading: str, remedy: str) -> None:
+def test_a_wrong_unit_is_refused_with_the_valid_units(heading: str, remedy: str) -> None:
     units = {"t": "s", "elbow": "rad", "lift": "m", "v:elbow": "rad/s", "root.qx": ""}
     with pytest.raises(InputError, match=f"wrong unit: found .*{remedy}"):
         read_columns(f"{heading}\n30\n", "x.csv", "q", [], list(units), units=units)
 
 
-def test_a_table_in_a_convention_is_that_motion(tmp_path: Path) -> None:
+def test_a_trajectory_table_in_a_convention_is_converted_to_the_same_motion(tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     start, end = robot.sample(2, seed=8)
     x = line(robot, start, end, 2.0, 31)

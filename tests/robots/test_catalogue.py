@@ -38,14 +38,14 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return urdfkin.load(request.param)
 
 
-def test_it_holds_every_urdf_of_example_robot_data_but_the_one_that_is_none() -> None:
+def test_the_catalogue_contains_every_valid_urdf_of_example_robot_data() -> None:
     shipped = {path.relative_to(example_robots_dir()) for path in example_robots_dir().rglob("*.urdf")}
     listed = [catalogue()[name].relative_path for name in examples()]
     assert len(listed) == len(set(listed)) == 68
     assert {path.name for path in shipped - set(listed)} == {"ur3.urdf"}
 
 
-def test_the_ends_of_an_enclosure_are_neighbouring_doubles(robot: Robot) -> None:
+def test_the_ends_of_an_enclosure_are_adjacent_doubles(robot: Robot) -> None:
     v, a = np.random.default_rng(1).standard_normal((2, robot.nv))
     proof = robot.enclose(robot.sample(1, 1)[0], v, a, robot.link_frames[-1])
     for one in (proof.placement, proof.velocity, proof.acceleration, proof.jacobian, proof.jacobian_rate):
@@ -54,7 +54,7 @@ def test_the_ends_of_an_enclosure_are_neighbouring_doubles(robot: Robot) -> None
         assert (few | ((one.width < 1e-28) & one.contains(np.zeros_like(one.width)))).all()
 
 
-def test_it_is_found_without_importing_pinocchio() -> None:
+def test_the_catalogue_is_found_without_importing_pinocchio() -> None:
     code = (
         "import sys; from urdfkin.urdf.catalogue import catalogue; "
         "assert all(entry.path.is_file() for entry in catalogue().values()); "
@@ -65,7 +65,7 @@ def test_it_is_found_without_importing_pinocchio() -> None:
     assert done.stdout == "[]\n"
 
 
-def test_its_limbs_name_frames_that_exist_and_move(robot: Robot) -> None:
+def test_the_limbs_of_a_catalogue_robot_name_existing_frames_that_move(robot: Robot) -> None:
     entry = catalogue()[robot.source]
     for base, tip in entry.limbs.values():
         above = robot.tree.path(robot.tree.frame_link(base))
@@ -76,7 +76,7 @@ def test_its_limbs_name_frames_that_exist_and_move(robot: Robot) -> None:
         assert (robot.base_frame, robot.tip_frame) == next(iter(entry.limbs.values()))
 
 
-def test_every_quantity_of_every_frame_agrees(robot: Robot) -> None:
+def test_every_quantity_of_every_frame_agrees_with_pinocchio(robot: Robot) -> None:
     report = urdfkin.validate(robot, samples=1).robots[0]
     assert (report.verdict, report.failed) == (ValidationVerdict.VERIFIED, 0)
     frames, moving = len(robot.all_frames), len(robot.joint_names)
@@ -87,13 +87,13 @@ def test_every_quantity_of_every_frame_agrees(robot: Robot) -> None:
 
 
 @pytest.mark.slow
-def test_every_quantity_agrees_on_many_samples(robot: Robot) -> None:
+def test_every_quantity_agrees_with_pinocchio_on_many_samples(robot: Robot) -> None:
     report = urdfkin.validate(robot, samples=50, seed=1).robots[0]
     assert (report.verdict, report.failed) == (ValidationVerdict.VERIFIED, 0)
 
 
 @pytest.mark.slow
-def test_a_robots_calls_agree_when_pinocchio_is_asked_directly(robot: Robot) -> None:
+def test_results_of_a_catalogue_robot_agree_with_direct_calls_of_pinocchio(robot: Robot) -> None:
     generator = np.random.default_rng(2)
     q, v, a = robot.sample(1, 2)[0], generator.normal(size=robot.nv), generator.normal(size=robot.nv)
     link = f"link:{robot.tree.links[robot.tree.frame_link(robot.tip_frame)]}"
@@ -101,7 +101,7 @@ def test_a_robots_calls_agree_when_pinocchio_is_asked_directly(robot: Robot) -> 
         assert_agrees(robot, q, v, a, link, reference)
 
 
-def test_joints_rates_and_frames_have_pinocchios_order_and_names(robot: Robot) -> None:
+def test_joints_velocities_and_frames_have_pinocchios_order_and_names(robot: Robot) -> None:
     follows = any(joint.mimic for joint in robot.tree.joints)
     free = urdfkin.load(robot.source, mimic=False) if follows else robot
     model = model_of(free)
@@ -128,7 +128,7 @@ def test_configurations_convert_to_pinocchios_default_model_and_back(robot: Robo
     )
 
 
-def test_configurations_and_rates_are_those_of_pinocchios_mimic_model(robot: Robot) -> None:
+def test_configurations_and_velocities_are_those_of_pinocchios_mimic_model(robot: Robot) -> None:
     if robot.source in WITHOUT_MIMIC_MODEL:
         with pytest.raises((ValueError, RuntimeError), match="mimic"):
             model_of(robot, mimic=True)
@@ -152,7 +152,7 @@ def test_configurations_and_rates_are_those_of_pinocchios_mimic_model(robot: Rob
 @pytest.mark.slow
 @pytest.mark.parametrize("root_joint", ["floating", "planar"])
 @pytest.mark.parametrize("name", ["panda", "ur5", "a1", "icub", "talos"])
-def test_a_root_joint_is_laid_out_as_pinocchios(name: str, root_joint: str) -> None:
+def test_the_coordinates_of_a_root_joint_are_those_of_pinocchio(name: str, root_joint: str) -> None:
     robot = urdfkin.load(name, root_joint=root_joint)
     model, q = model_of(robot), robot.sample(2, 6)
     full = robot.to_pinocchio(q)
@@ -164,7 +164,7 @@ def test_a_root_joint_is_laid_out_as_pinocchios(name: str, root_joint: str) -> N
     assert urdfkin.validate(robot, samples=2).passed
 
 
-def test_it_can_be_pickled_and_then_computes_the_same(robot: Robot) -> None:
+def test_a_pickled_robot_gives_the_same_results(robot: Robot) -> None:
     copy = pickle.loads(pickle.dumps(robot))
     q = robot.sample(3, 7)
     assert np.array_equal(copy.jacobian(q, robot.tip_frame), robot.jacobian(q, robot.tip_frame))
@@ -174,7 +174,7 @@ def test_it_can_be_pickled_and_then_computes_the_same(robot: Robot) -> None:
         assert not joint.axis.flags.writeable
 
 
-def test_the_robot_with_mimic_leaders_that_do_not_exist_says_so_and_how_to_load_it() -> None:
+def test_a_robot_with_missing_mimicked_joints_is_an_error_with_a_remedy() -> None:
     assert urdfkin.load("alex_psyonic_hands").findings
     with pytest.raises(urdfkin.UrdfError) as caught:
         urdfkin.load("alex_psyonic_hands", mimic=True)
@@ -182,7 +182,7 @@ def test_the_robot_with_mimic_leaders_that_do_not_exist_says_so_and_how_to_load_
     assert "mimic=False" in str(caught.value) or "--no-mimic" in str(caught.value)
 
 
-def test_an_unknown_name_offers_the_nearest_ones() -> None:
+def test_the_error_about_an_unknown_robot_lists_the_nearest_names() -> None:
     with pytest.raises(urdfkin.UnknownNameError, match="did you mean") as caught:
         urdfkin.load("pnda")
     assert "panda" in caught.value.nearest
@@ -200,12 +200,12 @@ SRDF = {
 }  # fmt: skip
 
 
-def test_the_robots_with_a_pose_of_their_own_are_those_named_here() -> None:
+def test_only_robots_with_an_srdf_pose_in_this_list_have_a_pose_in_the_catalogue() -> None:
     assert {name for name, entry in catalogue().items() if entry.poses} == set(SRDF)
 
 
 @pytest.mark.slow
-def test_ready_lies_within_every_limit_of_every_robot() -> None:
+def test_the_ready_pose_satisfies_every_limit_of_every_robot() -> None:
     outside = {}
     for name in catalogue():
         robot = urdfkin.load(name, verify=False)
@@ -219,7 +219,7 @@ def test_ready_lies_within_every_limit_of_every_robot() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SRDF)
-def test_pinocchio_finds_ready_within_its_limits_and_neutral_outside(name: str) -> None:
+def test_the_ready_pose_is_within_pinocchios_limits_and_the_neutral_pose_outside(name: str) -> None:
     robot = urdfkin.load(name, verify=False)
     model = pin.buildModelFromUrdf(str(catalogue()[name].path))
 
@@ -233,7 +233,7 @@ def test_pinocchio_finds_ready_within_its_limits_and_neutral_outside(name: str) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SRDF)
-def test_ready_is_the_srdfs_pose(name: str) -> None:
+def test_the_ready_pose_is_the_pose_of_the_srdf(name: str) -> None:
     folder = Path(example_robots_dir()) / catalogue()[name].relative_path.parts[0] / "srdf"
     texts = [ElementTree.parse(path).getroot() for path in sorted(folder.glob("*.srdf"))]
     states = [

@@ -30,7 +30,9 @@ robots = [pytest.param(name, marks=() if name in FAST else pytest.mark.slow) for
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 @pytest.mark.parametrize("name", robots)
-def test_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(name: str, convention: str) -> None:
+def test_the_table_of_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(
+    name: str, convention: str
+) -> None:
     robot = load(name)
     root = robot.tree.links[0]
     for leaf in robot.tree.leaves():
@@ -77,7 +79,7 @@ EXACT = {
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_every_cell_of_the_vendors_table_comes_out_of_the_urdf(name: str) -> None:
+def test_every_cell_of_the_vendors_table_is_computed_from_the_urdf(name: str) -> None:
     reference = read_table(reference_path(name))
     snap, last, metres = EXACT[name]
     table = load(reference.robot).dh(
@@ -93,7 +95,7 @@ def test_every_cell_of_the_vendors_table_comes_out_of_the_urdf(name: str) -> Non
 
 
 @pytest.mark.slow
-def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count() -> None:
+def test_kinovas_published_table_differs_from_the_urdf_only_by_rounding() -> None:
     found = compare(*published("kinova"))
     assert found.agrees
     assert [(one.row, one.cell) for one in found.differences] == [(3, "d")]
@@ -103,7 +105,7 @@ def test_the_kinova_sheet_differs_by_its_rounding_and_the_way_its_joints_count()
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", references())
-def test_a_shipped_reference_agrees_with_its_urdf_as_it_says(name: str) -> None:
+def test_a_bundled_reference_table_agrees_with_the_urdf_to_the_stated_accuracy(name: str) -> None:
     found = compare(*published(name))
     text = reference_path(name).read_text()
     assert found.agrees
@@ -114,7 +116,7 @@ def test_a_shipped_reference_agrees_with_its_urdf_as_it_says(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_catalogue_that_is_wrong_by_03_mm_is_found_out() -> None:
+def test_an_error_of_0_3_mm_in_a_published_table_is_detected() -> None:
     """A published xArm7 table (robotkinematicscatalogue 1.1.2) has a3 = 52.2 instead of 52.5 mm."""
     path, reference = published("xarm7_modified")
     rows = list(reference.rows)
@@ -130,6 +132,6 @@ def test_a_catalogue_that_is_wrong_by_03_mm_is_found_out() -> None:
     assert wrong[0].difference == pytest.approx(3e-4, abs=1e-9)
 
 
-def test_an_unknown_reference_offers_the_nearest() -> None:
+def test_the_error_about_an_unknown_reference_table_lists_the_nearest_names() -> None:
     with pytest.raises(UnknownNameError, match="did you mean"):
         reference_path("xarm7_standrad")

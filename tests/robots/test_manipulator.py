@@ -21,7 +21,7 @@ def moving_base(seed: int) -> urdfkin.BaseMotion:
 @pytest.mark.slow
 @pytest.mark.parametrize("base", [None, moving_base(1)], ids=["still", "moving"])
 @pytest.mark.parametrize("name", ROBOTS)
-def test_everything_agrees_with_pinocchio_also_on_a_free_flyer(
+def test_all_results_agree_with_pinocchio_even_on_a_moving_base(
     name: str, base: urdfkin.BaseMotion | None
 ) -> None:
     robot = urdfkin.load(name)
@@ -39,7 +39,7 @@ def test_everything_agrees_with_pinocchio_also_on_a_free_flyer(
     assert {line.quantity for line in certificate.lines} >= {"jacobian rate", "acceleration"}
 
 
-def test_a_wrong_rate_of_the_jacobian_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_of_the_jacobian_rate_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
     from urdfkin.compiled import evaluate
 
     original = evaluate.jacobian_rates
@@ -68,7 +68,7 @@ def test_the_manipulator_jacobian_predicts_the_change_of_the_pose(representation
     assert np.abs(rates - slope).max() <= 1e-9 * max(1.0, float(np.abs(rates).max()) ** 3)
 
 
-def test_the_singularity_names_the_sample() -> None:
+def test_the_error_about_a_singularity_names_the_sample() -> None:
     robot = urdfkin.load("elbow")
     q = np.full((3, 6), 0.5)
     q[1] = 0.0

@@ -54,7 +54,7 @@ def near(size: float, seed: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_finding_is_there_where_pinocchio_snaps_and_the_tilt_is_more_than_rounding(kind: str) -> None:
+def test_a_finding_exists_if_pinocchio_snaps_an_axis_with_a_tilt_above_rounding(kind: str) -> None:
     sizes = [0.0, 5e-324, 1e-200, 6e-17, 0.99 * EPS, 1.01 * EPS, 1e-15, 1e-13, 2e-12, 1e-9]
     sizes += [1e-12 * (1.0 + side * distance) for side in (-1, 1) for distance in (1e-3, 1e-6, 1e-9)]
     for size, seed in itertools.product(sizes, range(3)):
@@ -64,7 +64,7 @@ def test_the_finding_is_there_where_pinocchio_snaps_and_the_tilt_is_more_than_ro
         assert found(kind, axis) == (snaps(kind, axis) and tilt > EPS), (axis, tilt)
 
 
-def test_on_the_boundary_itself_the_last_bit_decides_and_is_the_same_one() -> None:
+def test_at_the_boundary_of_snapping_the_finding_agrees_with_pinocchio_to_the_last_bit() -> None:
     for seed in range(60):
         axis = near(1e-12, seed)
         axis[seed % 3] += (seed % 5 - 2) * EPS
@@ -72,7 +72,7 @@ def test_on_the_boundary_itself_the_last_bit_decides_and_is_the_same_one() -> No
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_pinocchio_compares_the_vector_as_it_is_written_and_so_does_the_finding(kind: str) -> None:
+def test_the_finding_uses_the_axis_vector_without_normalisation_as_pinocchio_does(kind: str) -> None:
     around_one = [1.0 + side * size for side in (-1, 1) for size in (2e-12, 0.9e-12, 5e-13)]
     for length in (*around_one, 0.5, 2.0):
         straight, tilted = length * AXES[1], length * AXES[1] + [0.0, 0.0, 4e-13]
@@ -82,7 +82,7 @@ def test_pinocchio_compares_the_vector_as_it_is_written_and_so_does_the_finding(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_directions_against_an_axis_are_taken_as_they_are(kind: str) -> None:
+def test_directions_opposite_to_a_coordinate_axis_are_not_snapped(kind: str) -> None:
     for axis in -AXES:
         tilted = axis + 1e-13 * np.roll(axis, 1)
         assert not snaps(kind, axis)
@@ -92,7 +92,9 @@ def test_directions_against_an_axis_are_taken_as_they_are(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(3))
-def test_the_two_differ_by_the_tilt_and_urdfkin_is_the_one_that_read_the_file(kind: str, seed: int) -> None:
+def test_urdfkin_uses_the_tilted_axis_of_the_file_and_pinocchio_differs_by_the_tilt(
+    kind: str, seed: int
+) -> None:
     tilt = 1e-12
     robot = loaded(text(kind, near(0.99 * tilt, seed)))
     ours = robot.placement([2.0], "l1")
@@ -133,7 +135,7 @@ def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, 
 
 
 @pytest.mark.parametrize("tilt", [1e-15, 1e-13])
-def test_a_slip_larger_than_the_tilts_allow_is_caught_behind_them_and_any_slip_before_them(
+def test_errors_above_the_tilt_bound_and_errors_before_tilted_axes_are_detected(
     tilt: float,
 ) -> None:
     document = text("revolute", AXES[2], AXES[0], near(tilt, 2), AXES[1])
@@ -157,7 +159,7 @@ def test_a_slip_larger_than_the_tilts_allow_is_caught_behind_them_and_any_slip_b
     slipped(0.0).placement(q, robot.link_frames)
 
 
-def test_the_tilt_is_read_from_the_text_and_not_from_the_tree_under_test() -> None:
+def test_the_tilt_of_a_joint_is_stored_and_survives_pickling() -> None:
     robot = loaded(text("revolute", AXES[2], near(1e-13, 1)))
     assert [round(joint.tilt, 16) for joint in robot.tree.joints] == [0.0, 1e-13]
     assert without_mimic_rules(robot.tree).joints[1].tilt > 0.0
@@ -165,7 +167,7 @@ def test_the_tilt_is_read_from_the_text_and_not_from_the_tree_under_test() -> No
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_it_is_a_note_and_results_are_verified(kind: str) -> None:
+def test_a_tilted_axis_is_a_note_and_results_are_verified(kind: str) -> None:
     document = text(kind, near(1e-13, 1))
     with warnings.catch_warnings():
         warnings.simplefilter("error", urdfkin.UrdfWarning)
@@ -177,7 +179,7 @@ def test_it_is_a_note_and_results_are_verified(kind: str) -> None:
     assert robot.certificate().verified
 
 
-def test_tables_and_validation_take_tilted_axes_into_account() -> None:
+def test_bounds_of_tables_and_validation_include_tilted_axes() -> None:
     document = text("revolute", *(near(0.99e-12, seed) for seed in (2, 0, 1, 2)))
     robot = loaded(document)
     robot.dh()
@@ -189,7 +191,7 @@ def test_tables_and_validation_take_tilted_axes_into_account() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_tilt_of_one_eps_stays_within_the_bound_in_every_joint(kind: str) -> None:
+def test_a_tilt_of_one_eps_in_every_joint_stays_within_the_bound(kind: str) -> None:
     # All tilts to one side, all joints far from zero: what is not seen adds up as well as it can.
     tilted = [AXES[2] + [EPS, 0.0, 0.0]] * 30
     robot = loaded(text(kind, *tilted))

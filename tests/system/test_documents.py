@@ -52,7 +52,7 @@ def ids(layout: DocumentKind[Any]) -> str:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
-def test_each_document_conforms_to_its_generated_schema_and_is_read_as_it_was_written(
+def test_each_document_conforms_to_the_generated_schema_and_is_read_back_unchanged(
     layout: DocumentKind[Any], tmp_path: Path
 ) -> None:
     schema = json.loads(layout.schema_text())
@@ -104,7 +104,7 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
-def test_another_layout_and_an_unknown_version_are_two_errors(layout: DocumentKind[Any]) -> None:
+def test_a_wrong_document_type_and_an_unknown_version_are_different_errors(layout: DocumentKind[Any]) -> None:
     family, _, version = layout.name.rpartition("/")
     with pytest.raises(InputError, match=f"unknown version of the layout {family}.*reads version {version}:"):
         layout.checked({"schema": f"{family}/99"}, "a.json")
@@ -120,7 +120,7 @@ def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: Doc
         layout.checked(made(layout) | {"more": 1}, "a.json")
 
 
-def test_an_unknown_entry_is_refused_however_deep_it_is() -> None:
+def test_an_unknown_entry_at_any_depth_is_refused() -> None:
     document = made(SAME)
     document["remarks"][1]["words"] = "a sentence"
     with pytest.raises(InputError, match=r"found \$\.remarks\[1\]: unknown entry 'words'"):
@@ -132,13 +132,13 @@ def test_an_unknown_entry_is_refused_however_deep_it_is() -> None:
     "text", ["NaN", "-Infinity", "1e999", "[" * 100_000, "1" + "0" * 5000, "{", "", "\udc80", '"\x00']
 )
 @pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
-def test_no_file_that_is_no_json_is_read(layout: DocumentKind[Any], text: str, tmp_path: Path) -> None:
+def test_a_file_that_is_not_json_is_refused(layout: DocumentKind[Any], text: str, tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(InputError, match="not a JSON file"):
         layout.read(path)
 
 
-def test_data_has_no_infinity_and_keeps_names_that_are_not_text() -> None:
+def test_serialized_data_has_no_infinity_and_preserves_names_that_are_not_valid_text() -> None:
     assert plain({"a": (float("inf"), float("nan"), -0.0, "\udc80")}) == {"a": [None, None, -0.0, "\udc80"]}
     assert as_data({"a": float("inf")}) == {"a": float("inf")}

@@ -26,7 +26,7 @@ def test_7_1_the_endpoint_lies_at_the_links_length_along_x1() -> None:
     assert np.abs(link_endpoint(THETA, A1) - array(endpoint(mp.mpf(0)))).max() <= ROUNDING
 
 
-def test_7_2_the_endpoints_velocity_is_the_derivative_of_its_position() -> None:
+def test_7_2_the_endpoints_velocity_is_the_derivative_of_the_position() -> None:
     assert np.abs(link_endpoint_velocity(THETA, SPEED, A1) - array(rate(endpoint, 0.0))).max() <= ROUNDING
 
 
@@ -45,7 +45,7 @@ def test_7_5_the_planar_rotation_is_scipys_rotation_about_z() -> None:
     assert np.abs(planar_rotation(thetas) - expected).max() <= ROUNDING
 
 
-def test_7_7_the_velocity_points_along_y1_with_the_speed_of_a_ball_on_a_string() -> None:
+def test_7_7_the_velocity_points_along_y1_with_the_speed_a1_times_the_angular_rate() -> None:
     velocity = link_endpoint_velocity(THETA, SPEED, A1)
     y1 = [-np.sin(THETA), np.cos(THETA)]
     assert abs(velocity @ y1 - A1 * SPEED) <= ROUNDING

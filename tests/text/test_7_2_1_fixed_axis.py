@@ -38,7 +38,7 @@ def R_k(t: Any) -> Any:
 # -- the one-link manipulator in space ---------------------------------------------------------------
 
 
-def test_7_11_the_endpoints_velocity_is_the_cross_product_of_w_and_its_position() -> None:
+def test_7_11_the_endpoints_velocity_is_the_cross_product_of_w_and_the_position() -> None:
     d_01 = array(R_z(mp.mpf(0)) * column(A1, 0, 0))
     expected = array(rate(lambda t: R_z(t) * column(A1, 0, 0), 0.0))
     assert close(turning_vector_rate([0.0, 0.0, SPEED], d_01), expected)
@@ -48,7 +48,7 @@ def test_7_12_the_angular_velocity_is_the_axis_times_the_rate() -> None:
     assert close(skew(angular_velocity_about(Z, SPEED)), array(rate(R_z, 0.0) * R_z(mp.mpf(0)).T))
 
 
-def test_7_13_the_velocity_in_space_is_the_rotations_rate_times_a1_x1() -> None:
+def test_7_13_the_velocity_is_the_rate_of_the_spatial_rotation_times_a1_x1() -> None:
     R_rate = SPEED * rotation_about_derivative(Z, THETA)
     assert close(R_rate @ (A1 * X), array(rate(lambda t: R_z(t) * column(A1, 0, 0), 0.0)))
 
@@ -79,14 +79,14 @@ def test_7_17_both_derivations_of_the_endpoints_velocity_agree() -> None:
 # -- an arbitrary axis: by geometry ------------------------------------------------------------------
 
 
-def test_7_18_a_vector_is_its_part_along_the_axis_and_the_radial_part() -> None:
+def test_7_18_a_vector_is_the_sum_of_the_axial_part_and_the_radial_part() -> None:
     along, radial = split_along(K, P)
     assert close(along + radial, P)
     assert close(np.cross(along, K), 0.0)
     assert abs(radial @ K) <= ROUNDING
 
 
-def test_7_19_only_the_radial_part_changes() -> None:
+def test_7_19_a_rotation_changes_only_the_radial_part_of_a_vector() -> None:
     turned = rotation_about(K, THETA) @ P
     assert close(split_along(K, turned)[0], split_along(K, P)[0])
 
@@ -97,7 +97,7 @@ def test_7_20_the_radial_part_moves_along_the_tangent() -> None:
     assert close(circular_velocity(K, SPEED, radial), expected)
 
 
-def test_7_21_the_whole_vector_moves_with_w_cross_p() -> None:
+def test_7_21_the_velocity_of_the_whole_vector_is_w_cross_p() -> None:
     expected = array(rate(lambda t: about(column(2, -1, 2), t * mp.mpf(SPEED)) * column(*P), 0.0))
     assert close(circular_velocity(K, SPEED, P), expected)
 
@@ -105,16 +105,16 @@ def test_7_21_the_whole_vector_moves_with_w_cross_p() -> None:
 # -- an arbitrary axis: by the rotation matrix -------------------------------------------------------
 
 
-def test_7_22_the_rate_is_the_derivative_by_the_angle_times_the_angles_rate() -> None:
+def test_7_22_the_rate_of_a_rotation_is_the_derivative_by_the_angle_times_the_angular_rate() -> None:
     assert close(rotation_about_derivative(K, THETA) * SPEED, array(rate(R_k, 0.0)))
 
 
-def test_7_23_the_transpose_is_the_inverse() -> None:
+def test_7_23_the_transpose_of_a_rotation_is_the_inverse() -> None:
     R = rotation_about(K, THETA)
     assert close(R @ R.T, np.eye(3))
 
 
-def test_7_24_the_derivative_of_that_product_vanishes() -> None:
+def test_7_24_the_derivative_of_a_rotation_times_the_transpose_vanishes() -> None:
     R, dR = rotation_about(K, THETA), rotation_about_derivative(K, THETA)
     assert close(dR @ R.T + R @ dR.T, 0.0)
 
@@ -125,21 +125,21 @@ def test_7_25_and_7_26_dR_times_R_transposed_is_skew_symmetric() -> None:
     assert np.abs(S).max() > 0.1
 
 
-def test_7_27_the_derivative_is_S_R_and_also_minus_S_transposed_R() -> None:
+def test_7_27_the_derivative_of_a_rotation_is_S_R_and_minus_S_transposed_R() -> None:
     R, dR = rotation_about(K, THETA), rotation_about_derivative(K, THETA)
     S = array(rate(R_k, 0.0) * R_k(mp.mpf(0)).T) / SPEED
     assert close(dR, S @ R)
     assert close(dR, -S.T @ R)
 
 
-def test_7_28_rodrigues_formula_is_scipys_and_pinocchios_rotation() -> None:
+def test_7_28_rodrigues_formula_agrees_with_scipy_and_pinocchio() -> None:
     for angle in (-9.0, 0.0, 1e-9, 1.0, np.pi, 5.0):
         R = rotation_about(K, angle)
         assert close(R, Rotation.from_rotvec(angle * K).as_matrix())
         assert close(R, pin.exp3(angle * K))
 
 
-def test_7_29_the_derivative_has_the_texts_three_terms() -> None:
+def test_7_29_the_derivative_of_rodrigues_formula_has_the_texts_three_terms() -> None:
     c, s = np.cos(THETA), np.sin(THETA)
     terms = -np.eye(3) * s + np.outer(K, K) * s + skew(K) * c
     assert close(rotation_about_derivative(K, THETA), terms)
@@ -153,27 +153,29 @@ def test_7_30_the_product_of_the_two_formulas_has_the_texts_nine_terms() -> None
     assert close(rotation_about_derivative(K, THETA) @ rotation_about(K, THETA).T, nine)
 
 
-def test_7_31_the_double_cross_product_with_k_takes_the_radial_part_away_from_itself() -> None:
+def test_7_31_the_double_cross_product_of_the_axis_with_a_vector_is_minus_the_radial_part() -> None:
     assert close(skew(K) @ skew(K) @ P, np.cross(K, np.cross(K, P)))
     assert close(skew(K) @ skew(K), np.outer(K, K) - np.eye(3))
 
 
-def test_7_32_the_skew_matrix_is_that_of_the_axis() -> None:
+def test_7_32_the_skew_matrix_of_a_rotation_about_an_axis_is_that_of_the_axis() -> None:
     assert close(unskew(rotation_about_derivative(K, THETA) @ rotation_about(K, THETA).T), K)
 
 
-def test_7_33_the_derivative_by_the_angle_is_S_k_R() -> None:
+def test_7_33_the_derivative_of_a_rotation_by_the_angle_is_S_k_R() -> None:
     exact = array(rate(lambda phi: about(column(2, -1, 2), phi), THETA))
     assert close(rotation_about_derivative(K, THETA), exact)
 
 
-def test_7_34_the_rate_is_S_w_R_with_w_along_the_axis() -> None:
+def test_7_34_the_rate_of_a_rotation_is_S_w_R_with_w_along_the_axis() -> None:
     w = angular_velocity_about(K, SPEED)
     assert close(rotation_rate(rotation_about(K, THETA), w), array(rate(R_k, 0.0)))
 
 
 @pytest.mark.parametrize(("axis", "name"), [(X, "x"), (Y, "y"), (Z, "z")])
-def test_example_7_1_dRx_by_the_angle_is_S_x_Rx_and_so_for_each_axis(axis: Any, name: str) -> None:
+def test_example_7_1_the_derivative_of_a_rotation_about_x_y_or_z_is_S_times_the_rotation(
+    axis: Any, name: str
+) -> None:
     phi = 0.6
     exact = array(rate(lambda angle: turn(name, angle), phi))
     assert close(rotation_about_derivative(axis, phi), exact)

@@ -52,12 +52,12 @@ def test_7_35_a_rotation_times_its_transpose_is_the_identity() -> None:
     assert close(R @ R.T, np.eye(3))
 
 
-def test_7_36_the_rate_of_that_product_vanishes() -> None:
+def test_7_36_the_rate_of_a_rotation_times_the_transpose_vanishes() -> None:
     R_rate = rotation_rate(now(R_01), W_01)
     assert close(R_rate @ now(R_01).T + now(R_01) @ R_rate.T, 0.0)
 
 
-def test_7_37_S_is_skew_symmetric_and_is_S_of_w() -> None:
+def test_7_37_S_is_the_skew_matrix_of_the_angular_velocity() -> None:
     S = rotation_rate(now(R_01), W_01) @ now(R_01).T
     assert close(S + S.T, 0.0)
     assert close(angular_velocity_of(now(R_01), array(rate(R_01, T))), W_01)
@@ -67,16 +67,16 @@ def test_7_38_the_rate_of_any_moving_rotation_is_S_w_R() -> None:
     assert close(rotation_rate(now(R_01), W_01), array(rate(R_01, T)))
 
 
-def test_7_39_a_vector_of_frame_1_is_turned_into_frame_0() -> None:
+def test_7_39_a_rotation_converts_a_vector_from_frame_1_to_frame_0() -> None:
     frame = MovingFrame(now(R_01), np.zeros(3))
     assert close(point_position(frame, P_1), array(R_01(mp.mpf(T)) * column(*P_1)))
 
 
-def test_7_40_a_vector_fixed_in_frame_1_has_the_rotations_rate() -> None:
+def test_7_40_the_rate_of_a_vector_fixed_in_frame_1_is_the_rate_of_the_rotation_times_p() -> None:
     assert close(rotation_rate(now(R_01), W_01) @ P_1, array(rate(lambda t: R_01(t) * column(*P_1), T)))
 
 
-def test_7_41_that_rate_is_w_cross_p() -> None:
+def test_7_41_the_rate_of_a_vector_fixed_in_frame_1_is_w_cross_p() -> None:
     p_0 = now(R_01) @ P_1
     assert close(turning_vector_rate(W_01, p_0), array(rate(lambda t: R_01(t) * column(*P_1), T)))
 
@@ -101,7 +101,7 @@ def frames() -> tuple[MovingFrame, MovingFrame]:
     return MovingFrame(now(R_01), np.zeros(3), W_01), MovingFrame(now(R_12), np.zeros(3), W_12)
 
 
-def test_7_43_rotations_multiply() -> None:
+def test_7_43_the_rotation_of_frame_2_is_the_product_of_two_rotations() -> None:
     assert close(compose(*frames()).R_0_1, array(R_01(mp.mpf(T)) * R_12(mp.mpf(T))))
 
 
@@ -110,34 +110,34 @@ def test_7_44_the_rate_of_the_product_obeys_the_product_rule() -> None:
     assert close(both, array(rate(lambda t: R_01(t) * R_12(t), T)))
 
 
-def test_7_45_the_skew_matrices_add_once_they_are_in_one_frame() -> None:
+def test_7_45_skew_matrices_in_the_same_frame_add() -> None:
     R_02 = now(R_01) @ now(R_12)
     whole = array(angular_velocity(lambda t: R_01(t) * R_12(t), T))
     inner = rotate_skew(now(R_01), skew(W_12))
     assert close(skew(whole) @ R_02, skew(W_01) @ R_02 + inner @ R_02)
 
 
-def test_7_46_a_skew_matrix_changes_frame_by_similarity() -> None:
+def test_7_46_a_similarity_transformation_converts_a_skew_matrix_to_another_frame() -> None:
     assert close(rotate_skew(now(R_01), skew(W_12)), skew(now(R_01) @ W_12))
 
 
-def test_7_47_the_left_side_applied_to_a_vector_is_a_cross_product() -> None:
+def test_7_47_the_left_side_of_7_46_times_a_vector_is_a_cross_product() -> None:
     assert close(rotate_skew(now(R_01), skew(W_12)) @ B, np.cross(now(R_01) @ W_12, B))
 
 
-def test_7_48_the_right_side_turns_back_crosses_and_turns_again() -> None:
+def test_7_48_the_right_side_of_7_46_times_a_vector_is_the_rotated_cross_product() -> None:
     R = now(R_01)
     b_1 = R.T @ B
     assert close(rotate_skew(R, skew(W_12)) @ B, R @ np.cross(W_12, b_1))
     assert close(R @ turning_vector_rate(W_12, b_1), turning_vector_rate(R @ W_12, B))
 
 
-def test_7_49_two_angular_velocities_add() -> None:
+def test_7_49_two_angular_velocities_in_the_same_frame_add() -> None:
     whole = array(angular_velocity(lambda t: R_01(t) * R_12(t), T))
     assert close(compose(*frames()).w_0_1, whole)
 
 
-def test_7_50_any_number_of_angular_velocities_add() -> None:
+def test_7_50_any_number_of_angular_velocities_in_the_same_frame_add() -> None:
     Rs = np.stack([now(R) for R in (R_01, R_12, R_23)])
     whole = array(angular_velocity(lambda t: R_01(t) * R_12(t) * R_23(t), T))
     assert close(add_angular_velocities(Rs, np.stack([W_01, W_12, W_23])), whole)

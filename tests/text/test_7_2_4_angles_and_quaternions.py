@@ -62,7 +62,7 @@ def test_7_55_omega_zyz_has_the_texts_entries() -> None:
     assert close(euler_rate_matrix("ZYZ", ANGLES), [[0, -s, c * s2], [0, c, s * s2], [1, 0, c2]])
 
 
-def test_7_56_the_inverse_gives_the_rates_and_fails_where_theta_is_zero() -> None:
+def test_7_56_the_inverse_of_omega_gives_zyz_rates_and_is_singular_at_theta_zero() -> None:
     assert close(euler_rates("ZYZ", ANGLES, W), RATES, 16)
     assert close(euler_rate_inverse("ZYZ", ANGLES), np.linalg.inv(euler_rate_matrix("ZYZ", ANGLES)), 16)
     for theta in (0.0, np.pi):
@@ -106,7 +106,7 @@ def turning(first: str) -> Any:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("first", "z1_ends_as"), [("x", [0, -1, 0]), ("y", [1, 0, 0])])
-def test_example_7_3_equal_integrals_of_w_end_in_different_orientations(
+def test_example_7_3_angular_velocities_with_equal_integrals_give_different_orientations(
     first: str, z1_ends_as: list[int]
 ) -> None:
     w = turning(first)

@@ -31,7 +31,7 @@ def jacobian() -> FloatArray:
     return robot("planar_two_link").jacobian(Q, "tip")
 
 
-def test_7_86_the_tip_is_where_the_geometry_says() -> None:
+def test_7_86_the_position_of_the_tip_is_that_of_the_geometry() -> None:
     position = robot("planar_two_link").placement(Q, "tip")[:3, 3]
     assert close(position, [A1 * C1 + A2 * C12, A1 * S1 + A2 * S12, 0.0])
     assert close(position, array(MOVING.d(2)(mp.mpf(0))))
@@ -50,12 +50,12 @@ def test_7_88_to_7_90_the_planar_jacobian_has_the_texts_entries() -> None:
     assert close(jacobian()[:2] @ V, tip()[:2])
 
 
-def test_7_91_and_7_92_each_joint_turns_its_link_about_z0() -> None:
+def test_7_91_and_7_92_each_joint_rotates_the_link_about_z0() -> None:
     for i in (1, 2):
         assert close(joint_angular_velocity(MOVING.axis(i), V[i - 1], turns=True), V[i - 1] * Z)
 
 
-def test_7_93_the_second_link_turns_with_the_sum_of_the_rates() -> None:
+def test_7_93_the_angular_velocity_of_the_second_link_is_the_sum_of_the_joint_velocities() -> None:
     assert close(tip()[3:], V.sum() * Z)
     assert close(tip()[3:], MOVING.w(2))
 
@@ -66,7 +66,7 @@ def test_7_94_the_tips_velocity_is_the_sum_of_two_cross_products() -> None:
     assert close(tip()[:3], both)
 
 
-def test_7_95_and_7_96_each_link_gives_its_endpoints_velocity_along_its_y_axis() -> None:
+def test_7_95_and_7_96_each_link_adds_a_velocity_along_the_y_axis_of_the_link() -> None:
     both = link_endpoint_velocity(Q[0], V[0], A1) + link_endpoint_velocity(Q.sum(), V.sum(), A2)
     assert close(tip()[:2], both)
     y1, y2 = planar_rotation(Q[0])[:, 1], planar_rotation(Q.sum())[:, 1]
@@ -81,12 +81,12 @@ def test_7_97_the_tips_velocity_is_also_a_sum_over_moment_arms() -> None:
     assert close(tip(), shares)
 
 
-def test_7_98_the_moment_arms_make_the_linear_rows_of_the_jacobian() -> None:
+def test_7_98_the_linear_rows_of_the_jacobian_are_cross_products_with_the_moment_arms() -> None:
     d_02, d_12 = MOVING.origin(2), MOVING.origin(2) - MOVING.origin(1)
     assert close(jacobian()[:3], np.stack((np.cross(Z, d_02), np.cross(Z, d_12)), axis=-1))
     assert close(jacobian()[:3] @ V, MOVING.vel(2))
 
 
-def test_7_99_and_7_100_with_the_axes_below_it_is_the_full_velocity_jacobian() -> None:
+def test_7_99_and_7_100_the_full_velocity_jacobian_has_the_joint_axes_as_angular_rows() -> None:
     assert close(jacobian()[3:], np.stack((Z, Z), axis=-1))
     assert close(jacobian() @ V, np.concatenate((MOVING.vel(2), MOVING.w(2))))

@@ -43,7 +43,7 @@ def test_7_109_the_upper_right_block_is_zero_and_the_lower_rows_are_the_axes() -
 
 
 @pytest.mark.slow
-def test_7_110_moment_arms_follow_recursively_from_the_wrist() -> None:
+def test_7_110_moment_arms_are_computed_recursively_from_the_wrist() -> None:
     for i in range(6):
         assert close(arm(i), MOVING.origin(6) - MOVING.origin(i))
     assert not arm(4).any()
@@ -51,19 +51,19 @@ def test_7_110_moment_arms_follow_recursively_from_the_wrist() -> None:
     assert close(np.cross(arm(3), Z[3]), 0.0)
 
 
-def test_7_111_the_arm_from_the_elbow_is_the_forearm() -> None:
+def test_7_111_the_moment_arm_from_the_elbow_is_the_forearm() -> None:
     assert close(arm(2), D4 * Z[3])
 
 
-def test_7_112_the_arm_from_the_shoulder_is_both_links() -> None:
+def test_7_112_the_moment_arm_from_the_shoulder_is_the_sum_of_both_links() -> None:
     assert close(arm(1), A2 * X2 + D4 * Z[3])
 
 
-def test_7_113_the_arm_from_the_base_adds_the_trunk() -> None:
+def test_7_113_the_moment_arm_from_the_base_includes_the_trunk() -> None:
     assert close(arm(0), D1 * Z[0] + A2 * X2 + D4 * Z[3])
 
 
-def test_7_114_the_jacobian_with_the_shortened_moment_arms_is_the_same() -> None:
+def test_7_114_shortened_moment_arms_give_the_same_jacobian() -> None:
     both = A2 * X2 + D4 * Z[3]
     linear = [np.cross(Z[0], both), np.cross(Z[1], both), np.cross(Z[2], D4 * Z[3]), *np.zeros((3, 3))]
     J = np.vstack((np.stack(linear, axis=-1), np.stack(Z, axis=-1)))
@@ -123,7 +123,7 @@ def linear_rows_by_7_114() -> tuple[FloatArray, int]:
     return values([*columns, *counted(np.zeros((3, 3)))]), Counted.multiplications
 
 
-def test_the_substitution_saves_two_thirds_of_the_multiplications() -> None:
+def test_the_substitution_in_7_114_saves_two_thirds_of_the_multiplications() -> None:
     (full, all_of_them), (shorter, with_zeros) = linear_rows_by_7_110(6), linear_rows_by_7_110(3)
     shortest, substituted = linear_rows_by_7_114()
     for rows in (full, shorter, shortest):

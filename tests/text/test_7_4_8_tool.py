@@ -10,7 +10,7 @@ MOVING = motion("elbow", 6)
 D_6_TOOL = 0.15 * MOVING.rotation(6)[:, 2]
 
 
-def test_7_115_the_tools_velocity_is_referred_to_the_wrist_and_back() -> None:
+def test_7_115_the_tools_velocity_is_converted_to_the_wrist_and_back() -> None:
     tool = robot("elbow").velocity(MOVING.q, MOVING.v, "tool")
     wrist = robot("elbow").velocity(MOVING.q, MOVING.v, "wrist")
     assert close(frame_velocity(tool, D_6_TOOL), wrist)

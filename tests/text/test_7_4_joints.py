@@ -35,14 +35,14 @@ def elbow_velocity() -> FloatArray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
-def test_7_62_a_rotary_joint_turns_its_link_about_its_axis(i: int) -> None:
+def test_7_62_a_rotary_joint_rotates_the_link_about_the_joint_axis(i: int) -> None:
     alone = only(ELBOW, i)
     w = joint_angular_velocity(alone.axis(i), alone.v[i - 1], turns=True)
     assert close(w, alone.w(i))
     assert close(robot("elbow").velocity(alone.q, alone.v, ELBOW_LINKS[i])[3:], alone.w(i))
 
 
-def test_7_63_a_prismatic_joint_does_not_turn_its_link() -> None:
+def test_7_63_a_prismatic_joint_does_not_rotate_the_link() -> None:
     alone = only(POLAR, 2)
     assert close(joint_angular_velocity(alone.axis(2), alone.v[1], turns=False), alone.w(2))
     assert not alone.w(2).any()
@@ -57,7 +57,7 @@ def test_7_64_the_interorigin_vector_has_a_part_along_the_axis_and_one_along_the
 
 
 @pytest.mark.parametrize("i", range(1, 7))
-def test_7_65_with_one_rotary_joint_moving_only_the_normal_turns(i: int) -> None:
+def test_7_65_a_single_moving_rotary_joint_rotates_only_the_part_along_the_normal(i: int) -> None:
     alone = only(ELBOW, i)
     w = joint_angular_velocity(alone.axis(i), alone.v[i - 1], turns=True)
     assert close(np.cross(w, float(alone.rows[i - 1].a) * alone.x(i)), alone.between_rate(i))
@@ -65,7 +65,9 @@ def test_7_65_with_one_rotary_joint_moving_only_the_normal_turns(i: int) -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
-def test_7_66_so_the_interorigin_vector_moves_with_the_joints_angular_velocity(i: int) -> None:
+def test_7_66_the_rate_of_an_interorigin_vector_is_the_joints_angular_velocity_cross_the_vector(
+    i: int,
+) -> None:
     alone = only(ELBOW, i)
     w = joint_angular_velocity(alone.axis(i), alone.v[i - 1], turns=True)
     d_vector = array(alone.between(i)(mp.mpf(0)))
@@ -73,7 +75,7 @@ def test_7_66_so_the_interorigin_vector_moves_with_the_joints_angular_velocity(i
     assert close(found, alone.between_rate(i))
 
 
-def test_7_67_with_a_prismatic_joint_moving_the_vector_grows_along_its_axis() -> None:
+def test_7_67_a_moving_prismatic_joint_extends_the_interorigin_vector_along_the_axis() -> None:
     alone = only(POLAR, 2)
     d_vector = array(alone.between(2)(mp.mpf(0)))
     found = interorigin_velocity(np.zeros(3), d_vector, alone.axis(2), alone.v[1], turns=False)
@@ -84,13 +86,13 @@ def test_7_67_with_a_prismatic_joint_moving_the_vector_grows_along_its_axis() ->
 # -- all joints --------------------------------------------------------------------------------------
 
 
-def test_7_68_and_7_69_a_links_angular_velocity_is_the_sum_over_the_joints_before_it() -> None:
+def test_7_68_and_7_69_a_links_angular_velocity_is_the_sum_over_the_previous_joints() -> None:
     parts = [joint_angular_velocity(ELBOW.axis(j), ELBOW.v[j - 1], turns=True) for j in range(1, 7)]
     for i in range(1, 7):
         assert close(sum(parts[:i]), ELBOW.w(i))
 
 
-def test_7_70_and_7_71_recursively_it_is_that_of_the_link_before_and_the_joints_own() -> None:
+def test_7_70_and_7_71_a_links_angular_velocity_is_that_of_the_previous_link_plus_the_joints() -> None:
     w = w_of_links()
     for i in range(1, 7):
         own = joint_angular_velocity(ELBOW.axis(i), ELBOW.v[i - 1], turns=True)
@@ -100,7 +102,7 @@ def test_7_70_and_7_71_recursively_it_is_that_of_the_link_before_and_the_joints_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
-def test_7_72_the_axis_turns_with_the_link_before_and_the_normal_with_the_link(i: int) -> None:
+def test_7_72_the_axis_rotates_with_the_previous_link_and_the_normal_with_the_link(i: int) -> None:
     row = ELBOW.rows[i - 1]
     along, normal = float(row.d) * ELBOW.axis(i), float(row.a) * ELBOW.x(i)
     parts = np.cross(ELBOW.w(i - 1), along) + np.cross(ELBOW.w(i), normal)
@@ -111,13 +113,13 @@ def test_7_72_the_axis_turns_with_the_link_before_and_the_normal_with_the_link(i
 
 @pytest.mark.slow
 @pytest.mark.parametrize("i", range(1, 7))
-def test_7_73_so_the_whole_interorigin_vector_turns_with_the_link(i: int) -> None:
+def test_7_73_the_whole_interorigin_vector_rotates_with_the_link(i: int) -> None:
     d_vector = array(ELBOW.between(i)(mp.mpf(0)))
     found = interorigin_velocity(ELBOW.w(i), d_vector, ELBOW.axis(i), ELBOW.v[i - 1], turns=True)
     assert close(found, ELBOW.between_rate(i))
 
 
-def test_7_74_a_prismatic_joint_adds_its_rate_along_the_axis() -> None:
+def test_7_74_a_prismatic_joint_adds_the_joint_velocity_along_the_axis() -> None:
     d_vector = array(POLAR.between(2)(mp.mpf(0)))
     found = interorigin_velocity(POLAR.w(2), d_vector, POLAR.axis(2), POLAR.v[1], turns=False)
     assert close(found, POLAR.between_rate(2))
@@ -142,7 +144,7 @@ def test_7_77_the_last_origin_is_the_sum_of_the_interorigin_vectors() -> None:
     assert close(position, ELBOW.origin(6))
 
 
-def test_7_78_and_7_79_the_last_origins_velocity_is_the_sum_of_theirs() -> None:
+def test_7_78_and_7_79_the_last_origins_velocity_is_the_sum_of_interorigin_rates() -> None:
     rates = [
         interorigin_velocity(
             ELBOW.w(i), array(ELBOW.between(i)(mp.mpf(0))), ELBOW.axis(i), ELBOW.v[i - 1], turns=True
@@ -158,7 +160,7 @@ def test_7_78_and_7_79_the_last_origins_velocity_is_the_sum_of_theirs() -> None:
 
 
 @pytest.mark.parametrize("i", range(1, 7))
-def test_7_80_one_joints_share_of_the_endpoints_velocity_is_rate_times_axis_cross_arm(i: int) -> None:
+def test_7_80_a_joint_contributes_joint_velocity_times_axis_cross_moment_arm(i: int) -> None:
     alone = only(ELBOW, i)
     arm = ELBOW.origin(6) - ELBOW.origin(i - 1)
     share = alone.v[i - 1] * jacobian_column(ELBOW.axis(i), arm, turns=True)
@@ -171,16 +173,16 @@ def columns() -> FloatArray:
     return np.stack([jacobian_column(ELBOW.axis(i), arms[i - 1], turns=True) for i in range(1, 7)], axis=-1)
 
 
-def test_7_81_to_7_84_the_shares_sum_to_the_velocity() -> None:
+def test_7_81_to_7_84_the_contributions_of_the_joints_sum_to_the_velocity() -> None:
     assert close(columns() @ ELBOW.v, np.concatenate((ELBOW.vel(6), ELBOW.w(6))))
     assert close(robot("elbow").jacobian(ELBOW.q, "wrist") @ ELBOW.v, elbow_velocity())
 
 
-def test_7_85_the_velocity_jacobian_has_axis_cross_arm_above_axis() -> None:
+def test_7_85_a_rotary_joints_column_is_axis_cross_moment_arm_above_the_axis() -> None:
     assert close(robot("elbow").jacobian(ELBOW.q, "wrist"), columns())
 
 
-def test_7_85_a_prismatic_joints_column_is_its_axis_above_nothing() -> None:
+def test_7_85_a_prismatic_joints_column_is_the_axis_above_zero() -> None:
     J = robot("polar").jacobian(POLAR.q, "slider")
     assert close(J[:, 1], np.concatenate((POLAR.axis(2), np.zeros(3))))
     assert close(J[:, 1], jacobian_column(POLAR.axis(2), np.zeros(3), turns=False))

@@ -53,19 +53,19 @@ def velocity() -> FloatArray:
     return robot("elbow").velocity(MOVING.q, MOVING.v, "wrist")
 
 
-def test_7_116_and_7_117_the_rates_of_x_are_the_manipulator_jacobian_times_the_joint_rates() -> None:
+def test_7_116_and_7_117_the_rates_of_x_are_the_manipulator_jacobian_times_joint_velocities() -> None:
     x_rate = array(rate(lambda t: pose(MOVING, t), 0.0))
     J = robot("elbow").analytical_jacobian(MOVING.q, "wrist", "ZYZ")
     assert close(J @ MOVING.v, x_rate, 8.0)
 
 
 @pytest.mark.parametrize("j", range(1, 7))
-def test_7_118_its_elements_are_the_derivatives_of_f_by_each_joint(j: int) -> None:
+def test_7_118_the_elements_of_the_manipulator_jacobian_are_derivatives_by_each_joint(j: int) -> None:
     J = robot("elbow").analytical_jacobian(MOVING.q, "wrist", "ZYZ")
     assert close(J[:, j - 1], derivative_by_joint(j), 8.0)
 
 
-def test_7_119_C_takes_the_rates_of_x_to_the_velocities() -> None:
+def test_7_119_C_converts_the_rates_of_x_to_velocities() -> None:
     x_rate = array(rate(lambda t: pose(MOVING, t), 0.0))
     assert close(velocity_of_pose_rates("ZYZ", R_06, x_rate), velocity(), 8.0)
     assert close(pose_rates("ZYZ", R_06, velocity()), x_rate, 8.0)
@@ -91,7 +91,7 @@ def test_7_122_the_manipulator_jacobian_is_the_inverse_of_C_times_the_velocity_j
     assert close(J @ MOVING.v, array(rate(lambda t: pose(MOVING, t), 0.0)), 8.0)
 
 
-def test_7_122_fails_where_omega_cannot_be_inverted_and_a_quaternion_does_not() -> None:
+def test_7_122_a_singular_omega_is_refused_and_a_quaternion_has_no_singularity() -> None:
     # At zero the elbow's wrist stands upright: theta = 0, and ZYZ cannot say how it turns.
     with pytest.raises(RepresentationSingularityError, match="ZYZ"):
         robot("elbow").analytical_jacobian(np.zeros(6), "wrist", "ZYZ")
@@ -123,13 +123,13 @@ def test_7_123_a_fixed_point_has_a_transverse_and_a_centripetal_acceleration() -
     assert agree(parts.centripetal, w * (w @ p_0) - p_0 * (w @ w), room=256)
 
 
-def test_7_124_a_moving_point_adds_its_own_velocity() -> None:
+def test_7_124_the_velocity_of_a_moving_point_includes_the_relative_velocity() -> None:
     velocity = point_velocity(frame(0), array(point(mp.mpf(T))), array(rate(point, T)))
     assert agree(velocity.total, array(rate(moving, T)))
     assert agree(velocity.relative, frame(0).R_0_1 @ array(rate(point, T)))
 
 
-def test_7_125_a_moving_point_adds_coriolis_and_its_own_acceleration() -> None:
+def test_7_125_the_acceleration_of_a_moving_point_includes_coriolis_and_relative_terms() -> None:
     p_1, v_1, a_1 = array(point(mp.mpf(T))), array(rate(point, T)), array(second_rate(point, T))
     parts = point_acceleration(frame(0), p_1, v_1, a_1)
     assert agree(parts.total, array(second_rate(moving, T)), room=256)
@@ -166,7 +166,7 @@ def end_acceleration(moving: Motion) -> FloatArray:
 
 
 @pytest.mark.parametrize("moving", [ELBOW, POLAR, PLANAR], ids=lambda moving: moving.name)
-def test_7_126_the_acceleration_is_J_a_and_the_jacobians_rate_times_v(moving: Motion) -> None:
+def test_7_126_the_acceleration_is_J_a_plus_the_jacobian_rate_times_v(moving: Motion) -> None:
     n = len(moving.rows)
     J = robot(moving.name).jacobian(moving.q, ENDS[moving.name])
     J_rate = robot(moving.name).jacobian_rate(moving.q, moving.v, ENDS[moving.name])
@@ -174,7 +174,7 @@ def test_7_126_the_acceleration_is_J_a_and_the_jacobians_rate_times_v(moving: Mo
     assert close(J @ moving.a + J_rate @ moving.v, exact, 16.0)
 
 
-def test_7_127_angular_velocity_goes_from_link_to_link() -> None:
+def test_7_127_angular_velocity_is_computed_recursively_from_link_to_link() -> None:
     for moving, turning in ((ELBOW, [True] * 6), (POLAR, [True, False])):
         w = robot(moving.name).velocity(moving.q, moving.v, LINKS[moving.name])[:, 3:]
         before = np.zeros(3)
@@ -185,7 +185,7 @@ def test_7_127_angular_velocity_goes_from_link_to_link() -> None:
 
 
 @pytest.mark.slow
-def test_7_128_and_so_does_linear_velocity() -> None:
+def test_7_128_linear_velocity_is_computed_recursively_from_link_to_link() -> None:
     for moving, turning in ((ELBOW, [True] * 6), (POLAR, [True, False])):
         vel = np.zeros(3)
         for i, turns in enumerate(turning, start=1):
@@ -196,7 +196,7 @@ def test_7_128_and_so_does_linear_velocity() -> None:
 
 
 @pytest.mark.slow
-def test_7_129_angular_acceleration_gains_a_term_where_a_turning_link_carries_an_axis() -> None:
+def test_7_129_the_recursion_of_angular_acceleration_includes_the_rotation_of_the_joint_axis() -> None:
     alphas = robot("elbow").acceleration(ELBOW.q, ELBOW.v, ELBOW.a, LINKS["elbow"])[:, 3:]
     before = np.zeros(3)
     for i in range(1, 7):
@@ -209,7 +209,7 @@ def test_7_129_angular_acceleration_gains_a_term_where_a_turning_link_carries_an
 
 
 @pytest.mark.slow
-def test_7_130_linear_acceleration_of_a_rotary_chain() -> None:
+def test_7_130_linear_acceleration_of_a_rotary_chain_is_computed_recursively() -> None:
     acc = np.zeros(3)
     for i in range(1, 7):
         d = array(ELBOW.between(i)(mp.mpf(0)))
@@ -218,7 +218,7 @@ def test_7_130_linear_acceleration_of_a_rotary_chain() -> None:
     assert close(end_acceleration(ELBOW)[:3], ELBOW.acc(6), 16.0)
 
 
-def test_7_130_a_slide_adds_its_acceleration_and_twice_the_cross_product() -> None:
+def test_7_130_a_prismatic_joint_adds_joint_acceleration_and_coriolis_acceleration() -> None:
     d, z, w = array(POLAR.between(2)(mp.mpf(0))), POLAR.axis(2), POLAR.w(1)
     acc = np.cross(POLAR.alpha(2), d) + np.cross(w, np.cross(w, d))
     acc = acc + POLAR.a[1] * z + 2.0 * POLAR.v[1] * np.cross(w, z)
@@ -226,7 +226,7 @@ def test_7_130_a_slide_adds_its_acceleration_and_twice_the_cross_product() -> No
     assert close(end_acceleration(POLAR)[:3], POLAR.acc(2), 8.0)
 
 
-def test_7_130_every_part_of_the_breakdown_has_its_name() -> None:
+def test_7_130_each_part_of_the_breakdown_has_the_value_of_a_named_term() -> None:
     parts = robot("polar").acceleration_breakdown(POLAR.q, POLAR.v, POLAR.a, "slider")
     z0, z1, d = POLAR.axis(1), POLAR.axis(2), POLAR.origin(2)
     transverse, centripetal, coriolis, sliding = parts.by_kind[:, :3]
@@ -237,7 +237,7 @@ def test_7_130_every_part_of_the_breakdown_has_its_name() -> None:
     assert close(parts.total[:3], POLAR.acc(2), 8.0)
 
 
-def test_a_moving_base_supplies_the_initial_conditions() -> None:
+def test_the_motion_of_the_base_is_the_initial_condition_of_the_recursion() -> None:
     # Frame -1 of the text: the base turns about an axis and falls, and the polar robot goes on as before.
     generator = np.random.default_rng(11)
     R, p = exp_rotation([0.3, -0.4, 0.5]), np.array([0.2, 0.1, 0.7])

@@ -80,7 +80,7 @@ def one_joint(joint: str) -> str:
     )
 
 
-def test_joints_of_one_body_move_one_after_the_other() -> None:
+def test_the_motions_of_joints_of_one_body_are_applied_in_order() -> None:
     robot = loaded(
         one_joint('<joint name="x" type="slide" axis="1 0 0" range="-9 9"/><joint name="turn" axis="0 0 1"/>')
     )

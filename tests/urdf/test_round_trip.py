@@ -30,7 +30,7 @@ def assert_same(found: KinematicTree, expected: KinematicTree) -> None:
 
 @pytest.mark.slow
 @given(trees())
-def test_a_tree_that_is_written_once_or_twice_reads_back_as_itself(tree: KinematicTree) -> None:
+def test_a_tree_written_once_or_twice_is_read_back_unchanged(tree: KinematicTree) -> None:
     text = to_urdf(tree).encode()
     assert [str(f) for f in check_text(text) if f.severity is Severity.ERROR] == []
     once = tree_of(text)
@@ -55,7 +55,7 @@ def test_pinocchio_agrees_on_every_written_tree(tree: KinematicTree) -> None:
     robot.acceleration(q, v, v, frame)
 
 
-def test_a_tree_with_one_link_reads_back() -> None:
+def test_a_tree_with_one_link_is_read_back() -> None:
     tree = build_tree("stone", "only", [])
     assert_same(tree_of(to_urdf(tree).encode()), tree)
 
@@ -79,7 +79,7 @@ def test_a_joint_without_required_limits_and_a_name_that_xml_does_not_allow_are_
         to_urdf(build_tree("r", "a\0b", []))
 
 
-def test_an_infinite_effort_makes_the_file_version_1_2() -> None:
+def test_an_infinite_effort_limit_is_written_in_urdf_version_1_2() -> None:
     limit, z = Limit(-1, 1, 2.0, math.inf), np.array([0.0, 0.0, 1.0])
     joint = Joint("j", JointKind.REVOLUTE, 0, np.eye(4), z, limit=limit)
     tree = build_tree("r", "a", [(joint, "a", "b")])

@@ -1170,7 +1170,7 @@ def with_mimic(robot: urdfkin.Robot) -> urdfkin.Robot:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ROBOTS)
-def test_each_mistake_of_a_converter_is_found_and_named(write: Write, name: str) -> None:
+def test_each_mistake_of_a_converter_is_detected_and_described(write: Write, name: str) -> None:
     robot = loaded(name)
     for kind, slip_word in SLIPS.items():
         word = slip_word
@@ -1402,7 +1402,7 @@ ROUNDED = {
 
 
 @pytest.mark.parametrize(("models", "explained"), ROUNDED.values(), ids=ROUNDED)
-def test_only_the_rounding_of_a_number_explains_its_difference_in_either_order_of_the_models(
+def test_only_the_rounding_of_a_number_explains_a_difference_in_either_order_of_the_models(
     read: Read, models: tuple[str, str], explained: bool
 ) -> None:
     a, b = loaded(models[0]), read(models[1])

@@ -142,7 +142,7 @@ def test_the_digits_of_true_values_grow_with_joints_before_a_link(monkeypatch: p
 
 
 @pytest.mark.parametrize(("name", "samples"), [("fixed_only", 1), ("single_link", 1), ("one_joint", 0)])
-def test_a_robot_without_moving_joints_or_samples_has_the_same_lines(name: str, samples: int) -> None:
+def test_a_study_without_moving_joints_or_samples_has_the_same_lines(name: str, samples: int) -> None:
     lines = accuracy_study(robot_of(name), samples=samples).lines
     assert len(lines) == 15
     assert all(line.numbers == 0 for line in lines if "jacobian" in line.quantity)
@@ -302,7 +302,7 @@ def test_errors_are_equal_only_if_they_are_the_same_double() -> None:
     assert f"\n{counts}. " in make_pages.study_parts({"arm": study})["counts"]
 
 
-def test_the_page_has_the_equal_lines_of_polar() -> None:
+def test_the_page_marks_the_equal_results_of_polar() -> None:
     lines = plain(accuracy_study(urdfkin.load("polar"), samples=make_pages.SAMPLES))["lines"]
     table = make_pages.path_of("accuracy").read_text("utf-8").partition("## polar")[2].partition("## ")[0]
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \|$", table, re.M)

@@ -95,7 +95,7 @@ def test_other_settings_of_the_study_reuse_no_result_and_keep_the_chunks(
     assert first.moving_base
 
 
-def test_shards_study_each_robot_once_and_merge_to_the_report_of_one_run(
+def test_shards_study_each_robot_once_and_can_be_merged_to_the_report_of_one_run(
     study: Recorder, expected: list[Any], tmp_path: Path
 ) -> None:
     whole, again = str(tmp_path / "whole"), tmp_path / "again.json"
@@ -142,7 +142,7 @@ def test_a_failed_study_is_reported_each_time_and_retried_on_request(study: Reco
     assert None not in stored(tmp_path).studies
 
 
-def test_a_text_that_changed_since_its_comparison_is_not_studied(study: Recorder, tmp_path: Path) -> None:
+def test_a_text_that_changed_after_the_comparison_is_not_studied(study: Recorder, tmp_path: Path) -> None:
     robot, store = tmp_path / "a.urdf", tmp_path / "s"
     robot.write_text('<robot name="a"><link name="l"/></robot>')
     report = validate([str(robot)], samples=0, store=store)
@@ -154,7 +154,7 @@ def test_a_text_that_changed_since_its_comparison_is_not_studied(study: Recorder
     assert not list(store.glob("chunks/*/*.accuracy"))
 
 
-def test_a_result_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
+def test_a_stored_result_of_a_study_is_read_back_exactly(tmp_path: Path) -> None:
     validate("planar_two_link", samples=0, store=tmp_path)
     with open_store(tmp_path, Store.reading(tmp_path, pytest.fail).manifest, pytest.fail) as store:
         kept = AccuracyResult(store, StudySettings(1, 0, False))

@@ -167,7 +167,7 @@ def test_a_cluster_with_the_settings_of_the_page_serves_only_clients_with_the_ke
             assert validate("planar_two_link", samples=SAMPLES, executor=there).passed
 
 
-def test_a_cluster_changes_no_number_and_sends_each_robot_once(
+def test_a_cluster_gives_the_results_of_one_process_and_sends_each_robot_once(
     two: Cluster, undisturbed: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     sent: list[str] = []
@@ -183,7 +183,7 @@ def test_a_cluster_changes_no_number_and_sends_each_robot_once(
     assert numbers(stored(tmp_path)) == undisturbed
 
 
-def test_a_carried_robot_needs_no_file_and_no_catalogue_path(tmp_path: Path) -> None:
+def test_a_robot_sent_to_a_worker_needs_no_file_and_no_catalogue_path(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text('<robot name="a"><link name="l"/></robot>')
     for source in (str(path), "ur5"):
@@ -238,7 +238,7 @@ def _start_processes_of(module: str, fault: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_workers_killed_at_random_times_change_no_number(
+def test_killed_workers_of_a_cluster_change_no_result(
     processes: tuple[Cluster, LocalCluster], seed: int
 ) -> None:
     rng, killed = np.random.default_rng(seed), list[int]()

@@ -50,7 +50,7 @@ def test_a_result_that_differs_from_two_equal_results_is_the_outlier(
     assert (found.alone, found.undecided) == (alone, undecided)
 
 
-def test_the_sum_does_not_depend_on_the_order() -> None:
+def test_the_sum_of_cross_checks_does_not_depend_on_the_order() -> None:
     some = [checked_results(*results) for results in ((0, 4, 16), (100, 0, 0), (0, 100, 300))]
     (total,) = {reduce(add, order) for order in itertools.permutations(some)}
     assert plus(None, total) == plus(total, None) == total
@@ -82,7 +82,7 @@ def test_two_results_agree_up_to_their_bound(
     assert found.undecided == (sum(agree) in (0, 2))
 
 
-def test_a_sum_has_the_worst_disagreement() -> None:
+def test_a_sum_of_cross_checks_has_the_largest_disagreement() -> None:
     small, large = checked_results(0, 2, 6), checked_results(0, -4, 14)
     for total in (small + large, large + small):
         assert total.urdfkin == OraclePair(0, large.urdfkin.worst, large.urdfkin.share_of_bound)
@@ -119,7 +119,7 @@ def test_each_pair_of_libraries_has_its_own_bound(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.slow
-def test_every_form_of_a_report_shows_the_cross_check() -> None:
+def test_every_format_of_a_report_shows_the_cross_check() -> None:
     document = document_of()
     robot = document["robots"][0]
     assert robot["verdict"] == "verified"

@@ -47,7 +47,7 @@ def test_tallies_of_any_division_into_samples_and_frames_add_up(cut: int) -> Non
     assert nothing.beside(whole) == whole == whole.beside(nothing)
 
 
-def test_of_equal_worst_cases_the_earlier_sample_is_kept_and_then_the_earlier_frame() -> None:
+def test_equal_worst_cases_are_ordered_by_sample_and_then_by_frame() -> None:
     same = np.full((4, 3), 3.0)
     for found in (
         tally_of(same[2:], 2) + tally_of(same[:2]),
@@ -77,7 +77,7 @@ def test_the_histogram_has_ten_bins_a_decade_and_counts_an_edge_above_it() -> No
     np.testing.assert_allclose(HISTOGRAM_EDGES[[0, 10, 30, 80]], [1e-3, 1e-2, 1.0, 1e5])
 
 
-def test_results_without_numbers_agree_and_tallies_of_different_frames_cannot_be_added() -> None:
+def test_empty_results_agree_and_tallies_of_different_frames_cannot_be_added() -> None:
     nothing = np.zeros((4, 3, 6, 0))
     bound = Bound(nothing, np.ones((4, 3, 1, 1)))
     found = tally(nothing, nothing, bound, FRAMES, 0, [([], [], [])] * 4)

@@ -100,7 +100,7 @@ def bend(robot: Robot, q: np.ndarray, v: np.ndarray, frame: str) -> np.ndarray:
 
 @pytest.mark.parametrize("mistake", MISTAKES)
 @pytest.mark.parametrize("name", FRAMES)
-def test_a_planted_mistake_is_named(name: str, mistake: str) -> None:
+def test_the_diagnosis_describes_each_mistake_of_a_function(name: str, mistake: str) -> None:
     quantities, words, wrong = MISTAKES[mistake]
     robot, frame = robot_of(name), FRAMES[name]
     for quantity in quantities:
@@ -110,7 +110,7 @@ def test_a_planted_mistake_is_named(name: str, mistake: str) -> None:
 
 @pytest.mark.parametrize("quantity", SIX)
 @pytest.mark.parametrize("name", FRAMES)
-def test_another_reference_frame_is_named(name: str, quantity: str) -> None:
+def test_the_diagnosis_names_a_wrong_reference_frame(name: str, quantity: str) -> None:
     for reference in ("local", "world"):
         found = check(name, quantity, computed(robot_of(name), quantity, FRAMES[name], reference))
         check_diagnosis(found, f"is in {reference.upper()} instead of ")
@@ -118,7 +118,7 @@ def test_another_reference_frame_is_named(name: str, quantity: str) -> None:
 
 @pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 @pytest.mark.parametrize("name", FRAMES)
-def test_a_wrong_frame_is_named(name: str, quantity: str) -> None:
+def test_the_diagnosis_names_a_wrong_frame(name: str, quantity: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
     tree = robot.tree
     joint = next(i for i in reversed(tree.path(tree.frame_link(frame))) if tree.joints[i].kind.nv)
@@ -141,7 +141,7 @@ def exchange(x: np.ndarray, at: list[int]) -> np.ndarray:
 
 @pytest.mark.parametrize("quantity", [row.name for row in recursive_quantities()])
 @pytest.mark.parametrize("name", FRAMES)
-def test_a_reversed_joint_and_exchanged_joints_are_named(name: str, quantity: str) -> None:
+def test_the_diagnosis_names_a_reversed_joint_and_exchanged_joints(name: str, quantity: str) -> None:
     robot, frame = robot_of(name), FRAMES[name]
     tree = robot.tree
     path = [i for i in tree.path(tree.frame_link(frame)) if tree.joints[i].nv][1:3]
@@ -165,7 +165,7 @@ def test_a_reversed_joint_and_exchanged_joints_are_named(name: str, quantity: st
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # the PR2's file has a warning about an inertia
 @pytest.mark.parametrize("name", MIMICS)
-def test_a_missing_mimic_column_is_named(name: str) -> None:
+def test_the_diagnosis_names_a_missing_mimic_column(name: str) -> None:
     robot = robot_of(name)
     free = urdfkin.load(name, mimic=False, verify=False)
     own = [free.rate_names.index(x) for x in robot.rate_names]
@@ -180,7 +180,7 @@ def test_a_missing_mimic_column_is_named(name: str) -> None:
     check_diagnosis(found, ") are not added")
 
 
-def test_two_mistakes_and_the_order_of_another_tool_are_named() -> None:
+def test_the_diagnosis_describes_two_mistakes_and_the_joint_order_of_another_tool() -> None:
     local = computed(robot_of("ur5"), "jacobian", "tool0", "local")
     (words,) = check("ur5", "jacobian", lambda q: local(q)[_HALVES]).diagnoses
     assert "is in LOCAL" in words
@@ -213,7 +213,7 @@ def pinocchio_function(robot: Robot, quantity: str, frame: str) -> Callable[...,
 
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # axes that are not of unit length
 @pytest.mark.parametrize("seed", range(200))
-def test_no_correct_function_is_called_wrong(seed: int) -> None:
+def test_a_correct_function_has_no_diagnosis_of_a_mistake(seed: int) -> None:
     robot = urdfkin.load(random_tree(1000 + seed), mimic=False)
     leaves = list(robot.tree.leaves())
     frame = robot.tree.links[leaves[seed % len(leaves)]]
@@ -242,7 +242,7 @@ def test_a_function_with_another_algorithm_or_that_reuses_its_arrays_agrees() ->
 # -- what a check reports -------------------------------------------------------------------------------
 
 
-def test_one_wrong_number_is_named_and_the_needed_factor_is_reported() -> None:
+def test_the_diagnosis_names_one_wrong_number_and_the_needed_factor() -> None:
     def function(q: np.ndarray) -> np.ndarray:
         J = ur5_jacobian(q)
         J[1, 3] += 1e-9
@@ -263,7 +263,7 @@ def test_one_wrong_number_is_named_and_the_needed_factor_is_reported() -> None:
     assert verify_function(single, robot_of("ur5"), "jacobian", frame="tool0", **how).agrees
 
 
-def test_exceptions_and_wrong_shapes_are_results() -> None:
+def test_exceptions_and_wrong_shapes_of_a_checked_function_are_counted_as_errors() -> None:
     def function(q: np.ndarray) -> Any:
         if q[0] > 0:
             raise ValueError("no solution")
@@ -292,7 +292,7 @@ def test_numbers_that_are_not_finite_disagree_and_an_exit_of_the_function_is_an_
     assert found.errors == found.samples
 
 
-def test_a_batch_of_configurations_is_one_call() -> None:
+def test_a_function_of_batches_is_called_once_for_each_batch() -> None:
     robot, sizes = robot_of("ur5"), list[int]()
 
     def function(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -418,7 +418,7 @@ def test_a_fault_of_a_program_is_reported_and_the_check_continues(fault: str, tm
     assert data["compared"] >= 10 - 3
 
 
-def test_a_file_named_like_a_library_does_not_replace_it_and_a_request_has_locked_joints(
+def test_a_file_named_like_a_library_does_not_replace_the_library_and_requests_have_locked_joints(
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "mujoco.py"
@@ -440,7 +440,7 @@ def test_a_file_named_like_a_library_does_not_replace_it_and_a_request_has_locke
 
 @pytest.mark.long
 @pytest.mark.parametrize("tool", ["g++", "octave"])
-def test_the_example_in_another_language_agrees(tool: str, tmp_path: Path) -> None:
+def test_the_examples_in_cpp_and_octave_agree(tool: str, tmp_path: Path) -> None:
     if shutil.which(tool) is None:
         pytest.skip(f"no {tool}")
     target = f"octave -q {ADAPTERS / 'planar.m'}"

@@ -193,7 +193,7 @@ def result() -> ChunkResult:
     return run_chunk(chunk)
 
 
-def test_an_answer_is_read_back_to_the_last_bit() -> None:
+def test_a_stored_answer_of_a_worker_is_read_back_exactly() -> None:
     found = result()
     odd: Any = {"worst": float("inf"), "by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
     tallies = {key: replace(tally, **odd) for key, tally in found.tallies.items()}
@@ -324,12 +324,14 @@ def test_equal_shards_contain_each_chunk_once(robots: int, samples: int, count: 
 
 
 @pytest.mark.parametrize("word", ["0/4", "5/4", "1", "a/b", "1/0", "-1/4", "1/4/2", " 1/4"])
-def test_a_wrong_form_of_a_shard_is_refused(word: str, tmp_path: Path) -> None:
+def test_an_invalid_shard_specification_is_refused(word: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="must have the form i/n"):
         validate("ur5", samples=0, store=tmp_path, shard=word)
 
 
-def test_shards_of_several_machines_merge_to_the_report_of_one_run(undisturbed: str, tmp_path: Path) -> None:
+def test_shards_of_several_machines_can_be_merged_to_the_report_of_one_run(
+    undisturbed: str, tmp_path: Path
+) -> None:
     for i in (1, 2, 3):
         part = run_all(tmp_path / str(i), shard=f"{i}/3")
         assert {robot.verdict for robot in part.robots} <= {"verified", "bad input"}
@@ -474,7 +476,7 @@ def test_two_processes_that_begin_together_give_the_report_of_one(undisturbed: s
     assert numbers(stored(tmp_path / "s")) == undisturbed
 
 
-def test_a_clock_that_is_set_back_changes_nothing(
+def test_a_clock_that_is_set_back_changes_no_result(
     undisturbed: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     interrupt(tmp_path, 2)
@@ -497,7 +499,7 @@ def test_status_lists_finished_failed_and_missing_chunks(tmp_path: Path) -> None
     assert "chunks: 6 done, 0 missing" in run("report status", str(tmp_path)).text
 
 
-def test_a_campaign_of_a_robot_from_another_format_is_resumed(tmp_path: Path) -> None:
+def test_a_stored_validation_of_a_robot_from_another_format_is_resumed(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     arm = tmp_path / "arm.xml"
     arm.write_text(

@@ -425,7 +425,7 @@ def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth(
 # -- the files ------------------------------------------------------------------------------------------
 
 
-def test_both_forms_have_the_same_numbers_and_conform_to_the_schema(folder: Path) -> None:
+def test_both_file_formats_have_the_same_numbers_and_conform_to_the_schema(folder: Path) -> None:
     schema = VECTORS.schema()
     for path in folder.glob("*.json"):
         data = document(path)
@@ -446,7 +446,7 @@ def test_both_forms_have_the_same_numbers_and_conform_to_the_schema(folder: Path
         assert [[float(x) for x in row[4].split()] for row in rows if row[1] == "-"] == inputs
 
 
-def test_files_are_the_same_in_another_process_with_another_hash_seed(folder: Path, tmp_path: Path) -> None:
+def test_files_are_equal_in_a_process_with_a_different_hash_seed(folder: Path, tmp_path: Path) -> None:
     command = "from urdfkin.cli import main; main()"
     subprocess.run(
         [sys.executable, "-c", command, "vectors", "write", str(tmp_path), "--no-catalogue"],
@@ -458,7 +458,7 @@ def test_files_are_the_same_in_another_process_with_another_hash_seed(folder: Pa
 
 
 @pytest.mark.long
-def test_all_files_with_the_catalogue_are_written_twice_the_same(tmp_path: Path) -> None:
+def test_files_of_all_features_and_robots_are_equal_if_written_twice(tmp_path: Path) -> None:
     first, second = tmp_path / "a", tmp_path / "b"
     for made in (first, second):
         assert run("vectors write", str(made)).code == 0
@@ -510,7 +510,7 @@ def test_vectors_of_a_catalogue_robot_have_no_urdf_file_and_vectors_of_other_rob
     assert agree(tmp_path / "out" / "my_arm.json") > 0
 
 
-def test_bad_arguments_are_explained(tmp_path: Path) -> None:
+def test_invalid_arguments_of_vectors_write_are_clear_errors(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert "cannot be written" in refused("vectors write", str(tmp_path / "file"), "ur5")
     assert "name the folder" in run("vectors write").err

@@ -39,7 +39,7 @@ def crashes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 @pytest.mark.long
-def test_processes_change_no_number() -> None:
+def test_results_do_not_depend_on_the_number_of_processes() -> None:
     robots = ["ur5", "double_pendulum", "<robot/>", "no such robot"]
     alone = validate(robots, samples=60)
     assert [robot.verdict for robot in alone.robots] == ["verified"] * 2 + ["bad input"] * 2
@@ -94,7 +94,7 @@ def test_an_interrupt_kills_processes_that_hang_in_compiled_code(monkeypatch: py
             process.wait()
 
 
-def test_a_robot_without_a_process_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_for_which_no_process_starts_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(_: int) -> None:
         raise OSError(24, "Too many open files")
 
@@ -127,7 +127,7 @@ def test_running_processes_take_the_work_of_a_process_that_does_not_start(
         assert count >= 2
 
 
-def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_runs_no_file_of_the_current_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     codes: list[list[str]] = []
 
     class RecordedError(Exception):
@@ -148,9 +148,7 @@ def test_a_worker_runs_nothing_of_the_current_folder(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.long
-def test_processes_killed_at_random_times_change_no_number(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_killed_processes_change_no_result(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     robots, right = ["planar_two_link", "double_pendulum", "<robot/>", "iris_simple"], answer.answer
 
     def store_answer(chunk: Chunk) -> Answer:
@@ -197,7 +195,7 @@ def take(queue: WorkQueue, tasks: RobotTasks | None = None) -> tuple[Task, Robot
     return (task, tasks) if task is not None and tasks is not None else present(queue.first())
 
 
-def test_two_workers_have_a_robot_each_and_share_the_last_robot() -> None:
+def test_two_workers_start_with_different_robots_and_both_work_on_the_last_robot() -> None:
     queue, tasks = WorkQueue(work(3)), list[RobotTasks | None]([None, None])
     taken = list[tuple[int, int, int]]()
     for turn in range(12):
@@ -209,7 +207,7 @@ def test_two_workers_have_a_robot_each_and_share_the_last_robot() -> None:
 
 
 @pytest.mark.parametrize("shared", [True, False])
-def test_a_task_that_is_put_back_is_taken_again_and_a_withdrawn_robot_has_no_task(shared: bool) -> None:
+def test_a_returned_task_is_assigned_again_and_a_withdrawn_robot_has_no_task(shared: bool) -> None:
     queue = WorkQueue(work(2), shared=shared)
     task, tasks = take(queue)
     queue.put_back(task, tasks)
@@ -219,7 +217,7 @@ def test_a_task_that_is_put_back_is_taken_again_and_a_withdrawn_robot_has_no_tas
     assert take(queue)[0].robot == 1
 
 
-def test_a_free_worker_helps_at_the_robot_with_the_most_chunks_left_unless_robots_are_not_shared() -> None:
+def test_a_free_worker_joins_the_robot_with_the_most_remaining_chunks_if_sharing_is_allowed() -> None:
     queue = WorkQueue(work(2))
     (_, first), (_, second) = take(queue), take(queue)
     for _ in range(2):

@@ -56,7 +56,7 @@ def rows(bound: Bound) -> tuple[Any, Any, float]:
     return scale[0].tolist(), scale[3].tolist(), float(bound.k.ravel()[0])
 
 
-def test_a_placement_is_held_to_the_path_and_its_rotation_to_one(plan: CompiledTree) -> None:
+def test_the_bound_of_a_placement_has_the_path_length_and_one_as_scales(plan: CompiledTree) -> None:
     bound = PLACEMENT.bound(plan, sizes(), None)
     expected = np.array([[1, 1, 1, P], [1, 1, 1, P], [1, 1, 1, P], [0, 0, 0, 0]], dtype=np.float64)
     assert (bound.scale[0, 0] == expected).all()
@@ -84,19 +84,19 @@ BY_HAND: list[tuple[Quantity, Reference, Any, Any, int]] = [
 
 
 @pytest.mark.parametrize(("quantity", "reference", "linear", "angular", "factors"), BY_HAND)
-def test_each_bound_has_the_terms_and_factors_that_are_counted_by_hand(
+def test_each_bound_has_the_terms_and_factors_counted_by_hand(
     plan: CompiledTree, quantity: Quantity, reference: Reference, linear: Any, angular: Any, factors: int
 ) -> None:
     bound = quantity.bound(plan, sizes(), reference)
     assert rows(bound) == (linear, angular, 24.0 * JOINTS * factors)
 
 
-def test_an_imus_reading_has_gravity_as_one_term_more(plan: CompiledTree) -> None:
+def test_the_scale_of_an_imu_includes_gravity(plan: CompiledTree) -> None:
     scale = bounds.imu_scale(sizes(), np.array([3.0, 0.0, 4.0]))[0, 0]
     assert scale.tolist() == [*[ACC + W * VEL + 5.0] * 3, *[W] * 3]
 
 
-def test_an_imus_reading_is_held_to_that_scale_and_to_an_accelerations_factors() -> None:
+def test_the_bound_of_an_imu_has_the_scale_with_gravity_and_the_factors_of_an_acceleration() -> None:
     robot = urdfkin.load(ARM)
     inputs = np.array([[0.3, 0.5], [1.5, -2.0], [0.7, 0.2]])
     call = Call(robot.tree, robot.plan, "l3", LOCAL, None, list(inputs), gravity=[3.0, 0.0, 4.0])
@@ -108,7 +108,7 @@ def test_an_imus_reading_is_held_to_that_scale_and_to_an_accelerations_factors()
     assert rows(bound) == (linear, size.w.item(), 24.0 * JOINTS * (ACCELERATION.factors + 1))
 
 
-def test_a_relative_placement_is_held_to_both_paths() -> None:
+def test_the_bound_of_a_relative_placement_includes_both_paths() -> None:
     robot = urdfkin.load(ARM)
     call = Call(robot.tree, robot.plan, "l3", ALIGNED, None, ([0.3, 0.5],), also=("l2",), relative_to="l2")
     part = call.part(slice(0, 1))
@@ -131,7 +131,7 @@ def test_a_relative_placement_is_held_to_both_paths() -> None:
         ("l0", ALIGNED, [False, False]),
     ],
 )
-def test_which_columns_can_be_anything_but_0_is_the_robots(
+def test_columns_that_the_bound_treats_as_zero_are_zero_in_the_jacobian(
     frame: str, reference: Reference, linear: list[bool]
 ) -> None:
     robot = urdfkin.load(ARM)
@@ -144,7 +144,9 @@ def test_which_columns_can_be_anything_but_0_is_the_robots(
     assert (np.abs(J).max(axis=(0, 1))[found[0].any(axis=0)] > 0.0).all()
 
 
-def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity(plan: CompiledTree) -> None:
+def test_the_bound_of_euler_rates_grows_with_the_inverse_square_of_the_singularity_distance(
+    plan: CompiledTree,
+) -> None:
     def euler(apart: float) -> FloatArray:
         jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
         return np.asarray(bounds.euler_jacobian_bound(jacobian, sizes(), np.array([[apart]])).scale[0, 0])
@@ -160,7 +162,7 @@ def test_rates_of_angles_grow_as_the_square_of_the_distance_from_the_singularity
     assert bounds.nearest_singularity(plan) == 4.0 * delta
 
 
-def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: CompiledTree) -> None:
+def test_the_bound_of_quaternion_rates_is_the_bound_of_the_jacobian(plan: CompiledTree) -> None:
     jacobian = JACOBIAN.bound(plan, sizes(), ALIGNED)
     bound = bounds.quaternion_jacobian_bound(JACOBIAN.bound(plan, sizes(), ALIGNED))
     assert (bound.scale[0, 0, :6] == jacobian.scale[0, 0]).all()
@@ -168,14 +170,14 @@ def test_rates_of_a_quaternion_are_held_to_those_of_the_jacobian(plan: CompiledT
     assert (bound.k == jacobian.k).all()
 
 
-def test_a_tilt_adds_twice_itself_to_each_factor(plan: CompiledTree) -> None:
+def test_each_factor_of_a_bound_includes_twice_the_tilt(plan: CompiledTree) -> None:
     tilt = 1e-13
     k = 24.0 * JOINTS + 2.0 * tilt / EPS
     assert rows(VELOCITY.bound(plan, sizes(tilt), LOCAL))[2] == 3.0 * k
     assert rows(JACOBIAN.bound(plan, sizes(tilt), ALIGNED))[2] == 2.0 * k
 
 
-def test_mujocos_levers_are_twice_as_long_and_its_roundings_two_and_a_half_times_as_many() -> None:
+def test_bounds_for_mujoco_have_lever_arms_twice_as_long_and_2_5_times_the_roundings() -> None:
     lever = 2.0 * P
     assert bounds.mujoco_magnitudes(sizes()) == Magnitudes(
         p=np.array([[lever]]),
@@ -207,7 +209,9 @@ def exceed(vectors: FloatArray, size: FloatArray) -> bool:
 @pytest.mark.parametrize("moving", [False, True])
 @pytest.mark.parametrize("sizes", [(1.0, 1.0), (1e-3, 1e3), (1e3, 1e-3), (0.0, 1.0), (1.0, 0.0)])
 @pytest.mark.parametrize("subject", NAMES)
-def test_nothing_exceeds_its_size(subject: str, sizes: tuple[float, float], moving: bool) -> None:
+def test_no_result_exceeds_the_computed_magnitude(
+    subject: str, sizes: tuple[float, float], moving: bool
+) -> None:
     robot = robot_of(subject)
     q, v, a = state(robot, 20, 1)
     v, a = sizes[0] * v, sizes[1] * a
@@ -232,7 +236,7 @@ def of_the_arm(q: list[float], v: list[float], a: list[float]) -> Magnitudes:
     return magnitudes(robot.plan([4]), np.array([q]), np.array([v]), np.array([a]), STILL_STATE)
 
 
-def test_where_all_terms_point_the_same_way_the_sizes_are_reached() -> None:
+def test_magnitudes_are_reached_if_all_terms_have_the_same_direction() -> None:
     size = of_the_arm([0.0, 0.0, 0.25], [2.0, 3.0, 0.0], [0.0, 0.0, 0.0])
     # Stretched out: 2 m turn with 2 rad/s, 1.75 m with 5 rad/s.
     assert size.p == 3.75
@@ -243,7 +247,7 @@ def test_where_all_terms_point_the_same_way_the_sizes_are_reached() -> None:
     assert size.roundings == 5 * ROUNDINGS
 
 
-def test_slides_and_second_rates_count_as_7_130_has_them() -> None:
+def test_magnitudes_include_prismatic_joints_and_joint_accelerations_as_in_7_130() -> None:
     size = of_the_arm([0.0, 0.0, -0.25], [0.5, 0.0, 3.0], [7.0, 0.0, 11.0])
     alpha = 7.0 + 0.25
     assert size.p == 3.75

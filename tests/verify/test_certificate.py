@@ -45,7 +45,7 @@ def counts(robot: Robot) -> dict[str, tuple[int, int]]:
     return {str(line.quantity): (line.checked, line.unchecked) for line in robot.certificate().lines}
 
 
-def test_each_way_of_asking_is_counted(robot: Robot) -> None:
+def test_the_certificate_counts_calls_of_every_kind(robot: Robot) -> None:
     q, v, a = state(robot, 1, 1)
     one = q[0], v[0], a[0]
     fast = robot.prepare(FRAME, "local")
@@ -67,7 +67,7 @@ def test_each_way_of_asking_is_counted(robot: Robot) -> None:
     assert robot.certificate().not_verified == (CHECK_TURNED_OFF,)
 
 
-def test_what_was_refused_is_not_counted(robot: Robot) -> None:
+def test_the_certificate_does_not_count_refused_calls(robot: Robot) -> None:
     q = robot.neutral()
     bad = np.full(robot.nq, np.nan)
     fast = robot.prepare(FRAME)
@@ -84,7 +84,7 @@ def test_what_was_refused_is_not_counted(robot: Robot) -> None:
     assert robot.certificate().not_verified == ()
 
 
-def test_what_was_prepared_is_in_the_same_certificate_as_what_was_checked(robot: Robot) -> None:
+def test_unchecked_calls_of_a_prepared_frame_and_checked_calls_have_one_certificate(robot: Robot) -> None:
     q = robot.sample(10, 2)
     assert not robot.certificate().verified
     robot.jacobian(q, FRAME, verify=True)
@@ -106,7 +106,7 @@ def test_what_was_prepared_is_in_the_same_certificate_as_what_was_checked(robot:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("often")
-def test_eight_threads_are_counted_as_one_is_and_get_what_one_gets(robot: Robot) -> None:
+def test_eight_threads_have_the_counts_and_results_of_one_thread(robot: Robot) -> None:
     q, v, a = state(robot, 16, 3)
     fast = robot.prepare(FRAME), robot.prepare("panda_link5", "local")
     expected = [robot.prepare(FRAME).jacobian(x) for x in q]
@@ -138,7 +138,7 @@ def test_eight_threads_are_counted_as_one_is_and_get_what_one_gets(robot: Robot)
     }
 
 
-def test_a_certificate_says_which_file_it_was_and_can_be_saved(tmp_path: Path) -> None:
+def test_a_certificate_states_the_file_name_and_the_digest_and_can_be_saved(tmp_path: Path) -> None:
     file = tmp_path / "arm.urdf"
     file.write_text(urdfkin.load("elbow").urdf)
     robot = urdfkin.load(file)
@@ -157,7 +157,7 @@ def test_a_certificate_says_which_file_it_was_and_can_be_saved(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("reading", ["", "MuJoCo 4.0.0 at 9 configurations"])
-def test_who_vouches_for_a_reading_is_said_where_somebody_does(reading: str) -> None:
+def test_a_certificate_states_the_check_of_the_reader_if_there_was_a_check(reading: str) -> None:
     certificate = Certificate("arm", "Pinocchio 4.1.0", (), (), reading=reading)
     for text in (str(certificate), certificate._repr_markdown_(), certificate._repr_html_()):
         assert ("read: " in text.lower()) == bool(reading)
@@ -165,7 +165,7 @@ def test_who_vouches_for_a_reading_is_said_where_somebody_does(reading: str) -> 
 
 
 @pytest.mark.parametrize("other", [0.5, 7.0, np.inf, np.nan])
-def test_a_share_that_is_no_number_is_kept_in_a_sum_of_comparisons(other: float) -> None:
+def test_a_fraction_of_the_bound_that_is_nan_is_preserved_in_a_sum_of_comparisons(other: float) -> None:
     wrong, right = BatchComparison(1, np.nan, np.nan, (3,)), BatchComparison(2, 1.0, other, (4,))
     for both in (wrong + right, right + wrong):
         assert np.isnan(both.share)

@@ -47,7 +47,7 @@ def impostor(tmp_path: Path) -> str:
 @pytest.mark.parametrize(
     "words", ["jacobian elbow --q random", "validate elbow --samples 1", "dh elbow", "--version"]
 )
-def test_another_project_of_that_name_is_named_with_what_cures_it(impostor: str, words: str) -> None:
+def test_another_project_named_pinocchio_is_reported_with_the_remedy(impostor: str, words: str) -> None:
     done = process(*words.split(), PYTHONPATH=impostor)
     assert done.code == 2, "1 would mean a disagreement"
     assert "pinocchio 0.5.1, another project" in done.err
@@ -58,14 +58,14 @@ def test_another_project_of_that_name_is_named_with_what_cures_it(impostor: str,
 
 
 @pytest.mark.slow
-def test_without_a_check_nobody_asks_which_it_is(impostor: str) -> None:
+def test_another_project_named_pinocchio_does_not_matter_without_verification(impostor: str) -> None:
     done = process("placement", "elbow", "--no-verify", PYTHONPATH=impostor)
     assert done.code == 3
     assert "NOT VERIFIED" in done.text
 
 
 @pytest.mark.slow
-def test_a_file_of_that_name_beside_ones_program_is_named(tmp_path: Path) -> None:
+def test_a_file_pinocchio_py_on_the_python_path_is_reported(tmp_path: Path) -> None:
     (tmp_path / "pinocchio.py").write_text("")
     done = process("--version", PYTHONPATH=str(tmp_path))
     assert f"rename or remove {tmp_path / 'pinocchio.py'}" in done.err
@@ -77,7 +77,9 @@ def module(**words: object) -> ModuleType:
     return made
 
 
-def test_the_version_is_that_of_the_module_in_use(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reported_pinocchio_version_is_that_of_the_imported_module(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(sys.modules, "pinocchio", module(buildModelFromXML=None, __version__="4.98.7"))
     assert version() == "4.98.7"
 
@@ -89,7 +91,7 @@ def test_an_older_pinocchio_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     assert version() == "not installed"
 
 
-def test_without_any_the_package_to_install_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_pinocchio_the_error_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pinocchio", None)
     robot = urdfkin.load("elbow")
     with pytest.raises(InstallationError, match="pip install 'pin>=4,<5'"):
@@ -137,7 +139,7 @@ def ask_everything(robot: urdfkin.Robot, n: int, base: urdfkin.BaseMotion | None
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SUBJECTS)
 @pytest.mark.parametrize("far", [None, 1.0, 1e6], ids=lambda far: f"base {far}")
-def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | None) -> None:
+def test_mujoco_agrees_for_every_quantity_and_reference_frame(name: str, far: float | None) -> None:
     text, options = SUBJECTS[name]
     robot = loaded(text, oracle="mujoco", **options)
     ask_everything(robot, 5, None if far is None else base_motion(np.random.default_rng(0), far))
@@ -150,7 +152,7 @@ def test_mujoco_agrees_in_every_quantity_and_reference(name: str, far: float | N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", catalogue())
-def test_mujoco_agrees_about_every_robot_of_the_catalogue(name: str) -> None:
+def test_mujoco_agrees_for_every_robot_of_the_catalogue(name: str) -> None:
     robot = urdfkin.load(name, oracle="mujoco")
     q = robot.sample(1)
     v, a = np.random.default_rng(0).normal(size=(2, 1, robot.nv))
@@ -161,7 +163,7 @@ def test_mujoco_agrees_about_every_robot_of_the_catalogue(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", robots.FAMILIES)
-def test_mujoco_agrees_about_odd_robots_or_says_why_not(family: str) -> None:
+def test_mujoco_agrees_for_unusual_robots_or_a_reason_is_given(family: str) -> None:
     agreed = 0
     for number in range(4):
         case = robots.robot(7, family, number)
@@ -179,7 +181,7 @@ def test_mujoco_agrees_about_odd_robots_or_says_why_not(family: str) -> None:
     assert agreed
 
 
-def test_a_lever_that_is_nothing_is_nothing_to_mujoco() -> None:
+def test_a_jacobian_without_a_lever_arm_is_zero_and_verified_by_mujoco() -> None:
     far = fixed("far", "l1", "end").replace("</joint>", '<origin xyz="1e60 0 0"/></joint>')
     text = arm(origin='<origin rpy="0.1 0.2 0.3"/>', more=f'<link name="end"/>{far}')
     with pytest.warns(urdfkin.UrdfWarning):
@@ -189,14 +191,14 @@ def test_a_lever_that_is_nothing_is_nothing_to_mujoco() -> None:
     assert robot.certificate().verified
 
 
-def test_a_chain_that_is_too_deep_for_mujoco_is_not_handed_to_it() -> None:
+def test_a_too_deep_chain_is_not_passed_to_mujoco() -> None:
     joints = (fixed(f"j{i}", f"l{i}", f"l{i + 1}") for i in range(1_101))
     robot = urdfkin.load(urdfs.robot(*joints), oracle="mujoco")
     with pytest.warns(NotVerifiedWarning, match=r"chains of up to 1,000 links: found 1,101"):
         robot.placement([], "l9")
 
 
-def test_what_pinocchio_refuses_mujoco_may_check() -> None:
+def test_mujoco_can_check_a_file_that_pinocchio_refuses() -> None:
     with pytest.warns(urdfkin.UrdfWarning, match="URDF303"):
         robot = urdfkin.load(arm(origin='<origin xyz="0\t0 1"/>'), oracle="mujoco")
     robot.placement(robot.neutral(), "tool")
@@ -204,7 +206,9 @@ def test_what_pinocchio_refuses_mujoco_may_check() -> None:
 
 
 @pytest.mark.parametrize("quantity", ["placement", "jacobian", "velocity"])
-def test_a_disagreement_with_mujoco_bears_its_name(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_about_a_disagreement_with_mujoco_names_mujoco(
+    quantity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     method = {"velocity": "velocities"}.get(quantity, f"{quantity}s")
     right = getattr(MujocoOracle, method)
     monkeypatch.setattr(MujocoOracle, method, lambda *given: right(*given) + 1e-9)
@@ -215,7 +219,7 @@ def test_a_disagreement_with_mujoco_bears_its_name(quantity: str, monkeypatch: p
     assert "oracle" in str(caught.value), "the line that reproduces it asks MuJoCo again"
 
 
-def test_what_mujoco_does_not_know_is_a_reason() -> None:
+def test_an_attribute_that_mujoco_does_not_read_is_a_reason_for_no_verification() -> None:
     text = arm(robot='name="r" version="1.1"', origin='<origin quat_xyzw="0 0 1 0"/>')
     with pytest.warns(urdfkin.UrdfWarning):
         robot = urdfkin.load(text, oracle="mujoco")
@@ -224,12 +228,14 @@ def test_what_mujoco_does_not_know_is_a_reason() -> None:
     assert not robot.certificate().verified
 
 
-def test_an_oracle_that_nobody_knows_is_an_error() -> None:
+def test_an_unknown_oracle_is_an_error_with_the_nearest_name() -> None:
     with pytest.raises(UnknownNameError, match=r"unknown oracle 'mujuco'.*did you mean mujoco"):
         urdfkin.load(arm(), oracle="mujuco")  # type: ignore[arg-type]
 
 
-def test_an_oracle_that_is_not_installed_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_about_a_missing_oracle_names_the_package_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("urdfkin.urdf.mujoco.installed_version", lambda _: None)
     with pytest.raises(urdfkin.InputError, match=r"MuJoCo is not installed; pip install 'mujoco>=4,<5'"):
         urdfkin.load(arm(), oracle="mujoco")
@@ -259,7 +265,7 @@ QUICK = ("panda", "talos", "elbow")
 @pytest.mark.parametrize(
     "name", [*QUICK, *(pytest.param(x, marks=pytest.mark.slow) for x in catalogue() if x not in QUICK)]
 )
-def test_both_readers_agree_on_the_catalogue(name: str) -> None:
+def test_both_urdf_readers_agree_on_every_robot_of_the_catalogue(name: str) -> None:
     robot = loaded(name, verify=False)
     found = second_reading(robot.urdf, robot.tree, mimic=robot.verifier.mimic)
     assert (found.differences, found.unread) == ((), None)
@@ -268,7 +274,7 @@ def test_both_readers_agree_on_the_catalogue(name: str) -> None:
 
 
 @pytest.mark.parametrize("how", [{}, {"mimic": False}, {"root_joint": "floating"}])
-def test_options_of_load_are_no_difference(how: dict[str, Any]) -> None:
+def test_options_of_load_cause_no_difference_between_the_readers(how: dict[str, Any]) -> None:
     assert reading(ARM, **how).differences == ()
 
 
@@ -305,19 +311,21 @@ def plant(
 
 
 @pytest.mark.parametrize("what", PLANTED)
-def test_a_planted_difference_is_reported(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_of_the_second_reader_is_reported_as_a_difference(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     *fault, words = PLANTED[what]
     plant(monkeypatch, *fault)  # type: ignore[arg-type]
     assert any(words in text for text in reading(ARM).differences)
 
 
-def test_a_different_mimic_rule_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_different_mimic_rule_of_the_second_reader_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     plant(monkeypatch, "mimic.multiplier", lambda x: 2.0 * x, 1)
     (difference,) = reading(ARM).differences
     assert difference.startswith("joint slide: mimic rule")
 
 
-def test_a_bent_axis_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_different_axis_of_the_second_reader_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> None:
     plant(monkeypatch, *PLANTED["axis"][:2])
     (robot,) = validate(ARM, samples=0).robots
     assert robot.verdict is ValidationVerdict.DISAGREES
@@ -326,7 +334,7 @@ def test_a_bent_axis_fails_the_validation(monkeypatch: pytest.MonkeyPatch) -> No
     assert robot.failed == 0
 
 
-def test_known_faults_are_named_and_not_counted() -> None:
+def test_known_faults_of_the_second_reader_are_listed_and_are_no_differences() -> None:
     text = ARM.replace('axis xyz="0 0 1"', 'axis xyz="0 0 2"')
     text = text.replace("<robot", '<robot version="1.2"').replace('rpy="0.1 -0.2 2.5"', 'quat_xyzw="0 0 1 1"')
     found = reading(text)
@@ -334,7 +342,9 @@ def test_known_faults_are_named_and_not_counted() -> None:
     assert found.known == ("does not normalise an axis: turn", "ignores quat_xyzw: turn")
 
 
-def test_a_file_that_yourdfpy_cannot_read_is_named_and_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_yourdfpy_cannot_read_is_reported_and_is_no_failure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def refuse(text: str) -> None:
         raise KeyError("link")
 
@@ -344,12 +354,12 @@ def test_a_file_that_yourdfpy_cannot_read_is_named_and_is_no_failure(monkeypatch
     assert report.as_dict()["robots"][0]["second_reader"]["unread"] == "KeyError: 'link'"  # type: ignore[index]
 
 
-def test_a_document_type_is_not_given_to_yourdfpy() -> None:
+def test_a_file_with_a_document_type_is_not_passed_to_yourdfpy() -> None:
     found = second_reading("<!DOCTYPE robot>" + ARM, loaded(ARM, verify=False).tree)
     assert found.unread == "the file has a document type"
 
 
-def test_the_declared_encoding_of_the_file_does_not_matter() -> None:
+def test_the_declared_encoding_of_a_file_causes_no_difference_between_the_readers() -> None:
     text = ARM.replace("turn", "drehen_ä")
     assert reading(text).differences == ()
     declared = '<?xml version="1.0" encoding="latin-1"?>' + text

@@ -67,7 +67,7 @@ def row(monkeypatch: pytest.MonkeyPatch) -> Quantity:
 
 
 @pytest.mark.usefixtures("row")
-def test_a_new_row_is_computed_checked_and_certified() -> None:
+def test_a_new_quantity_is_computed_checked_and_certified() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(5)
     out = np.empty((5, 2, 3))
@@ -80,7 +80,9 @@ def test_a_new_row_is_computed_checked_and_certified() -> None:
     assert 0.0 < line.share < 1.0
 
 
-def test_a_slip_in_a_new_row_is_found_and_its_line_computes_it_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_of_a_new_quantity_is_detected_with_a_command_that_repeats_the_computation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     wrong = replace(TURNING, compute=lambda *x, **how: turning(*x, **how) * (1.0 + 1e-10))
     monkeypatch.setitem(QUANTITIES, wrong.name, wrong)
     robot = urdfkin.load("ur5")
@@ -94,7 +96,7 @@ def test_a_slip_in_a_new_row_is_found_and_its_line_computes_it_again(monkeypatch
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("row")
-def test_a_new_row_is_validated_and_stands_in_every_report() -> None:
+def test_a_new_quantity_is_validated_and_included_in_every_report() -> None:
     report = urdfkin.validate("ur5", samples=4)
     (robot,) = report.robots
     assert report.passed
@@ -112,7 +114,7 @@ def test_a_new_row_is_validated_and_stands_in_every_report() -> None:
 
 
 @pytest.mark.usefixtures("row")
-def test_a_new_row_is_a_command_with_help_and_every_form() -> None:
+def test_a_new_quantity_has_a_command_with_help_and_every_output_format() -> None:
     assert "angular velocity of a frame" in command("--help").text
     text = " ".join(command("angular-velocity", "--help").text.split())
     assert "Angular velocity of a frame (eq. 7.127, 7.128). How fast it turns. ROBOT is" in text
@@ -126,7 +128,7 @@ def test_a_new_row_is_a_command_with_help_and_every_form() -> None:
 
 
 @pytest.mark.usefixtures("row")
-def test_a_new_row_is_checked_along_a_trajectory() -> None:
+def test_a_new_quantity_is_checked_along_a_trajectory() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(3)
     x = frame_motion(robot, (q, q, q), "tool0")
@@ -138,13 +140,13 @@ def test_a_new_row_is_checked_along_a_trajectory() -> None:
 
 
 @pytest.mark.parametrize("row", QUANTITIES.values(), ids=lambda row: row.name)
-def test_a_rows_equations_are_the_chapters(row: Quantity) -> None:
+def test_the_equations_of_each_quantity_exist_in_the_equation_table(row: Quantity) -> None:
     assert set(row.equations) <= set(equations())
     assert row.equations
 
 
 @pytest.mark.parametrize("row", recursive_quantities(), ids=lambda row: row.name)
-def test_a_robot_has_a_method_for_each_row_that_takes_its_inputs(row: Quantity) -> None:
+def test_a_robot_has_a_method_for_each_quantity_with_the_declared_inputs(row: Quantity) -> None:
     parameters = list(inspect.signature(getattr(Robot, row.method)).parameters)
     takes = [*row.inputs, "frame", *(["reference"] if row.referred else [])]
     assert parameters == ["self", *takes, "base", "out", "verify", "threads"]
@@ -156,12 +158,12 @@ def test_a_robot_has_a_method_for_each_row_that_takes_its_inputs(row: Quantity) 
     assert robot.certificate().verified
 
 
-def test_every_command_of_the_table_is_its_rows() -> None:
+def test_the_quantities_with_a_command_are_those_listed_here() -> None:
     commands = "placement velocity jacobian jacobian-rate hessian acceleration"
     assert list(by_command()) == commands.split()
 
 
-def test_what_is_no_row_or_takes_other_inputs_is_refused() -> None:
+def test_an_unknown_quantity_or_wrong_inputs_are_refused() -> None:
     robot = urdfkin.load("polar")
     with pytest.raises(UnknownNameError, match="unknown quantity 'jacobain'; did you mean jacobian"):
         robot.compute("jacobain", ([0.0, 0.0],), "slider")
@@ -176,7 +178,7 @@ def test_what_is_no_row_or_takes_other_inputs_is_refused() -> None:
 
 
 @given(st.data())
-def test_it_is_the_product_with_g_to_the_last_bit(data: st.DataObject) -> None:
+def test_coupled_columns_are_the_product_with_g_to_the_last_bit(data: st.DataObject) -> None:
     nv, full = data.draw(st.integers(1, 5)), data.draw(st.integers(1, 8))
     index = np.array(data.draw(st.tuples(*[st.integers(0, nv - 1)] * full)), dtype=np.int64)
     factor = np.array(data.draw(st.tuples(*[st.floats(-2.0, 2.0)] * full)))
@@ -194,7 +196,7 @@ def test_it_is_the_product_with_g_to_the_last_bit(data: st.DataObject) -> None:
             np.testing.assert_array_equal(coupled(J, columns, index, factor, nv), expected)
 
 
-def test_it_takes_views_and_leaves_them_as_they_are() -> None:
+def test_coupled_columns_of_read_only_views_are_correct() -> None:
     J = np.arange(24.0).reshape(2, 3, 4).swapaxes(0, 1)
     J.setflags(write=False)
     places = np.array([0, 2], dtype=np.int64)
@@ -203,7 +205,7 @@ def test_it_takes_views_and_leaves_them_as_they_are() -> None:
 
 
 @pytest.mark.parametrize("rows", [0, 1])
-def test_a_robot_without_rates_has_no_columns(rows: int) -> None:
+def test_coupled_columns_of_a_robot_without_joint_velocities_are_empty(rows: int) -> None:
     nothing = np.zeros(0, dtype=np.int64)
     assert coupled(np.zeros((rows, 6, 0)), nothing, nothing, np.zeros(0), 0).shape == (rows, 6, 0)
 
@@ -213,7 +215,7 @@ def test_a_robot_without_rates_has_no_columns(rows: int) -> None:
 
 
 @pytest.mark.parametrize("with_special", [True, False])
-def test_special_configurations_come_first_if_asked_for_and_nowhere_else(with_special: bool) -> None:
+def test_special_configurations_come_first_on_request(with_special: bool) -> None:
     robot = urdfkin.load("panda")
     drawn = draw(robot.tree, 40, np.random.default_rng(0), with_special=with_special)
     extra = 3 if with_special else 0
@@ -224,7 +226,7 @@ def test_special_configurations_come_first_if_asked_for_and_nowhere_else(with_sp
     assert special(robot.tree)[2].tolist() == [limit.upper for limit in limits if limit]
 
 
-def test_every_eighth_sample_has_rates_a_hundred_times_as_large() -> None:
+def test_every_eighth_sample_has_joint_velocities_a_hundred_times_as_large() -> None:
     drawn = draw(urdfkin.load("panda").tree, 400, np.random.default_rng(0), with_special=False)
     demand_large_rates(drawn.v, drawn.a)
 
@@ -236,7 +238,7 @@ def demand_large_rates(*rates: FloatArray) -> None:
         assert 0.8 < np.delete(sizes, np.s_[::8]).mean() < 1.2
 
 
-def test_a_base_is_placed_and_moves_otherwise_in_every_sample() -> None:
+def test_every_sample_has_a_different_placement_and_motion_of_the_base() -> None:
     base = draw_base(400, np.random.default_rng(0))
     assert base.batch_shape == (400,)
     assert np.abs(base.placement[:, :3, 3]).max() <= 2.0
@@ -244,7 +246,7 @@ def test_a_base_is_placed_and_moves_otherwise_in_every_sample() -> None:
     demand_large_rates(base.velocity, base.acceleration)
 
 
-def test_more_configurations_than_memory_holds_are_refused_in_one_line() -> None:
+def test_more_configurations_than_fit_into_memory_are_refused_in_one_line() -> None:
     robot = urdfkin.load("ur5", verify=False)
     with pytest.raises(InputError) as caught:
         robot.sample(10**15)

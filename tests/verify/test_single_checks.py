@@ -43,7 +43,7 @@ def entries(robot: Robot) -> dict[str, tuple[int, float, float, int]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
-def test_a_single_call_records_the_numbers_that_the_check_of_a_batch_records(name: str) -> None:
+def test_the_check_of_a_single_call_records_the_results_of_the_check_of_a_batch(name: str) -> None:
     prompt, usual = urdfkin.load(name), urdfkin.load(name)
     frame = prompt.tip_frame
     for seed, reference in enumerate(Reference):
@@ -88,7 +88,7 @@ def bound_of_one(robot: Robot, quantity: Quantity, inputs: tuple[FloatArray, ...
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "ur5", "tiago"])
 @pytest.mark.parametrize("method", METHODS)
-def test_a_planted_error_in_any_number_is_found(name: str, method: str) -> None:
+def test_an_error_in_any_number_of_a_single_result_is_detected(name: str, method: str) -> None:
     robot = urdfkin.load(name)
     q, v, a = (x[0].copy() for x in state(robot, 1, 4))
     inputs = (q, v, a)[: METHODS[method]]
@@ -104,14 +104,14 @@ def test_a_planted_error_in_any_number_is_found(name: str, method: str) -> None:
     assert robot.certificate().lines == ()
 
 
-def test_a_result_that_is_not_finite_is_found() -> None:
+def test_a_result_that_is_not_finite_is_detected() -> None:
     robot = urdfkin.load("ur5")
     for bad in (np.inf, np.nan):
         with pytest.raises(VerificationError):
             planted(robot, "jacobian", 7, bad)(np.zeros(6), None)
 
 
-def test_only_a_call_without_a_check_counts_as_not_checked() -> None:
+def test_only_a_call_with_verify_false_counts_as_not_checked() -> None:
     robot = urdfkin.load("panda")
     q, frame = robot.neutral(), "panda_hand"
     for _ in range(3):
@@ -125,7 +125,7 @@ def test_only_a_call_without_a_check_counts_as_not_checked() -> None:
     assert entries(unchecked)["jacobian"][0::3] == (1, 0)
 
 
-def test_a_prepared_frame_checks_if_asked_and_so_does_its_copy() -> None:
+def test_a_prepared_frame_and_the_unpickled_copy_check_results_on_request() -> None:
     robot = urdfkin.load("panda", verify=False)
     q = robot.neutral()
     fast = robot.prepare("panda_hand", verify=True)
@@ -140,7 +140,7 @@ def test_a_prepared_frame_checks_if_asked_and_so_does_its_copy() -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos"])
-def test_a_checked_jacobian_takes_few_calls_of_functions(name: str) -> None:
+def test_a_checked_jacobian_needs_at_most_130_function_calls(name: str) -> None:
     robot = urdfkin.load(name)
     q, frame = robot.sample(1)[0].copy(), robot.tip_frame
     for _ in range(2):
@@ -156,7 +156,7 @@ def test_a_checked_jacobian_takes_few_calls_of_functions(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("moving", [False, True])
 @pytest.mark.parametrize("subject", [*NAMES, "ur5", "tiago"])
-def test_the_lengths_of_one_configuration_have_the_bits_of_those_in_many(subject: str, moving: bool) -> None:
+def test_magnitudes_of_one_configuration_are_equal_alone_and_in_a_batch(subject: str, moving: bool) -> None:
     robot = robot_of(subject) if subject in NAMES else urdfkin.load(subject, verify=False)
     rng = np.random.default_rng(1)
     drawn = draw(robot.tree, 9, rng, with_special=True)
@@ -176,7 +176,7 @@ def test_the_lengths_of_one_configuration_have_the_bits_of_those_in_many(subject
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "tiago", "a1"])
 @pytest.mark.parametrize("moving", [False, True])
-def test_a_bound_that_is_computed_once_is_that_of_every_configuration(name: str, moving: bool) -> None:
+def test_a_bound_that_is_computed_once_is_valid_for_every_configuration(name: str, moving: bool) -> None:
     robot = urdfkin.load(name)
     q, rng = robot.sample(5, 1), np.random.default_rng(2)
     base = draw_base(5, rng) if moving else None
@@ -194,7 +194,7 @@ def test_a_bound_that_is_computed_once_is_that_of_every_configuration(name: str,
 
 
 @pytest.mark.parametrize("name", ["ur5", "panda", "talos", "a1", "tiago"])
-def test_pinocchios_two_ways_to_a_jacobian_differ_by_less_than_half_the_bound(name: str) -> None:
+def test_two_computations_of_a_jacobian_in_pinocchio_differ_by_less_than_half_the_bound(name: str) -> None:
     robot = urdfkin.load(name)
     oracle: Oracle = robot.verifier.oracle()
     q, frame = robot.sample(20, 3), robot.tip_frame

@@ -51,7 +51,7 @@ def holds(found: Between, true: list[mpmath.mpf]) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("rows", ROWS)
 @pytest.mark.parametrize(("name", "frame"), [("ur5", "tool0"), ("panda", "panda_hand"), ("polar", "slider")])
-def test_what_the_equations_have_at_fifty_digits_lies_between(name: str, frame: str, rows: str) -> None:
+def test_singular_values_at_fifty_digits_lie_within_the_bounds(name: str, frame: str, rows: str) -> None:
     robot = urdfkin.load(name)
     for q in (*robot.sample(2, 3), robot.neutral()):
         found = robot.singular_values(q, frame, rows)
@@ -65,7 +65,7 @@ def test_what_the_equations_have_at_fifty_digits_lies_between(name: str, frame: 
         assert found.values.value.size == min(len(J), len(moving))
 
 
-def test_a_jacobian_that_is_wrong_by_a_billionth_is_not_excused() -> None:
+def test_singular_values_of_a_jacobian_wrong_by_a_billionth_lie_outside_the_bounds() -> None:
     robot, q = urdfkin.load("ur5"), np.linspace(0.2, 1.7, 6)
     J, still = robot.jacobian(q, "tool0"), np.zeros((6, 6))
     right = true_values(true_jacobian(robot, q, "tool0"))
@@ -78,7 +78,7 @@ def test_a_jacobian_that_is_wrong_by_a_billionth_is_not_excused() -> None:
 @given(
     *(st.integers(1, 6), st.integers(1, 8), st.integers(-12, 12), st.booleans(), st.integers(0, 2**32 - 1))
 )
-def test_any_matrixs_lie_between_whatever_their_size_and_rank(
+def test_singular_values_of_matrices_of_any_shape_and_rank_lie_within_the_bounds(
     rows: int, columns: int, exponent: int, deficient: bool, seed: int
 ) -> None:
     generator, shape = np.random.default_rng(seed), (rows, columns)
@@ -93,7 +93,9 @@ def test_any_matrixs_lie_between_whatever_their_size_and_rank(
 
 @pytest.mark.parametrize("exponent", [-1040, -700, -500, 500, 900])
 @pytest.mark.parametrize("deficient", [False, True])
-def test_they_lie_between_however_small_or_large_the_matrix_is(exponent: int, deficient: bool) -> None:
+def test_singular_values_of_very_small_and_large_matrices_lie_within_the_bounds(
+    exponent: int, deficient: bool
+) -> None:
     A = np.random.default_rng(5).standard_normal((3, 4))
     if deficient:
         A[2] = A[0] + A[1]
@@ -133,7 +135,7 @@ def test_a_singular_arm_of_any_size_is_never_proven_to_be_regular(size: float) -
         ((2e-162, 1.5e-162), mp.mpf("3e-324")),
     ],
 )
-def test_a_product_lies_between_where_a_part_of_it_is_beyond_all_numbers(
+def test_the_bounds_of_a_product_hold_if_a_partial_product_overflows_or_underflows(
     sizes: tuple[float, ...], product: mpmath.mpf
 ) -> None:
     values = np.array(sorted(sizes, reverse=True))
@@ -146,7 +148,7 @@ def test_a_product_lies_between_where_a_part_of_it_is_beyond_all_numbers(
 # -- each term of the bounds is needed -----------------------------------------------------------------
 
 
-def test_what_the_matrix_may_be_off_by_is_in_the_bounds() -> None:
+def test_bounds_of_singular_values_include_the_error_of_the_matrix() -> None:
     A, off = np.diag([2.0, 1.0]), np.full((2, 2), 1e-6)
     found = singular_values(A, off, np.ones(2, dtype=bool))
     for sign in (1.0, -1.0):
@@ -173,7 +175,7 @@ def holds_with(A: FloatArray, *svd: FloatArray) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_decomposition_that_leaves_a_residual_is_not_believed(seed: int) -> None:
+def test_bounds_of_singular_values_include_the_residual_of_the_decomposition(seed: int) -> None:
     U, s, Vt, A = decomposed(seed, (3.0, 2.0, 1.0))
     for wrong in ([1e-9, 0.0, 0.0], [0.0, -1e-9, 0.0], [0.0, 0.0, 1e-9]):
         assert holds_with(A, U, s + np.array(wrong), Vt)
@@ -182,19 +184,21 @@ def test_a_decomposition_that_leaves_a_residual_is_not_believed(seed: int) -> No
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("size", [1.0 + 1e-9, 1.0 - 1e-9])
-def test_a_decomposition_that_is_askew_is_not_believed(seed: int, side: int, size: float) -> None:
+def test_bounds_of_singular_values_include_the_lack_of_orthogonality(
+    seed: int, side: int, size: float
+) -> None:
     U, s, Vt, A = decomposed(seed, (3.0, 2.0, 1.0))
     assert holds_with(A, *((U * size, s / size, Vt) if side == 0 else (U, s / size, Vt * size)))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_what_the_residual_itself_is_rounded_by_is_in_the_bounds(seed: int) -> None:
+def test_bounds_of_singular_values_include_the_rounding_of_the_residual(seed: int) -> None:
     U, s, Vt, A = decomposed(seed, (1.0, 1e-12, 1e-13))
     assert not np.abs(A - (U * s) @ Vt).any(), "the residual, as it is computed, is 0"
     assert holds_with(A, U, s, Vt)
 
 
-def test_products_that_underflow_are_in_the_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bounds_of_singular_values_include_underflow_of_products(monkeypatch: pytest.MonkeyPatch) -> None:
     # Each product 1607 / 16 = 100.4375 of the smallest double is rounded to 100.
     least = 5e-324
     A, svd = np.full((1, 256), 100 * least), (np.eye(1), np.array([1607 * least]), np.full((1, 256), 1 / 16))
@@ -203,12 +207,12 @@ def test_products_that_underflow_are_in_the_bounds(monkeypatch: pytest.MonkeyPat
     assert values.lower[0] <= 1600 * least <= values.upper[0]
 
 
-def test_the_product_that_shows_what_is_askew_rounds_too() -> None:
+def test_the_measure_of_orthogonality_includes_the_rounding_of_the_product() -> None:
     # Each number of the product of 3 by 3 matrices has the error bound 5 eps.
     assert _skew(np.eye(3)) == pytest.approx(5.0 * EPS * np.sqrt(3.0), rel=1e-12, abs=0.0)
 
 
-def test_the_bounds_are_rounded_outward() -> None:
+def test_bounds_of_singular_values_and_products_are_rounded_outward() -> None:
     # Norms, products and quotients of random numbers are rounded up or down.
     generator = np.random.default_rng(1)
     for x, y in generator.uniform(1.0, 2.0, (50, 2)):
@@ -221,7 +225,7 @@ def test_the_bounds_are_rounded_outward() -> None:
             assert mp.mpf(float(between.lower)) < true < mp.mpf(float(between.upper))
 
 
-def test_what_is_beyond_all_numbers_bounds_nothing() -> None:
+def test_an_infinite_error_of_the_matrix_gives_the_bounds_zero_and_infinity() -> None:
     huge = singular_values(np.full((2, 2), 1e200), np.full((2, 2), np.inf), np.ones(2, dtype=bool))
     assert (huge.values.lower == 0.0).all()
     assert np.isinf(huge.values.upper).all()
@@ -251,7 +255,7 @@ def test_one_configuration_alone_and_in_a_batch_have_the_same_singular_values(ro
     )
 
 
-def test_at_the_pole_of_a_slide_the_manipulability_is_zero() -> None:
+def test_the_manipulability_of_a_slide_on_the_axis_of_rotation_is_zero() -> None:
     found = urdfkin.load(SLIDE).singular_values([0.3, 0.0], "c", "linear")
     assert found.values.value.tolist() == pytest.approx([1.0, 0.0], abs=1e-15)
     assert found.manipulability.lower == 0.0
@@ -259,13 +263,13 @@ def test_at_the_pole_of_a_slide_the_manipulability_is_zero() -> None:
 
 
 @pytest.mark.parametrize("base", [None, BaseMotion(np.block([[np.eye(3), np.ones((3, 1))], [0, 0, 0, 1]]))])
-def test_which_columns_count_does_not_depend_on_where_the_base_stands(base: BaseMotion | None) -> None:
+def test_the_number_of_singular_values_does_not_depend_on_the_base_placement(base: BaseMotion | None) -> None:
     robot = urdfkin.load(SLIDE)
     assert robot.singular_values([0.3, 0.0], "b", "linear", base=base).values.value.shape == (0,)
     assert robot.singular_values([0.3, 0.0], "c", "linear", base=base).values.value.shape == (2,)
 
 
-def test_a_frame_that_no_rate_moves_has_none() -> None:
+def test_a_frame_that_no_joint_moves_has_no_singular_values() -> None:
     robot = urdfkin.load("panda")
     found = robot.singular_values(robot.sample(3), "panda_link0")
     assert found.values.value.shape == (3, 0)
@@ -278,7 +282,9 @@ def test_a_frame_that_no_rate_moves_has_none() -> None:
 @pytest.mark.parametrize(
     ("name", "frame"), [("panda", "panda_hand"), ("ur5", "forearm_link"), ("polar", "slider")]
 )
-def test_the_gradient_is_the_difference_quotient_of_the_product(name: str, frame: str, rows: str) -> None:
+def test_the_gradient_of_the_manipulability_is_the_difference_quotient(
+    name: str, frame: str, rows: str
+) -> None:
     robot, h = urdfkin.load(name, verify=False), 1e-5
     if (name, rows) == ("polar", "angular"):
         return  # one column, of length 1: below
@@ -292,7 +298,7 @@ def test_the_gradient_is_the_difference_quotient_of_the_product(name: str, frame
         np.testing.assert_allclose(gradient[sure, j], (ahead - behind) / (2.0 * h), rtol=0, atol=1e-7)
 
 
-def test_at_a_kink_there_is_no_gradient_and_beside_it_there_is() -> None:
+def test_the_manipulability_gradient_is_nan_at_a_singularity_and_finite_nearby() -> None:
     arm = urdfkin.load("planar_two_link")
     q = np.array([[0.3, 0.0], [0.3, 0.1]])
     found = arm.singular_values(q, arm.tip_frame, "linear")
@@ -305,7 +311,7 @@ def test_at_a_kink_there_is_no_gradient_and_beside_it_there_is() -> None:
     assert gradient[1, 1] == pytest.approx(lengths * np.cos(0.1), rel=1e-12)
 
 
-def test_a_base_and_a_batch_shape_are_taken_and_bad_words_refused() -> None:
+def test_singular_values_accept_a_base_and_a_batch_shape_and_refuse_invalid_options() -> None:
     robot = urdfkin.load("ur5")
     q = robot.sample(6).reshape(2, 3, 6)
     T = np.eye(4)
@@ -351,11 +357,13 @@ def found(robot: Robot, q: Any, rows: str = "all") -> Singularity:
          "The axes of joints panda_joint2, panda_joint4 and panda_joint6 are parallel."),
     ],
 )  # fmt: skip
-def test_the_reason_names_the_joints_and_their_geometry(robot: str, q: Any, rows: str, reason: str) -> None:
+def test_the_explanation_of_a_singularity_names_the_joints_and_the_geometry(
+    robot: str, q: Any, rows: str, reason: str
+) -> None:
     assert reason in found(urdfkin.load(robot), q, rows).reasons
 
 
-def test_no_joint_velocity_moves_the_frame_in_a_lost_direction_and_no_null_motion_moves_it_at_all() -> None:
+def test_lost_directions_and_null_motions_are_null_spaces_of_the_jacobian() -> None:
     robot = urdfkin.load("ur5")
     for q in (np.zeros(6), np.array([0.3, -1, 0, 0.4, 0.5, 0.6]), np.array([0.3, -1, 1, 0.4, 0, 0.6])):
         one, J = found(robot, q), robot.jacobian(q, "tool0")
@@ -366,7 +374,7 @@ def test_no_joint_velocity_moves_the_frame_in_a_lost_direction_and_no_null_motio
     assert robot.certificate().verified, "the explanation computes unchecked Jacobians"
 
 
-def test_a_regular_configuration_is_not_singular_however_near_it_is() -> None:
+def test_a_regular_configuration_near_a_singularity_is_not_singular() -> None:
     robot = urdfkin.load("ur5")
     for elbow in (1.0, 1e-6, 1e-10):
         one = found(robot, [0.3, -1.0, elbow, 0.4, 0.5, 0.6])
@@ -374,7 +382,7 @@ def test_a_regular_configuration_is_not_singular_however_near_it_is() -> None:
     assert found(robot, [0.3, -1.0, 1e-14, 0.4, 0.5, 0.6]), "within the bound of the Jacobian"
 
 
-def test_an_arm_that_is_singular_everywhere_is_not_explained_by_its_configuration() -> None:
+def test_the_explanation_for_an_arm_that_is_singular_everywhere_is_the_arm() -> None:
     robot = urdfkin.load(urdfs.chain([""] * 5, origin='xyz="0.3 0 0"'))
     one = found(robot, [0.1, 0.2, 0.3, 0.4, 0.5])
     assert (one.rank, one.full, len(one.lost), len(one.motions)) == (3, 5, 0, 2)
@@ -385,7 +393,7 @@ def test_an_arm_that_is_singular_everywhere_is_not_explained_by_its_configuratio
     assert stretched.lost.tolist() == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
 
 
-def test_the_base_of_a_moving_robot_turns_the_lost_direction() -> None:
+def test_the_rotation_of_the_base_rotates_the_lost_direction() -> None:
     robot = urdfkin.load("ur5")
     turn = np.eye(4)
     turn[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
@@ -406,7 +414,7 @@ def axes(points: FloatArray, z: FloatArray) -> FloatArray:
     return np.hstack([np.cross(points, units), units]).T
 
 
-def test_six_axes_that_meet_one_line_name_this_line() -> None:
+def test_the_explanation_names_the_line_that_six_axes_meet() -> None:
     rng = np.random.default_rng(0)
     along, start = np.array([0.0, 0.0, 1.0]), np.array([0.2, 0.1, 0.0])
     points = start + rng.normal(size=(6, 1)) * along
@@ -416,7 +424,7 @@ def test_six_axes_that_meet_one_line_name_this_line() -> None:
     assert one.reasons[-1].startswith("These joint velocities do not move tip: ")
 
 
-def test_axes_through_one_point_are_told_from_axes_in_one_plane() -> None:
+def test_axes_through_one_point_are_distinguished_from_axes_in_one_plane() -> None:
     rng = np.random.default_rng(2)
     J = axes(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))
     point, z = np.array([0.1, 0.2, 0.3]), rng.normal(size=(4, 3))
@@ -429,7 +437,7 @@ def test_axes_through_one_point_are_told_from_axes_in_one_plane() -> None:
     assert explained(J).reasons[-1] == said
 
 
-def test_dependent_columns_that_are_no_axes_get_no_geometry() -> None:
+def test_dependent_columns_that_are_no_axes_have_no_geometric_explanation() -> None:
     J = np.random.default_rng(3).normal(size=(6, 6))
     J[:, 5] = J[:, 0] - 2.0 * J[:, 1]
     one = explained(J, turns=None)
@@ -437,7 +445,7 @@ def test_dependent_columns_that_are_no_axes_get_no_geometry() -> None:
     assert not any(line.startswith(("The axes", "All axes")) for line in one.reasons)
 
 
-def test_a_batch_names_its_configuration() -> None:
+def test_the_singularity_of_each_configuration_of_a_batch_is_available_by_index() -> None:
     robot = urdfkin.load("ur5")
     values = robot.singular_values([robot.neutral().tolist(), UR5], "tool0")
     assert [bool(values.singularity(k)) for k in (0, 1)] == [True, False]
@@ -448,7 +456,7 @@ def test_a_batch_names_its_configuration() -> None:
     assert str(pickle.loads(pickle.dumps(values)).singularity(0)) == str(values.singularity(0))
 
 
-def test_a_notebook_shows_tables() -> None:
+def test_results_are_shown_as_tables_in_a_notebook() -> None:
     robot = urdfkin.load("ur5")
     same = urdfkin.same("ur5", "ur5_limited")
     for one in (robot.singular_values(robot.neutral(), "tool0"), robot.screws(), robot.joints, same):

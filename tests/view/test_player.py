@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import urdfkin
-from tests.attacks.test_viewer_gate import free_port
+from tests.attacks.test_viewer_server import free_port
 from tests.report.browser import opened, require_chromium
 from tests.view.test_viewer import _PRESS, _until
 from urdfkin.robot.trajectory import line
@@ -37,7 +37,7 @@ def player(viewer: Viewer) -> Player:
     return viewer.player
 
 
-def test_the_time_slider_shows_the_nearest_sample_and_its_checked_numbers(viewer: Viewer) -> None:
+def test_the_time_slider_selects_the_nearest_sample_and_shows_checked_results(viewer: Viewer) -> None:
     x = player(viewer).trajectory
     player(viewer).time.value = float(x.t[5]) + 0.01
     assert player(viewer).sample == 5
@@ -50,7 +50,7 @@ def test_the_time_slider_shows_the_nearest_sample_and_its_checked_numbers(viewer
     np.testing.assert_allclose(viewer.sliders.handles[0].value, np.rad2deg(x.q[5, 0]), rtol=1e-14)
 
 
-def test_it_plays_to_the_end_at_the_chosen_speed_and_a_pause_keeps_the_sample(viewer: Viewer) -> None:
+def test_the_player_plays_to_the_end_at_the_chosen_speed_and_a_pause_holds_the_sample(viewer: Viewer) -> None:
     player(viewer).show(0)
     player(viewer).speed.value = "0.5"
     begin = time.perf_counter()
@@ -78,7 +78,7 @@ def test_the_whole_trajectory_is_checked_for_each_frame(viewer: Viewer) -> None:
     assert "9 samples, verified by Pinocchio" in player(viewer).words.content
 
 
-def test_a_saved_motion_has_all_frames_and_a_saved_picture_is_opaque() -> None:
+def test_a_saved_gif_has_all_frames_and_a_saved_png_is_opaque() -> None:
     frames = [np.full((8, 10, 3), 40 * k, dtype=np.uint8) for k in range(5)]
     image = Image.open(io.BytesIO(as_gif(frames, 0.08)))
     assert image.size == (10, 8)
@@ -91,7 +91,7 @@ def test_a_saved_motion_has_all_frames_and_a_saved_picture_is_opaque() -> None:
 
 @pytest.mark.long
 @pytest.mark.browser
-def test_in_a_browser_the_picture_and_the_motion_are_saved(viewer: Viewer, tmp_path: Path) -> None:
+def test_a_browser_saves_a_picture_and_an_animation(viewer: Viewer, tmp_path: Path) -> None:
     require_chromium()
     saved = tmp_path / "saved"
     saved.mkdir()

@@ -25,7 +25,7 @@ URDF = """<robot name="r">
 </robot>"""
 
 
-def test_primitives_come_with_size_place_and_colour_and_a_broken_mesh_is_left_out(tmp_path: Path) -> None:
+def test_shapes_have_size_placement_and_colour_and_a_broken_mesh_is_omitted(tmp_path: Path) -> None:
     box, cylinder, sphere, missing = shapes(urdfkin.load(URDF))
     assert (box.kind, box.size, box.colour) == ("box", (1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.5))
     np.testing.assert_array_equal(box.T_link_shape[:3, :3], rotation_from_rpy((0.1, 0.2, 0.3)))
@@ -42,7 +42,7 @@ def test_primitives_come_with_size_place_and_colour_and_a_broken_mesh_is_left_ou
     assert mesh(broken) is None
 
 
-def test_meshes_are_found_by_package_by_file_and_beside_the_urdf(tmp_path: Path) -> None:
+def test_meshes_are_found_by_package_address_file_address_and_relative_path(tmp_path: Path) -> None:
     file = tmp_path / "robots" / "meshes" / "a b.stl"
     file.parent.mkdir(parents=True)
     file.write_text("solid")
@@ -58,7 +58,7 @@ def test_meshes_are_found_by_package_by_file_and_beside_the_urdf(tmp_path: Path)
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos"])
-def test_every_mesh_of_the_catalogues_robots_is_found(name: str) -> None:
+def test_every_mesh_of_a_catalogue_robot_is_found(name: str) -> None:
     found = shapes(urdfkin.load(name))
     assert len(found) > 5
     assert [shape for shape in found if shape.missing] == []
@@ -73,7 +73,9 @@ def x() -> FrameMotion:
 
 
 @pytest.mark.parametrize("angular", [False, True])
-def test_velocities_of_unit_rates_touch_the_ellipsoid_and_stay_inside(angular: bool, x: FrameMotion) -> None:
+def test_velocities_of_unit_joint_velocities_lie_inside_the_ellipsoid_and_reach_the_surface(
+    angular: bool, x: FrameMotion
+) -> None:
     shape = velocity_ellipsoid(x, 1.0, angular=angular)
     R = rotation_of(np.roll(shape.wxyz, -1))
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
@@ -88,7 +90,7 @@ def test_velocities_of_unit_rates_touch_the_ellipsoid_and_stay_inside(angular: b
     np.testing.assert_allclose(tips, 1.0, rtol=1e-12)
 
 
-def test_a_flat_ellipsoid_can_still_be_seen_and_the_words_say_the_numbers(x: FrameMotion) -> None:
+def test_a_flat_ellipsoid_is_visible_and_the_text_contains_the_results(x: FrameMotion) -> None:
     robot = urdfkin.load("ur5")
     zero = np.zeros((1, 6))
     shape = velocity_ellipsoid(frame_motion(robot, (zero, zero, zero), "base_link"), 2.0)
@@ -98,7 +100,7 @@ def test_a_flat_ellipsoid_can_still_be_seen_and_the_words_say_the_numbers(x: Fra
     assert f"{x.placement[0, 0, 3]:.4g}" in words
 
 
-def test_arrows_are_the_columns_and_parts_at_one_scale(x: FrameMotion) -> None:
+def test_arrows_show_jacobian_columns_and_acceleration_parts_at_one_scale(x: FrameMotion) -> None:
     rates = urdfkin.load("panda").rate_names
     arrows = jacobian_arrows(x, rates, 1.0, angular=False)
     vectors = arrows.points[:, 1] - arrows.points[:, 0]

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.attacks.test_viewer_gate import free_port
+from tests.attacks.test_viewer_server import free_port
 from tests.report.browser import Browser, opened, require_chromium
 from tests.urdfs import joint, limit
 from tests.urdfs import robot as robot_of
@@ -62,7 +62,7 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 
 @pytest.mark.slow
-def test_a_slider_moves_its_own_joint_and_the_numbers_are_checked(viewer: Viewer) -> None:
+def test_a_slider_moves_only_one_joint_and_the_results_are_checked(viewer: Viewer) -> None:
     viewer.set_q(viewer.robot.sample(1, 5)[0])
     before = viewer.q
     viewer.sliders.handles[1].value = -40.0
@@ -82,7 +82,7 @@ def shown(viewer: Viewer) -> list[float]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("units", ["radians", "degrees"])
-def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> None:
+def test_the_sliders_show_q_after_every_change_of_q(viewer: Viewer, units: str) -> None:
     viewer.units.value = units
     for seed in range(3):
         q = viewer.robot.sample(1, seed)[0]
@@ -99,7 +99,7 @@ def test_every_slider_equals_q_however_q_was_set(viewer: Viewer, units: str) -> 
 
 
 @pytest.mark.slow
-def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
+def test_the_text_field_shows_and_reads_q_in_a_convention() -> None:
     robot = urdfkin.load("a1", verify=False)
     mujoco = robot.convention("mujoco")
     with shown_robot(robot, conversion=mujoco) as viewer:
@@ -112,7 +112,7 @@ def test_the_field_of_q_shows_and_reads_the_numbers_of_a_convention() -> None:
         np.testing.assert_array_equal(viewer.q, other)
 
 
-def test_a_slider_ends_where_its_joint_does_and_a_joint_without_a_range_has_none() -> None:
+def test_a_slider_has_the_limits_of_the_joint_and_a_joint_without_a_range_has_no_slider() -> None:
     robot = urdfkin.load("panda")
     rows = {row.name: row for row in coordinate_rows(robot)}
     own = robot.tree.joints[[joint.name for joint in robot.tree.joints].index("panda_joint4")].limit
@@ -131,7 +131,7 @@ def test_a_slider_ends_where_its_joint_does_and_a_joint_without_a_range_has_none
     assert within_limits(robot, robot.neutral()).tolist() == [0.0, 0.5]
 
 
-def test_a_step_is_one_degree_and_the_limits_stand_at_both_ends_of_a_slider(viewer: Viewer) -> None:
+def test_a_slider_has_steps_of_one_degree_and_the_limits_at_both_ends(viewer: Viewer) -> None:
     assert viewer.units.value == "degrees"
     assert {handle.step for handle in viewer.sliders.handles} == {1.0}
     viewer.set_q(np.zeros(6))
@@ -141,7 +141,7 @@ def test_a_step_is_one_degree_and_the_limits_stand_at_both_ends_of_a_slider(view
         assert [float(mark.label) for mark in handle._marks] == pytest.approx(ends, abs=0.05)
 
 
-def test_missing_meshes_are_named_with_the_remedy() -> None:
+def test_missing_meshes_are_listed_with_the_remedy() -> None:
     addresses = [f"package://arm/m{i}.stl" for i in range(7)]
     missing = [Shape("l", "mesh", (1.0, 1.0, 1.0), np.eye(4), None, None, name) for name in addresses]
     words = missing_words(missing)
@@ -154,7 +154,7 @@ def test_missing_meshes_are_named_with_the_remedy() -> None:
 
 
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 2.0])
-def test_the_robot_fills_the_view_and_nothing_of_it_is_cut_off(aspect: float) -> None:
+def test_the_camera_shows_the_whole_robot_and_the_robot_fills_the_view(aspect: float) -> None:
     points, fov = np.random.default_rng(0).uniform([-1.0, -0.2, 0.0], [0.5, 0.2, 2.0], (500, 3)), 1.0
     position, middle = camera(points, aspect=aspect, fov=fov)
     back = (position - middle) / np.linalg.norm(position - middle)
@@ -167,7 +167,7 @@ def test_the_robot_fills_the_view_and_nothing_of_it_is_cut_off(aspect: float) ->
     assert share == pytest.approx(0.85, abs=1e-9)
 
 
-def test_each_joint_has_a_rate_of_its_own(viewer: Viewer) -> None:
+def test_each_joint_has_sliders_for_velocity_and_acceleration(viewer: Viewer) -> None:
     viewer.set_rates(np.zeros(6), np.zeros(6))
     viewer.units.value = "radians"
     viewer.rates.handles[2].value = 0.5
@@ -181,7 +181,7 @@ def test_each_joint_has_a_rate_of_its_own(viewer: Viewer) -> None:
 
 
 @pytest.mark.slow
-def test_tables_frames_are_seen_through_the_shapes(viewer: Viewer) -> None:
+def test_shapes_are_transparent_while_the_frames_of_a_dh_table_are_shown(viewer: Viewer) -> None:
     viewer.dh.value = "modified"
     assert viewer.shapes.value == "see-through"
     assert all(not handle.visible for _, handle in viewer.stage._shapes)
@@ -193,7 +193,7 @@ def test_tables_frames_are_seen_through_the_shapes(viewer: Viewer) -> None:
 
 
 @pytest.mark.parametrize(("kind", "name"), [("links", "wrist_1_link"), ("joints", "elbow_joint")])
-def test_names_stand_beside_the_frames(viewer: Viewer, kind: str, name: str) -> None:
+def test_names_of_links_or_joints_are_shown_at_the_frames(viewer: Viewer, kind: str, name: str) -> None:
     viewer.names.value = kind
     labels = [handle for handles in viewer.stage._labels.values() for handle in handles if handle.visible]
     assert name in [handle.text for handle in labels]
@@ -201,7 +201,9 @@ def test_names_stand_beside_the_frames(viewer: Viewer, kind: str, name: str) -> 
     assert not any(handle.visible for handles in viewer.stage._labels.values() for handle in handles)
 
 
-def test_the_browser_is_started_with_a_file_that_no_other_can_read(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_browser_is_started_with_a_file_that_no_other_user_can_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     asked: list[str] = []
     monkeypatch.setattr("webbrowser.open", asked.append)
     address = "http://127.0.0.1:8080/the-key/"
@@ -215,7 +217,7 @@ def test_the_browser_is_started_with_a_file_that_no_other_can_read(monkeypatch: 
 
 
 @pytest.mark.slow
-def test_every_overlay_can_be_shown_in_every_reference(viewer: Viewer) -> None:
+def test_every_overlay_can_be_shown_in_every_reference_frame(viewer: Viewer) -> None:
     viewer.set_rates(np.ones(6), np.full(6, 0.5))
     viewer.parts.value = True
     for reference in ("local", "world", "local_world_aligned"):
@@ -233,7 +235,7 @@ def test_every_overlay_can_be_shown_in_every_reference(viewer: Viewer) -> None:
     viewer._choose()
 
 
-def test_without_the_extra_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_viser_the_error_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(InputError, match=r"pip install 'viser>=1'"):
         new_server(port=free_port())
@@ -241,7 +243,7 @@ def test_without_the_extra_one_line_says_what_to_install(monkeypatch: pytest.Mon
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar_two_link", "romeo", "alex_psyonic_hands"])
-def test_robots_of_other_kinds_are_shown_too(name: str) -> None:
+def test_the_viewer_shows_robots_of_other_kinds(name: str) -> None:
     with shown_robot(urdfkin.load(name, root_joint=None)) as viewer:
         viewer.set_q(viewer.robot.sample(1, 0)[0])
         assert viewer.motion.agrees
@@ -249,7 +251,9 @@ def test_robots_of_other_kinds_are_shown_too(name: str) -> None:
 
 @pytest.mark.long
 @pytest.mark.browser
-def test_a_browser_draws_it_without_errors_and_asks_nothing_elsewhere(viewer: Viewer, tmp_path: Path) -> None:
+def test_a_browser_shows_the_viewer_without_errors_and_external_requests(
+    viewer: Viewer, tmp_path: Path
+) -> None:
     require_chromium()
     viewer.ellipsoid.value, viewer.columns.value = "linear", "linear"
     viewer.update()
@@ -276,7 +280,7 @@ _UNNAMED = """return [...document.querySelectorAll("[role=slider], [role=button]
 @pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("dark", [False, True])
-def test_the_page_follows_the_theme_of_the_browser_and_its_words_and_focus_stand_out(
+def test_the_viewer_has_the_browsers_theme_sufficient_contrast_and_a_visible_focus(
     viewer: Viewer, chromium: Browser, dark: bool
 ) -> None:
     chromium.become(900, 700, dark=dark)
@@ -328,7 +332,7 @@ _RING = """const e = document.activeElement, style = getComputedStyle(e);
 
 @pytest.mark.long
 @pytest.mark.browser
-def test_folders_open_by_the_keyboard(viewer: Viewer, chromium: Browser) -> None:
+def test_folders_of_the_viewer_open_by_keyboard(viewer: Viewer, chromium: Browser) -> None:
     chromium.become(900, 700)
     chromium.chrome.get(viewer.server.address)
     bar = "return [...document.querySelectorAll('[role=button]')].find((b) => b.innerText === 'Show')"
@@ -367,7 +371,9 @@ def _until(holds: Callable[[], bool]) -> bool:
 @pytest.mark.long
 @pytest.mark.browser
 @pytest.mark.parametrize("width", [1280, 390])
-def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium: Browser, width: int) -> None:
+def test_in_a_browser_each_slider_equals_q_and_a_key_changes_only_one_coordinate(
+    chromium: Browser, width: int
+) -> None:
     # The robot has no shapes, because a browser draws them slowly in software.
     bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
     with shown_robot(urdfkin.load(bare)) as viewer:
@@ -405,7 +411,7 @@ def test_in_a_browser_each_slider_equals_q_and_none_speaks_for_another(chromium:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("plays", [False, True])
-def test_the_command_serves_until_it_is_interrupted(tmp_path: Path, plays: bool) -> None:
+def test_the_view_command_serves_until_an_interrupt(tmp_path: Path, plays: bool) -> None:
     port = free_port()
     words = [sys.executable, "-m", "urdfkin", "view", "planar_two_link", "--port", str(port)]
     if plays:

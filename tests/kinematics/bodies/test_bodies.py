@@ -29,7 +29,7 @@ from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.rotation import SEQUENCES, exp_rotation, rotation_from_euler, rotation_of
 
 
-def test_a_row_of_frames_moves_as_the_product_of_its_transformations() -> None:
+def test_the_motion_of_composed_frames_is_the_derivative_of_the_product_of_transformations() -> None:
     def R(t: Any) -> Any:
         return ORIENTATIONS[0](t) * ORIENTATIONS[1](t) * ORIENTATIONS[2](t)
 
@@ -76,7 +76,7 @@ def test_a_frame_refuses_an_invalid_rotation_and_copies_its_arrays() -> None:
         moving.d_0_1[0] = 1.0
 
 
-def test_the_planar_derivative_is_the_rotation_a_right_angle_on() -> None:
+def test_the_derivative_of_a_planar_rotation_is_the_rotation_by_a_further_right_angle() -> None:
     thetas = np.linspace(-4.0, 4.0, 9)
     assert np.abs(planar_rotation_derivative(thetas) - planar_rotation(thetas + np.pi / 2)).max() <= ROUNDING
 
@@ -89,7 +89,9 @@ REPRESENTATIONS = (*SEQUENCES, "quaternion")
 
 
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
-def test_the_rates_are_the_difference_quotient_of_the_representation(representation: str) -> None:
+def test_pose_rates_are_the_difference_quotients_of_the_orientation_representation(
+    representation: str,
+) -> None:
     velocity, step = np.array([0.1, 0.2, 0.3, -0.4, 0.9, 0.6]), 1e-3
     weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
 
@@ -104,7 +106,7 @@ def test_the_rates_are_the_difference_quotient_of_the_representation(representat
 
 
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
-def test_manipulator_and_velocity_jacobian_are_each_others(representation: str) -> None:
+def test_manipulator_jacobian_and_velocity_jacobian_can_be_converted_both_ways(representation: str) -> None:
     J_v = np.random.default_rng(0).normal(size=(4, 6, 7))
     Rs = exp_rotation(np.random.default_rng(1).normal(size=(4, 3)))
     J = analytical_jacobian(representation, Rs, J_v)
@@ -112,7 +114,7 @@ def test_manipulator_and_velocity_jacobian_are_each_others(representation: str) 
     assert np.abs(velocity_jacobian(representation, Rs, J) - J_v).max() <= 256 * ROUNDING
 
 
-def test_a_quaternions_matrix_has_a_right_inverse_everywhere() -> None:
+def test_the_representation_matrix_of_a_quaternion_has_a_right_inverse_at_every_angle() -> None:
     for angle in (0.0, 1e-9, 1.0, np.pi):
         turned = exp_rotation([0.0, angle, 0.0])
         product = representation_matrix("quaternion", turned) @ representation_inverse("quaternion", turned)
@@ -120,7 +122,7 @@ def test_a_quaternions_matrix_has_a_right_inverse_everywhere() -> None:
     assert np.abs(rotation_of(orientation_of("quaternion", R)) - R).max() <= ROUNDING
 
 
-def test_at_the_singularity_the_jacobian_is_refused_with_the_distance() -> None:
+def test_at_a_representation_singularity_the_jacobian_is_refused_with_the_distance() -> None:
     for sequence, middle in (("ZYZ", 0.0), ("xyz", np.pi / 2)):
         singular = rotation_from_euler(sequence, [0.3, middle, 0.0])
         with pytest.raises(RepresentationSingularityError, match=f"{sequence}.*rad from it") as caught:

@@ -34,7 +34,7 @@ from urdfkin.kinematics.rotation import (
 )
 
 
-def test_a_batch_of_rows_adds_up_row_by_row_and_no_frame_gives_nothing() -> None:
+def test_angular_velocities_add_for_each_sample_of_a_batch_and_the_empty_sum_is_zero() -> None:
     generator = np.random.default_rng(1)
     Rs, ws = exp_rotation(generator.normal(size=(4, 3, 3))), generator.normal(size=(4, 3, 3))
     assert np.allclose(
@@ -63,7 +63,7 @@ def moving(name: str) -> Callable[[Any], Any]:
 
 
 @pytest.mark.parametrize("name", SEQUENCES)
-def test_euler_rates_give_the_angular_velocity_and_back(name: str) -> None:
+def test_euler_rates_and_angular_velocity_can_be_converted_both_ways(name: str) -> None:
     w = array(angular_velocity(moving(name), 0.0))
     assert np.abs(angular_velocity_from_euler_rates(name, ANGLES, RATES) - w).max() <= 2 * ROUNDING
     assert np.abs(euler_rates(name, ANGLES, w) - RATES).max() <= 16 * ROUNDING
@@ -73,7 +73,9 @@ def test_euler_rates_give_the_angular_velocity_and_back(name: str) -> None:
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(st.tuples(angles, st.floats(0.2, 1.3), angles))
-def test_the_closed_inverse_is_the_inverse(name: str, turns: tuple[float, float, float]) -> None:
+def test_the_closed_form_inverse_of_the_euler_rate_matrix_is_correct(
+    name: str, turns: tuple[float, float, float]
+) -> None:
     product = euler_rate_inverse(name, turns) @ euler_rate_matrix(name, turns)
     assert np.abs(product - np.eye(3)).max() <= 16 * ROUNDING
 
@@ -82,7 +84,7 @@ def test_the_closed_inverse_is_the_inverse(name: str, turns: tuple[float, float,
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(st.floats(-4.0, 4.0))
-def test_the_condition_number_is_that_of_the_matrix(name: str, middle: float) -> None:
+def test_the_condition_number_is_that_of_the_euler_rate_matrix(name: str, middle: float) -> None:
     turns = [0.3, middle, -0.8]
     if float(singularity_distance(name, turns)) > 1e-3:
         expected = float(np.linalg.cond(euler_rate_matrix(name, turns)))
@@ -92,9 +94,7 @@ def test_the_condition_number_is_that_of_the_matrix(name: str, middle: float) ->
 @pytest.mark.parametrize(
     ("name", "middle"), [("ZYZ", 0.0), ("ZYZ", np.pi), ("xyz", np.pi / 2), ("XYZ", -np.pi / 2)]
 )
-def test_at_the_singularity_the_rates_are_refused_with_the_distance_and_never_infinite(
-    name: str, middle: float
-) -> None:
+def test_at_a_singularity_euler_rates_are_refused_with_the_distance(name: str, middle: float) -> None:
     for off in (0.0, 1e-10):
         with pytest.raises(RepresentationSingularityError, match="representational singularity") as caught:
             euler_rates(name, [0.1, middle + off, 0.2], [1.0, 0.0, 0.0])
@@ -102,14 +102,14 @@ def test_at_the_singularity_the_rates_are_refused_with_the_distance_and_never_in
         assert caught.value.sequence == name
 
 
-def test_the_worst_sample_of_a_batch_is_named() -> None:
+def test_the_error_names_the_sample_nearest_to_the_singularity() -> None:
     batch = np.full((2, 3, 3), 1.0)
     batch[1, 2, 1] = 0.0
     with pytest.raises(RepresentationSingularityError, match=r"sample \[1, 2\]"):
         euler_rates("ZYZ", batch, np.ones(3))
 
 
-def test_near_the_singularity_the_condition_grows_as_two_over_the_distance_and_at_it_none_exists() -> None:
+def test_the_condition_number_is_two_over_the_distance_near_a_singularity_and_refused_at_it() -> None:
     for distance in (1e-3, 1e-6, 1e-8):
         near = [0.0, distance, 0.0]
         assert float(euler_condition("ZYZ", near)) * distance == pytest.approx(2.0, rel=1e-6)
@@ -119,7 +119,7 @@ def test_near_the_singularity_the_condition_grows_as_two_over_the_distance_and_a
 
 
 @given(st.floats(-30.0, 30.0))
-def test_the_distance_is_zero_where_and_only_where_the_determinant_is(middle: float) -> None:
+def test_the_sine_of_the_singularity_distance_is_the_determinant_of_the_rate_matrix(middle: float) -> None:
     turns: FloatArray = np.array([0.5, middle, 1.0])
     for name in ("ZYZ", "zyx"):
         determinant = abs(float(np.linalg.det(euler_rate_matrix(name, turns))))
@@ -131,7 +131,9 @@ def test_the_distance_is_zero_where_and_only_where_the_determinant_is(middle: fl
 
 @pytest.mark.slow
 @given(axes, angles, vectors3)
-def test_angular_velocity_comes_back_and_the_norm_stays(k: FloatArray, phi: float, w: FloatArray) -> None:
+def test_quaternion_rates_give_back_the_angular_velocity_and_preserve_the_norm(
+    k: FloatArray, phi: float, w: FloatArray
+) -> None:
     quat = quaternion_of(rotation_about(k, phi))
     frames: tuple[Literal["fixed", "body"], ...] = ("fixed", "body")
     for frame in frames:
@@ -141,7 +143,9 @@ def test_angular_velocity_comes_back_and_the_norm_stays(k: FloatArray, phi: floa
 
 
 @given(axes, angles)
-def test_the_columns_of_the_rate_matrix_are_perpendicular_and_half_long(k: FloatArray, phi: float) -> None:
+def test_the_columns_of_the_quaternion_rate_matrix_are_perpendicular_with_length_one_half(
+    k: FloatArray, phi: float
+) -> None:
     E = quaternion_rate_matrix(quaternion_of(rotation_about(k, phi)))
     assert np.abs(E.T @ E - np.eye(3) / 4).max() <= ROUNDING
 
@@ -180,14 +184,14 @@ def error(steps: int) -> float:
     return float(np.linalg.norm(log_rotation(missed)))
 
 
-def test_the_integration_converges_with_the_fourth_power_of_the_step() -> None:
+def test_the_integration_of_orientation_converges_with_fourth_order() -> None:
     errors = np.array([error(steps) for steps in (20, 40, 80, 160)])
     orders = np.log2(errors[:-1] / errors[1:])
     assert np.abs(orders - 4.0).max() < 0.25
     assert errors[-1] < 1e-6
 
 
-def test_the_bodys_own_angular_velocity_integrates_to_the_same_orientation() -> None:
+def test_angular_velocity_in_the_body_frame_integrates_to_the_same_orientation() -> None:
     def in_body(t: float) -> FloatArray:
         return rotation_from_euler("ZYZ", zyz(t)).T @ wobble(t)
 

@@ -38,7 +38,7 @@ from urdfkin.kinematics.rotation import (
 
 @pytest.mark.slow
 @given(axes, angles)
-def test_rotation_about_is_scipys_and_pinocchios(axis: FloatArray, angle: float) -> None:
+def test_rotation_about_agrees_with_scipy_and_pinocchio(axis: FloatArray, angle: float) -> None:
     R = rotation_about(axis, angle)
     assert np.abs(R - Rotation.from_rotvec(angle * axis).as_matrix()).max() <= ROUNDING * max(1.0, abs(angle))
     assert np.abs(R - pin.AngleAxis(angle, axis).toRotationMatrix()).max() <= ROUNDING
@@ -48,13 +48,13 @@ def test_rotation_about_is_scipys_and_pinocchios(axis: FloatArray, angle: float)
 
 @pytest.mark.slow
 @given(axes, angles)
-def test_exp_is_pinocchios_exp3(axis: FloatArray, angle: float) -> None:
+def test_exp_rotation_agrees_with_pinocchios_exp3(axis: FloatArray, angle: float) -> None:
     assert np.abs(exp_rotation(angle * axis) - pin.exp3(angle * axis)).max() <= ROUNDING * max(1, abs(angle))
 
 
 @pytest.mark.slow
 @given(axes, angles)
-def test_log_undoes_exp_also_at_half_a_turn(axis: FloatArray, angle: float) -> None:
+def test_log_is_the_inverse_of_exp_even_at_half_a_turn(axis: FloatArray, angle: float) -> None:
     R = rotation_about(axis, angle)
     vector = log_rotation(R)
     assert np.linalg.norm(vector) <= np.pi * (1 + ROUNDING)
@@ -63,7 +63,7 @@ def test_log_undoes_exp_also_at_half_a_turn(axis: FloatArray, angle: float) -> N
 
 @pytest.mark.slow
 @given(axes)
-def test_log_is_pinocchios_log3_away_from_half_a_turn(axis: FloatArray) -> None:
+def test_log_agrees_with_pinocchios_log3_away_from_half_a_turn(axis: FloatArray) -> None:
     # Near half a turn Pinocchio's own error grows; there the law above is the test.
     for angle in (0.0, 1e-9, 1e-4, 0.3, 1.0, 2.0):
         R = pin.exp3(angle * axis)
@@ -84,7 +84,7 @@ def test_the_identity_has_axis_z_and_angle_zero() -> None:
     assert float(angle) == 0.0
 
 
-def test_half_a_turn_about_each_axis_keeps_the_axis() -> None:
+def test_the_axis_of_a_half_turn_is_recovered() -> None:
     for axis in np.vstack((np.eye(3), [[0.6, 0.8, 0.0]])):
         found, angle = axis_angle_of(2.0 * np.outer(axis, axis) - np.eye(3))
         assert np.abs(np.abs(found @ axis) - 1.0) <= ROUNDING
@@ -93,7 +93,7 @@ def test_half_a_turn_about_each_axis_keeps_the_axis() -> None:
 
 @pytest.mark.slow
 @given(axes)
-def test_the_aligning_rotation_has_the_axis_as_its_z(axis: FloatArray) -> None:
+def test_the_z_axis_of_the_aligning_rotation_is_the_given_axis(axis: FloatArray) -> None:
     R = axis_aligning(axis)
     assert np.array_equal(R[:, 2], axis + 0.0)
     assert np.abs(R @ R.T - np.eye(3)).max() <= ROUNDING
@@ -114,7 +114,7 @@ def test_coordinate_axes_are_aligned_without_rounding() -> None:
 three_angles = st.tuples(angles, angles, angles)
 
 
-def test_there_are_twelve_turning_and_twelve_fixed_sequences() -> None:
+def test_there_are_twelve_sequences_about_moving_axes_and_twelve_about_fixed_axes() -> None:
     assert len(set(SEQUENCES)) == 24
     assert sum(name.isupper() for name in SEQUENCES) == 12
 
@@ -123,7 +123,7 @@ def test_there_are_twelve_turning_and_twelve_fixed_sequences() -> None:
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)
-def test_a_rotation_from_angles_is_scipys(name: str, turns: tuple[float, float, float]) -> None:
+def test_a_rotation_from_euler_angles_agrees_with_scipy(name: str, turns: tuple[float, float, float]) -> None:
     expected = Rotation.from_euler(name, turns).as_matrix()
     assert np.abs(rotation_from_euler(name, turns) - expected).max() <= ROUNDING
 
@@ -132,7 +132,7 @@ def test_a_rotation_from_angles_is_scipys(name: str, turns: tuple[float, float, 
 @pytest.mark.parametrize("name", SEQUENCES)
 @settings(max_examples=40)  # for each of 24 sequences
 @given(three_angles)
-def test_angles_of_a_rotation_give_it_back_at_the_singularity_too(
+def test_euler_angles_of_a_rotation_reproduce_the_rotation_even_at_the_singularity(
     name: str, turns: tuple[float, float, float]
 ) -> None:
     R = rotation_from_euler(name, turns)
@@ -152,23 +152,25 @@ def test_angles_within_the_range_are_recovered(name: str) -> None:
 
 
 @given(three_angles)
-def test_rpy_is_pinocchios(rpy: tuple[float, float, float]) -> None:
+def test_rotation_from_rpy_agrees_with_pinocchio(rpy: tuple[float, float, float]) -> None:
     assert np.abs(rotation_from_rpy(rpy) - pin.rpy.rpyToMatrix(np.array(rpy))).max() <= ROUNDING
 
 
 @given(st.sampled_from([0.5, -0.5]), angles, st.sampled_from([0.0, 1e-17, 1e-12, 1e-9, 1e-8, 1e-5]))
-def test_rpy_is_exact_through_gimbal_lock(half: float, yaw: float, off: float) -> None:
+def test_rpy_angles_reproduce_the_rotation_near_and_at_gimbal_lock(
+    half: float, yaw: float, off: float
+) -> None:
     R = rotation_about([0.0, 0.0, 1.0], yaw) @ rotation_about([0.0, 1.0, 0.0], half * np.pi - off)
     assert np.abs(rotation_from_rpy(rpy_of(R)) - R).max() <= ROUNDING
 
 
-def test_exact_gimbal_lock_has_no_yaw() -> None:
+def test_at_gimbal_lock_the_yaw_angle_is_zero() -> None:
     straight_up = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert rpy_of(straight_up).tolist() == [0.0, np.pi / 2, 0.0]
     assert rpy_of(np.eye(3)).tolist() == [0.0, 0.0, 0.0]
 
 
-def test_batches_are_their_members() -> None:
+def test_a_batch_gives_the_results_of_single_calls() -> None:
     turns = np.random.default_rng(3).uniform(-3.0, 3.0, (2, 5, 3))
     Rs = rotation_from_euler("XZX", turns)
     assert Rs.shape == (2, 5, 3, 3)
@@ -181,7 +183,7 @@ def test_batches_are_their_members() -> None:
 
 @pytest.mark.slow
 @given(axes, angles)
-def test_quaternion_and_rotation_are_each_others_inverse(axis: FloatArray, angle: float) -> None:
+def test_quaternion_and_rotation_matrix_can_be_converted_both_ways(axis: FloatArray, angle: float) -> None:
     R = rotation_about(axis, angle)
     quat = quaternion_of(R)
     assert quat[3] >= 0.0
@@ -191,7 +193,7 @@ def test_quaternion_and_rotation_are_each_others_inverse(axis: FloatArray, angle
 
 @pytest.mark.slow
 @given(axes, angles, axes, angles)
-def test_a_product_of_quaternions_is_the_product_of_rotations(
+def test_a_product_of_quaternions_represents_the_product_of_rotations(
     k: FloatArray, phi: float, m: FloatArray, psi: float
 ) -> None:
     p, q = quaternion_of(rotation_about(k, phi)), quaternion_of(rotation_about(m, psi))
@@ -200,7 +202,7 @@ def test_a_product_of_quaternions_is_the_product_of_rotations(
 
 @pytest.mark.slow
 @given(axes, angles)
-def test_the_conjugate_is_the_inverse(axis: FloatArray, angle: float) -> None:
+def test_the_conjugate_of_a_unit_quaternion_is_the_inverse(axis: FloatArray, angle: float) -> None:
     quat = quaternion_of(rotation_about(axis, angle))
     assert np.abs(multiply(quat, conjugate(quat)) - [0, 0, 0, 1]).max() <= ROUNDING
 
@@ -215,11 +217,11 @@ def test_the_skew_matrix_times_a_vector_is_the_cross_product(w: FloatArray, p: F
 
 
 @given(vectors3)
-def test_unskew_undoes_skew_exactly(w: FloatArray) -> None:
+def test_unskew_is_the_exact_inverse_of_skew(w: FloatArray) -> None:
     assert np.array_equal(unskew(skew(w)), w)
 
 
-def test_any_leading_shape_is_kept_empty_ones_too() -> None:
+def test_every_leading_shape_is_preserved_even_an_empty_one() -> None:
     assert skew(np.ones((4, 0, 3))).shape == (4, 0, 3, 3)
     assert unskew(np.zeros((4, 0, 3, 3))).shape == (4, 0, 3)
     w = np.arange(12.0).reshape(2, 2, 3)

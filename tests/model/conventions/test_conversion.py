@@ -63,7 +63,7 @@ def _values(robot: Robot, n: int = 4) -> tuple[FloatArray, FloatArray, FloatArra
     return robot.sample(n, 1), rng.standard_normal((n, robot.nv)), rng.standard_normal((n, robot.nv))
 
 
-def test_the_list_of_names_is_that_of_the_data_and_each_has_evidence() -> None:
+def test_every_listed_convention_has_data_and_evidence() -> None:
     assert tuple(module._built_in()) == BUILT_IN
     for name in BUILT_IN:
         found = find_convention(name)
@@ -76,7 +76,9 @@ def test_the_list_of_names_is_that_of_the_data_and_each_has_evidence() -> None:
 
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
-def test_from_undoes_to(dog: Robot, cart: Robot, convention: Convention) -> None:
+def test_conversion_from_a_convention_is_the_inverse_of_conversion_to_the_convention(
+    dog: Robot, cart: Robot, convention: Convention
+) -> None:
     for robot in (dog, cart):
         conversion = robot.convention(convention)
         ours = _values(robot)
@@ -88,7 +90,9 @@ def test_from_undoes_to(dog: Robot, cart: Robot, convention: Convention) -> None
 
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
-def test_converted_accelerations_are_derivatives(dog: Robot, cart: Robot, convention: Convention) -> None:
+def test_converted_accelerations_are_derivatives_of_converted_velocities(
+    dog: Robot, cart: Robot, convention: Convention
+) -> None:
     h = 1e-4
     for robot in (dog, cart):
         conversion = robot.convention(convention)
@@ -99,7 +103,9 @@ def test_converted_accelerations_are_derivatives(dog: Robot, cart: Robot, conven
 
 
 @pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
-def test_a_robot_in_a_convention_keeps_identities(dog: Robot, cart: Robot, convention: Convention) -> None:
+def test_a_robot_in_a_convention_satisfies_the_kinematic_identities(
+    dog: Robot, cart: Robot, convention: Convention
+) -> None:
     for robot, frame in ((dog, "FL_foot"), (cart, "arm")):
         other = robot.with_convention(convention)
         ours = _values(robot)
@@ -134,13 +140,13 @@ def test_equal_conventions_make_no_copy() -> None:
 
 
 @pytest.mark.parametrize("name", ["kinova", "panda", "tiago"])
-def test_the_convention_of_pinocchio_is_to_pinocchio(name: str) -> None:
+def test_the_convention_pinocchio_converts_as_to_pinocchio(name: str) -> None:
     robot = urdfkin.load(name, root_joint="floating", verify=False)
     q = robot.sample(5)
     assert np.allclose(robot.convention("pinocchio").to(q), robot.to_pinocchio(q), 0, 1e-15)
 
 
-def test_a_users_file_has_order_names_signs_units_and_motor_zeros(tmp_path: Path) -> None:
+def test_a_users_file_defines_order_names_signs_units_and_motor_zeros(tmp_path: Path) -> None:
     file = tmp_path / "motors.toml"
     file.write_text(
         'joints = ["2", "joint_1"]\nangle = "deg"\n'
@@ -179,7 +185,7 @@ TWICE = "two joints have the same name in the convention: found"
         ("=", "this is not a TOML file"),
     ],
 )
-def test_a_wrong_file_is_one_error_with_its_place(text: str, words: str, tmp_path: Path) -> None:
+def test_an_invalid_convention_file_is_an_error_with_the_place(text: str, words: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(text)
     arm = urdfkin.load("planar_two_link", verify=False)
@@ -199,7 +205,9 @@ def test_a_wrong_file_is_one_error_with_its_place(text: str, words: str, tmp_pat
         ("[joint.joint_1]\nsing = 1", "did you mean sign"),
     ],
 )
-def test_an_unknown_name_in_a_file_is_refused_with_the_nearest(text: str, words: str, tmp_path: Path) -> None:
+def test_an_unknown_name_in_a_convention_file_is_refused_with_the_nearest_name(
+    text: str, words: str, tmp_path: Path
+) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(text)
     with pytest.raises(UnknownNameError) as caught:
@@ -207,19 +215,19 @@ def test_an_unknown_name_in_a_file_is_refused_with_the_nearest(text: str, words:
     assert words in str(caught.value)
 
 
-def test_an_unknown_convention_is_an_error_with_the_nearest() -> None:
+def test_an_unknown_convention_is_an_error_with_the_nearest_name() -> None:
     with pytest.raises(UnknownNameError, match="did you mean mujoco"):
         urdfkin.load("planar_two_link", verify=False).convention("mujocco")
 
 
-def test_a_tool_without_an_order_asks_for_one() -> None:
+def test_a_convention_without_a_known_joint_order_needs_an_explicit_order() -> None:
     arm = urdfkin.load("planar_two_link", verify=False)
     with pytest.raises(InputError, match="no known order of joints"):
         arm.convention("idyntree")
     assert arm.convention("idyntree", ["joint_2", "joint_1"]).to([1.0, 2.0]).tolist() == [2.0, 1.0]
 
 
-def test_a_mimic_joint_has_a_column_that_must_follow_its_rule() -> None:
+def test_the_value_of_a_mimic_joint_in_a_convention_must_satisfy_the_mimic_rule() -> None:
     panda = urdfkin.load("panda", verify=False)
     mujoco = panda.convention("mujoco")
     q = mujoco.to("ready")
@@ -246,18 +254,20 @@ IDENTIFIERS = (
 
 
 @pytest.mark.parametrize(("name", "in_usd", "plain"), list(zip(NAMES, IN_USD, IDENTIFIERS, strict=True)))
-def test_a_name_is_written_as_in_usd(name: str, in_usd: str | None, plain: str | None) -> None:
+def test_a_joint_name_is_converted_to_a_valid_usd_name(
+    name: str, in_usd: str | None, plain: str | None
+) -> None:
     assert spelled(name, "usd") == in_usd or in_usd is None
     assert spelled(name, "identifier") == plain or plain is None
     assert all(spelled(name, how).isidentifier() for how in ("usd", "identifier", "isaacsim"))
     assert not spelled(name, "isaacsim").startswith("_")
 
 
-def test_a_name_that_begins_with_a_digit_is_written_as_isaac_sim_4_wrote_it() -> None:
+def test_a_name_with_a_leading_digit_has_the_prefix_of_isaac_sim_4() -> None:
     assert spelled("00_fr_abad", "isaacsim") == "a_00_fr_abad"  # github.com/isaac-sim/IsaacLab/issues/2496
 
 
-def test_names_in_usd_are_those_of_the_libraries() -> None:
+def test_converted_usd_names_are_those_of_the_usd_libraries() -> None:
     exchange, tf = pytest.importorskip("usdex.core"), pytest.importorskip("pxr.Tf")
     rng = np.random.default_rng(0)
     letters = list("abzAZ019_-./ :éß漢😀#")
@@ -269,7 +279,7 @@ def test_names_in_usd_are_those_of_the_libraries() -> None:
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["newton", "newton-usd", "usd"])
-def test_a_library_writes_odd_names_as_the_convention_says(name: str, tmp_path: Path) -> None:
+def test_a_library_converts_unusual_names_as_the_convention_states(name: str, tmp_path: Path) -> None:
     text = PLANAR.replace('type="planar"', 'type="continuous"').replace("plane", "1")
     text = text.replace('"turn"', '"a-b"').replace('"world"', '"ground"')
     robot = urdfkin.load(text, verify=False)
@@ -346,7 +356,7 @@ def _hold(name: str, seed: int, folder: Path) -> None:
 @pytest.mark.filterwarnings("ignore::urdfkin.DegreesWarning")  # a zero moves values beyond the limits
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", FEW)
-def test_a_map_converts_to_a_model_with_other_names_senses_zeros_and_order(
+def test_a_map_converts_to_a_model_with_different_names_signs_zeros_and_order(
     name: str, seed: int, tmp_path: Path
 ) -> None:
     _hold(name, seed, tmp_path)
@@ -355,7 +365,7 @@ def test_a_map_converts_to_a_model_with_other_names_senses_zeros_and_order(
 @pytest.mark.filterwarnings("ignore::urdfkin.DegreesWarning")  # a zero moves values beyond the limits
 @pytest.mark.long
 @pytest.mark.parametrize("name", sorted(set(catalogue()) - set(FEW)))
-def test_a_map_converts_to_a_disguise_of_every_robot(name: str, tmp_path: Path) -> None:
+def test_a_map_converts_to_a_renamed_and_reordered_model_of_every_robot(name: str, tmp_path: Path) -> None:
     if pair(name).tree.nq:
         _hold(name, 2, tmp_path)
 
@@ -376,7 +386,7 @@ def _wrong(right: Convention, mistake: str) -> Convention:
 
 @pytest.mark.parametrize("mistake", ["sign", "zero", "order"])
 @pytest.mark.parametrize("name", ["ur5", "a1", "tiago"])
-def test_a_planted_mistake_in_a_map_is_seen(name: str, mistake: str) -> None:
+def test_a_mistake_in_a_map_is_detected(name: str, mistake: str) -> None:
     found, a, b = _found(name, 0)
     assert _excess(found, a, b, a.convention(_wrong(found.convention(), mistake))) > 100.0
 
@@ -399,7 +409,7 @@ def test_a_mimicked_joint_of_one_model_may_be_a_mimic_joint_of_the_other() -> No
     assert np.allclose(J, b.jacobian([0.7], "l2"), 0, 1e-15)
 
 
-def test_a_coordinate_of_one_model_only_is_an_error_that_names_its_joint() -> None:
+def test_a_coordinate_of_only_one_model_is_an_error_that_names_the_joint() -> None:
     a, b = arm_with(), arm_with()
     shorter = urdfkin.load(b.urdf.replace('name="b" type="revolute"', 'name="b" type="fixed"'), verify=False)
     with pytest.raises(InputError, match=r"a joint of B has no joint of A.*found b"):
@@ -408,7 +418,7 @@ def test_a_coordinate_of_one_model_only_is_an_error_that_names_its_joint() -> No
         urdfkin.same(a, shorter, bounds=False).convention()
 
 
-def test_a_free_joint_with_another_frame_is_an_error() -> None:
+def test_a_floating_joint_with_different_frames_in_two_models_is_an_error() -> None:
     texts = (urdfs.robot(joint("f", "floating", "l0", "l1", f'xyz="{x} 0 0"', "")) for x in (0, 1))
     a, b = (urdfkin.load(text, verify=False) for text in texts)
     with pytest.raises(InputError, match="a free joint has another frame in B"):

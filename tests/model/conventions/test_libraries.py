@@ -115,7 +115,7 @@ def mistaken(right: Convention, field: str) -> dict[str, Any]:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("mistake", STATED)
 @pytest.mark.parametrize("name", LIBRARIES)
-def test_a_planted_mistake_in_a_convention_is_found(name: str, mistake: str, tmp_path: Path) -> None:
+def test_a_mistake_in_a_convention_is_detected(name: str, mistake: str, tmp_path: Path) -> None:
     if name == "rtb" and mistake not in ("six", "angle"):  # it has no floating joint
         return
     robot = _loaded("go2" if mistake == "point" else "a1", name)  # the A1's base has its mass at the origin
@@ -127,7 +127,7 @@ def test_a_planted_mistake_in_a_convention_is_found(name: str, mistake: str, tmp
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("robot_name", FEW)
 @pytest.mark.parametrize("name", LIBRARIES)
-def test_two_exchanged_joints_are_found(name: str, robot_name: str, tmp_path: Path) -> None:
+def test_two_exchanged_joints_are_detected(name: str, robot_name: str, tmp_path: Path) -> None:
     robot = _loaded(robot_name, name)
     library = LIBRARIES[name](robot, tmp_path)
     joints = list(library.names)

@@ -111,7 +111,7 @@ def test_a_convention_agrees_with_its_sources(name: str) -> None:
 
 @pytest.mark.parametrize("mistake", [*STATED, "order"])
 @pytest.mark.parametrize("name", ORDERS)
-def test_a_planted_mistake_contradicts_them(name: str, mistake: str) -> None:
+def test_a_mistake_in_a_convention_contradicts_the_sources(name: str, mistake: str) -> None:
     right = find_convention(name)
     if mistake == "order":
         joints = list(urdfkin.load("a1", verify=False).convention(name).joint_names)
@@ -196,14 +196,16 @@ H1_2_URDF = _humanoid(
     ],
     ids=["anymal_c", "anymal_c isaacgym", "go2", "h1", "h1_2", "panda"],
 )  # fmt: skip
-def test_the_order_is_the_published_one(robot: str, convention: str, published: list[str]) -> None:
+def test_the_joint_order_of_a_convention_is_the_published_order(
+    robot: str, convention: str, published: list[str]
+) -> None:
     loaded = urdfkin.load(robot, verify=False)
     assert list(loaded.convention(convention).joint_names) == published
     if robot != "panda":  # a chain whose last two joints are siblings
         assert list(loaded.convention("urdf").joint_names) != published
 
 
-def test_isaac_gym_has_the_go1s_legs_by_name_and_not_as_in_the_file() -> None:
+def test_isaac_gym_sorts_the_legs_of_the_go1_by_name_and_not_by_position_in_the_file() -> None:
     go1 = urdfkin.load("go1", verify=False)
     written = go1.convention("urdf").joint_names
     assert [written.index(name) for name in go1.convention("isaacgym").joint_names] == GO1_GYM

@@ -20,7 +20,7 @@ def verdict(findings: list[Finding]) -> str:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_a_document_has_its_verdict_and_each_finding_has_its_place_and_a_remedy(case: Case) -> None:
+def test_a_document_has_the_expected_verdict_and_each_finding_has_a_place_and_a_remedy(case: Case) -> None:
     findings = check(case.data)
     printed = [str(finding) for finding in findings]
     assert verdict(findings) == case.verdict, printed
@@ -40,7 +40,7 @@ def messages() -> str:
     return "\n".join(lines) + "\n"
 
 
-def test_the_messages_are_those_of_the_snapshot() -> None:
+def test_the_messages_of_findings_equal_the_stored_snapshot() -> None:
     assert messages() == SNAPSHOT.read_text("utf-8"), (
         "messages changed: read the changes, then run python -m tests.urdf.lint.test_cases to accept them"
     )

@@ -54,7 +54,7 @@ def test_the_corrected_example_has_no_error_and_not_the_finding(rule: Rule) -> N
 
 
 @EVERY_RULE
-def test_codes_and_texts_have_their_form_and_a_page_fits_a_terminal(rule: Rule) -> None:
+def test_codes_and_texts_of_rules_have_the_required_form_and_pages_fit_a_terminal(rule: Rule) -> None:
     text = explain(rule)
     assert rule.id in text.splitlines()[0]
     assert max(map(len, text.splitlines())) <= 104

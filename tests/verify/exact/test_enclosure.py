@@ -67,7 +67,7 @@ def holds(enclosure: Enclosure, true: NDArray[np.object_]) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("moves", [False, True], ids=["standing", "moving"])
 @pytest.mark.parametrize("name", ROBOTS)
-def test_every_number_at_fifty_digits_lies_in_its_interval_at_any_precision(name: str, moves: bool) -> None:
+def test_every_result_at_fifty_digits_lies_in_the_interval_at_any_precision(name: str, moves: bool) -> None:
     robot = robot_of(name)
     x, base = sample(robot), moving_base(3) if moves else None
     link = int(np.random.default_rng(len(robot.tree.links)).integers(1, len(robot.tree.links)))
@@ -83,7 +83,7 @@ def test_every_number_at_fifty_digits_lies_in_its_interval_at_any_precision(name
 
 
 @pytest.mark.slow
-def test_quaternions_in_the_file_and_joints_that_the_root_hangs_from_are_enclosed_too() -> None:
+def test_robots_with_quaternions_or_a_root_joint_are_enclosed() -> None:
     for robot in (
         urdfkin.load(text(quaternions(1.7), 'version="1.1"'), verify=False),
         robot_of("tree_1", root_joint="floating"),
@@ -98,7 +98,7 @@ def test_quaternions_in_the_file_and_joints_that_the_root_hangs_from_are_enclose
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "tree_3", "tree_5", "mimic_hand_40_sliding", "deep_with_fixed"])
-def test_the_ends_are_neighbouring_doubles_unless_fewer_digits_are_asked_for(name: str) -> None:
+def test_the_ends_of_intervals_are_adjacent_doubles_at_the_default_precision(name: str) -> None:
     robot = robot_of(name)
     for one in quantities(robot.enclose(*sample(robot), robot.tip_frame)):
         # A true number that is itself a double may lie between the ends.
@@ -109,7 +109,7 @@ def test_the_ends_are_neighbouring_doubles_unless_fewer_digits_are_asked_for(nam
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "ur5", "tree_2", "floating_root"])
-def test_what_doubles_give_lies_in_what_intervals_of_as_many_digits_give_but_for_few(name: str) -> None:
+def test_nearly_all_results_in_doubles_lie_in_intervals_of_15_digits(name: str) -> None:
     robot = urdfkin.load("ur5", verify=False) if name == "ur5" else robot_of(name)
     x, frame = sample(robot), robot.tip_frame
     for reference in Reference:
@@ -125,7 +125,7 @@ def test_what_doubles_give_lies_in_what_intervals_of_as_many_digits_give_but_for
 
 
 @pytest.mark.parametrize("base", [None, moving_base(1)], ids=["standing", "moving"])
-def test_pinocchios_doubles_are_those_that_it_is_asked_for(base: BaseMotion | None) -> None:
+def test_an_enclosure_contains_the_results_of_the_pinocchio_oracle(base: BaseMotion | None) -> None:
     robot = robot_of("panda")
     x, frame = sample(robot), robot.tip_frame
     enclosed = robot.enclose(*x, frame, "world", base=base)
@@ -146,7 +146,9 @@ SLIPS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("equation", SLIPS)
-def test_wrong_equations_leave_the_interval(equation: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_of_wrong_equations_lie_outside_the_interval(
+    equation: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     robot, (term, quantity) = robot_of("panda"), SLIPS[equation]
     x, frame = sample(robot), robot.tip_frame
     monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
@@ -166,7 +168,7 @@ GANTRY = urdfs.robot(
 )
 
 
-def test_what_is_exact_has_no_width_and_a_decimal_that_is_no_double_lies_between_two() -> None:
+def test_an_exact_result_has_zero_width_and_a_decimal_lies_between_adjacent_doubles() -> None:
     robot = urdfkin.load(GANTRY)
     first, second = (robot.enclose([0.75, 0.5], [1.0, 5.0], [0.5, 0.0], frame) for frame in "bc")
     assert [one.width.max() for one in quantities(first)] == [0.0] * 5
@@ -181,7 +183,7 @@ def test_what_is_exact_has_no_width_and_a_decimal_that_is_no_double_lies_between
     assert second.jacobian.contains(np.array([[1.0, 0, 0, 0, 0, 0], [0, 0.6, 0.8, 0, 0, 0]]).T).all()
 
 
-def test_an_error_is_rounded_outward() -> None:
+def test_the_stated_error_of_a_result_is_rounded_upward() -> None:
     generator = np.random.default_rng(3)
     x, lower = generator.normal(size=(2, 200)) * 10.0 ** generator.integers(-9, 9, (2, 200))
     upper = np.nextafter(lower, np.inf)
@@ -195,7 +197,7 @@ def test_an_error_is_rounded_outward() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tree_1", "one_joint"])
-def test_a_hessian_is_enclosed_where_it_is_asked_for(name: str) -> None:
+def test_a_hessian_is_enclosed_on_request(name: str) -> None:
     robot = robot_of(name)
     x, link = sample(robot), robot.tree.frame_link(robot.tip_frame)
     motion = true_motion(robot, x)
@@ -217,7 +219,7 @@ FOLLOWERS = urdfs.robot(
 
 
 @pytest.mark.parametrize("reference", list(Reference))
-def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipliers(
+def test_a_hessian_with_two_mimic_joints_is_enclosed_with_both_multipliers(
     reference: Reference,
 ) -> None:
     robot, x = urdfkin.load(FOLLOWERS), (np.array([0.3]), np.array([1.0]), np.array([0.5]))
@@ -228,7 +230,7 @@ def test_a_hessian_behind_mimic_joints_is_enclosed_and_counts_both_their_multipl
     assert np.abs((one.lower[..., 0] - rate).astype(float)).max() < 1e-15
 
 
-def test_threads_that_ask_for_other_digits_do_not_disturb_each_other_nor_the_users_precision() -> None:
+def test_threads_with_different_digits_change_neither_results_nor_the_users_precision() -> None:
     robot = robot_of("panda")
     x, asked = sample(robot), (15, 300) * 20
 
@@ -247,7 +249,7 @@ def test_threads_that_ask_for_other_digits_do_not_disturb_each_other_nor_the_use
     assert flint.ctx.prec == before
 
 
-def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:
+def test_a_robot_that_pinocchio_refuses_can_be_enclosed() -> None:
     robot = robot_of("panda")
     robot.verifier.unverifiable = "it was told to"
     enclosed = robot.enclose(*sample(robot), robot.tip_frame)
@@ -255,7 +257,7 @@ def test_a_robot_that_pinocchio_refuses_is_enclosed_all_the_same() -> None:
     assert "Pinocchio" not in str(enclosed)
 
 
-def test_it_reads_as_what_it_says() -> None:
+def test_the_text_of_an_enclosure_lists_intervals_widths_and_contained_results() -> None:
     lines = str(urdfkin.load(GANTRY).enclose([0.75, 0.5], [1.0, 5.0], [0.5, 0.0], "b")).splitlines()
     assert lines[0] == "b in local_world_aligned, proven with 31 digits"
     assert lines[3] == (
@@ -264,7 +266,7 @@ def test_it_reads_as_what_it_says() -> None:
     assert len(lines) == 6
 
 
-def test_bad_input_is_said() -> None:
+def test_invalid_input_of_an_enclosure_is_a_clear_error() -> None:
     robot = robot_of("panda")
     q, v, a = sample(robot)
     with pytest.raises(InputError, match=r"an enclosure needs one sample: found a batch of shape \(2,\)"):
@@ -287,7 +289,7 @@ def test_a_robot_without_joints_has_jacobians_without_columns() -> None:
     assert enclosed.velocity.contains(robot.velocity([], [], robot.tip_frame, base=moving_base(4))).any()
 
 
-def test_the_example_on_the_page_runs_and_prints_what_stands_there() -> None:
+def test_the_example_on_the_page_of_enclosures_prints_the_stated_output() -> None:
     page = (Path(__file__).parents[3] / "docs" / "enclosures.md").read_text("utf-8")
     code, printed = re.findall(r"```(?:python|text)\n(.*?)```", page, re.DOTALL)
     names: dict[str, Enclosures] = {}

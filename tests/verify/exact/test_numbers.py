@@ -41,7 +41,7 @@ FAR = ("1e300", "-1.7976931348623157e308", "5e-324", "1e-400", "2.5e-1000", "3.1
 
 @pytest.mark.parametrize("digits", DIGITS)
 @pytest.mark.parametrize("word", [*WORDS, *FAR])
-def test_a_decimal_lies_in_its_interval_however_large_its_exponent(word: str, digits: int) -> None:
+def test_a_decimal_with_any_exponent_lies_in_the_interval(word: str, digits: int) -> None:
     with precision(digits):
         low, high = true_ends(arb(word))
     assert low <= Fraction(word) <= high
@@ -49,13 +49,13 @@ def test_a_decimal_lies_in_its_interval_however_large_its_exponent(word: str, di
 
 
 @given(finite)
-def test_a_double_is_an_interval_of_itself(x: float) -> None:
+def test_the_interval_of_a_double_has_zero_width(x: float) -> None:
     assert true_ends(exact(x)) == (Fraction(x), Fraction(x))
 
 
 @pytest.mark.parametrize("digits", DIGITS)
 @given(x=st.floats(1e-300, 1e300))
-def test_the_squares_of_a_roots_ends_lie_on_either_side(digits: int, x: float) -> None:
+def test_the_interval_of_a_square_root_contains_the_root(digits: int, x: float) -> None:
     with precision(digits):
         low, high = true_ends(exact(x).sqrt())
     assert low**2 <= Fraction(x) <= high**2
@@ -65,7 +65,7 @@ def test_the_squares_of_a_roots_ends_lie_on_either_side(digits: int, x: float) -
 @pytest.mark.slow
 @pytest.mark.parametrize("digits", DIGITS)
 @given(angle=st.one_of(finite, st.floats(-7.0, 7.0), st.integers(-9, 9).map(lambda k: k * math.pi / 2)))
-def test_cosine_and_sine_of_every_double_lie_in_their_intervals(digits: int, angle: float) -> None:
+def test_cosine_and_sine_of_every_double_lie_in_the_computed_intervals(digits: int, angle: float) -> None:
     context = independent.clone()
     context.prec = 1100 + 8 * digits  # what reducing 1e308 rad takes
     with precision(digits):
@@ -78,7 +78,9 @@ def test_cosine_and_sine_of_every_double_lie_in_their_intervals(digits: int, ang
 
 @pytest.mark.parametrize("digits", DIGITS)
 @pytest.mark.parametrize("exponent", [-20, -60, -100, -200, -1000])
-def test_what_taylors_series_leaves_out_is_in_the_intervals(exponent: int, digits: int) -> None:
+def test_intervals_of_sine_and_cosine_include_the_omitted_terms_of_the_series(
+    exponent: int, digits: int
+) -> None:
     # For such a small angle, the first terms are exact doubles; only the omitted terms give the interval a
     # width.
     x = Fraction(2) ** exponent
@@ -100,7 +102,7 @@ def nearest(M: FloatArray, digits: int) -> Matrix:
 @pytest.mark.slow
 @pytest.mark.parametrize("digits", [15, 50])
 @given(R=rotations, off=st.integers(0, 2**32 - 1).map(np.random.default_rng))
-def test_the_nearest_rotation_lies_in_its_intervals(digits: int, R: FloatArray, off: Any) -> None:
+def test_the_nearest_rotation_lies_in_the_computed_intervals(digits: int, R: FloatArray, off: Any) -> None:
     M = R + off.uniform(-5e-10, 5e-10, (3, 3))
     found, expected = nearest(M, digits), orthogonal_factor(M)
     room = Fraction(10) ** -57  # what the 60 digits of mpmath may be off by
@@ -110,7 +112,7 @@ def test_the_nearest_rotation_lies_in_its_intervals(digits: int, R: FloatArray, 
         assert high - low < Fraction(10) ** (1 - digits)
 
 
-def test_what_newtons_steps_leave_is_in_the_intervals_of_the_nearest_rotation() -> None:
+def test_intervals_of_the_nearest_rotation_include_the_residual_of_newtons_method() -> None:
     # Six steps give about 550 digits, so 1000 digits need the bound of the residual.
     M = np.array([[0.28, -0.96, 0.0], [0.96, 0.28, 0.0], [0.0, 0.0, 1.0]])
     M += np.random.default_rng(1).uniform(-5e-10, 5e-10, (3, 3))
@@ -123,14 +125,14 @@ def test_what_newtons_steps_leave_is_in_the_intervals_of_the_nearest_rotation() 
             assert high - low < Fraction(10) ** -500
 
 
-def test_a_rotation_is_its_own_nearest_without_width() -> None:
+def test_the_nearest_rotation_of_an_exact_rotation_is_equal_with_zero_width() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     for row, right in zip(nearest(turn, 15), turn.tolist(), strict=True):
         assert [true_ends(number) for number in row] == [(number, number) for number in right]
 
 
 @given(st.integers(-(2**200), 2**200), st.integers(-1400, 1100))
-def test_doubles_around_an_interval_lie_outside_it_and_next_to_it(man: int, exponent: int) -> None:
+def test_the_doubles_around_an_interval_are_the_nearest_outside_the_interval(man: int, exponent: int) -> None:
     with precision(120):
         low, high = ends(arb((man, exponent)))
     true = Fraction(man) * Fraction(2) ** exponent
@@ -139,7 +141,7 @@ def test_doubles_around_an_interval_lie_outside_it_and_next_to_it(man: int, expo
     assert low == high or math.nextafter(low, math.inf) == high
 
 
-def test_a_whole_number_has_itself_for_ends() -> None:
+def test_both_ends_of_a_whole_number_are_the_number() -> None:
     assert ends(1) == (1.0, 1.0)
 
 
@@ -162,7 +164,7 @@ def test_a_decimal_is_the_true_value_rounded_to_seventeen_digits(x: float, y: fl
         assert float(found) == float(expected)
 
 
-def test_a_ball_that_is_too_large_has_no_decimal() -> None:
+def test_a_ball_with_a_too_large_radius_has_no_decimal() -> None:
     with precision(50):
         assert decimal(arb(1.0, 1e-19), 1.0) is None
         assert decimal(arb(0.0, 1e-19), 1e-12) is None

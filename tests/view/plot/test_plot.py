@@ -27,9 +27,7 @@ def case() -> Case:
     return robot, frame_motion(robot, x, robot.tip_frame), x
 
 
-def test_the_title_says_from_where_to_where_every_panel_is_offered_and_lines_differ(
-    case: Case, tmp_path: Path
-) -> None:
+def test_the_title_states_start_and_end_and_every_panel_is_available(case: Case, tmp_path: Path) -> None:
     assert (*COORDINATES, *PANELS) == OFFERED
     assert len({tuple(_look(k).values()) for k in range(14)}) == 14
     robot, x, trajectory = case
@@ -42,7 +40,7 @@ def test_the_title_says_from_where_to_where_every_panel_is_offered_and_lines_dif
         sheet(*case, ["velocty"])
 
 
-def test_the_lines_are_the_numbers(case: Case) -> None:
+def test_the_plotted_lines_have_the_values_of_the_motion(case: Case) -> None:
     robot, x, trajectory = case
     figure = sheet(robot, x, trajectory, ["velocity", "parts"])
     velocity, parts = figure.axes
@@ -53,7 +51,7 @@ def test_the_lines_are_the_numbers(case: Case) -> None:
     np.testing.assert_array_equal(together.get_ydata(), np.linalg.norm(x.acceleration[:, :3], axis=1))
 
 
-def test_q_and_v_are_drawn_with_their_limits_one_unit_an_axis(case: Case) -> None:
+def test_q_and_v_are_plotted_with_limits_and_one_unit_for_each_axis(case: Case) -> None:
     robot, x, trajectory = case
     axes = sheet(robot, x, trajectory, ["q", "v", "a"]).axes
     assert [one.get_ylabel().split("\n")[0] for one in axes] == [
@@ -75,7 +73,7 @@ def _of(bounds: Any) -> tuple[set[float], set[float]]:
 
 
 @pytest.mark.slow
-def test_panels_are_as_wide_as_the_sheet_lets_them_be_whatever_their_legends_say() -> None:
+def test_long_legends_do_not_make_the_panels_narrower() -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
     figure = sheet(robot, frame_motion(robot, x, "FL_foot"), x)
@@ -87,7 +85,7 @@ def test_panels_are_as_wide_as_the_sheet_lets_them_be_whatever_their_legends_say
             assert box.x1 < axes.get_position().x1 + 0.03
 
 
-def test_of_many_joints_those_outside_their_limits_are_named_and_the_others_counted() -> None:
+def test_the_legend_names_joints_outside_the_limits_and_counts_the_others() -> None:
     robot = urdfkin.load("romeo", root_joint=None)
     end = np.clip(robot.sample(1, 3)[0], *robot.limits)
     far = [robot.coordinate_names.index(name) for name in ("LElbowYaw", "RWristPitch")]
@@ -101,7 +99,7 @@ def test_of_many_joints_those_outside_their_limits_are_named_and_the_others_coun
 
 
 @pytest.mark.parametrize("panels", [[], ["q"], ["position", "velocity", "disagreement"]])
-def test_a_sheet_fits_a_page_and_no_curve_touches_the_top(panels: list[str], case: Case) -> None:
+def test_a_plot_fits_a_page_and_no_curve_touches_the_top(panels: list[str], case: Case) -> None:
     figure = sheet(*case, panels)
     width, height = figure.get_size_inches()
     assert width <= 7.6  # A4 is 8.27 by 11.69 inches, US Letter 8.5 by 11
@@ -113,7 +111,7 @@ def test_a_sheet_fits_a_page_and_no_curve_touches_the_top(panels: list[str], cas
             assert upper - largest > 0.03 * (upper - lower), axes.get_ylabel()
 
 
-def test_a_cross_stands_where_a_limit_is_left_and_the_bound_beside_what_it_bounds(case: Case) -> None:
+def test_crosses_mark_limit_violations_and_disagreements_are_plotted_with_the_bound(case: Case) -> None:
     robot, motion, trajectory = case
     x = line(robot, robot.poses["ready"], robot.poses["neutral"], 1.0, 21)
     (axes, _) = sheet(robot, frame_motion(robot, x, robot.tip_frame), x, ["q"]).axes
@@ -129,7 +127,7 @@ def test_a_cross_stands_where_a_limit_is_left_and_the_bound_beside_what_it_bound
     assert bounded.get_ylim()[1] > max(check.bound.max() for check in motion.checks.values())
 
 
-def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
+def test_no_axis_of_a_plot_mixes_metres_and_radians(case: Case) -> None:
     robot, x, trajectory = case
     names = ["singular-values", "angular-singular-values", "manipulability", "angular-manipulability"]
     figure = sheet(robot, x, trajectory, names)
@@ -143,7 +141,7 @@ def test_no_axis_mixes_metres_and_radians(case: Case) -> None:
 
 
 @pytest.mark.slow
-def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: Path) -> None:
+def test_a_floating_base_is_plotted_with_position_and_quaternion(tmp_path: Path) -> None:
     robot = urdfkin.load("a1", root_joint="floating")
     x = line(robot, robot.poses["ready"], robot.sample(1, 3)[0], 1.0, 11)
     motion = frame_motion(robot, x, "FL_foot")
@@ -156,7 +154,7 @@ def test_a_floating_base_is_plotted_with_its_place_and_its_quaternion(tmp_path: 
 
 
 @pytest.mark.slow
-def test_every_panel_is_on_the_sheet_and_the_foot_says_what_was_checked(case: Case, tmp_path: Path) -> None:
+def test_a_plot_contains_every_panel_and_a_footer_about_the_verification(case: Case, tmp_path: Path) -> None:
     robot, x, trajectory = case
     written = "".join(ET.fromstring(save(sheet(robot, x, trajectory), tmp_path / "a.svg")).itertext())
     panels = "position", "velocity", "parts", "singular", "manipulability", "disagreement"
@@ -167,7 +165,7 @@ def test_every_panel_is_on_the_sheet_and_the_foot_says_what_was_checked(case: Ca
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("ending", "head"), [("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")])
-def test_the_ending_says_the_format_and_the_same_motion_gives_the_same_file(
+def test_the_suffix_selects_the_picture_format_and_equal_motions_give_equal_files(
     ending: str, head: bytes, case: Case, tmp_path: Path
 ) -> None:
     files = [save(sheet(*case, ["position"]), tmp_path / f"a.{ending}") for _ in range(2)]

@@ -87,13 +87,13 @@ def passes_as_it_is(test: str) -> bool:
     return passes(test)
 
 
-def test_every_equation_is_there_but_the_four_that_are_lost() -> None:
+def test_the_table_contains_every_equation_except_the_four_lost_equations() -> None:
     assert list(equations()) == [f"7.{i}" for i in range(1, LAST + 1) if f"7.{i}" not in LOST]
     assert len(equations()) == 126
     assert LOST == ("7.6", "7.8", "7.9", "7.10")
 
 
-def test_every_function_exists_and_every_test_is_a_test() -> None:
+def test_every_function_and_test_in_the_equation_table_exists() -> None:
     for equation in equations().values():
         assert equation.functions
         assert equation.tests
@@ -106,7 +106,7 @@ def test_every_function_exists_and_every_test_is_a_test() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", list(equations()))
-def test_its_tests_pass_and_fail_when_one_of_its_functions_is_slightly_wrong(number: str) -> None:
+def test_the_tests_of_an_equation_detect_a_slightly_wrong_function(number: str) -> None:
     equation = equations()[number]
     assert all(passes_as_it_is(test) for test in equation.tests)
     for name in equation.functions:
@@ -116,18 +116,18 @@ def test_its_tests_pass_and_fail_when_one_of_its_functions_is_slightly_wrong(num
     assert all(passes(test) for test in equation.tests)
 
 
-def test_every_misprint_has_a_proof_that_passes() -> None:
+def test_every_listed_misprint_has_a_passing_test() -> None:
     assert misprints()
     for misprint in misprints():
         assert passes(misprint.test), misprint.where
 
 
-def test_the_page_is_current() -> None:
+def test_the_generated_page_of_equations_is_current() -> None:
     page = (ROOT / "docs" / "equations.md").read_text(encoding="utf-8")
     assert page == table(), "run python scripts/make_pages.py equations"
 
 
-def test_explain_gives_a_page_for_each_equation_and_says_which_are_lost() -> None:
+def test_explain_describes_each_equation_and_states_the_lost_equations() -> None:
     for number, equation in equations().items():
         page = explain(number)
         assert page is not None
@@ -167,7 +167,7 @@ def test_both_notations_have_the_same_symbols_in_the_same_order(equation: Equati
     assert of_latex(equation.latex) == of_statement(equation.statement)
 
 
-def test_a_lost_sign_or_dot_is_seen() -> None:
+def test_a_changed_sign_dot_or_index_of_a_notation_is_detected() -> None:
     equation = equations()["7.130"]
     for slip in (("+ 2", "- 2"), (r"\ddot", r"\dot"), ("i-1,i", "i,i-1")):
         assert of_latex(equation.latex.replace(*slip, 1)) != of_statement(equation.statement)
@@ -184,7 +184,7 @@ def test_omega_zyz_is_singular_at_pi_as_well_as_at_zero() -> None:
         assert abs(determinant + np.sin(theta)) <= ROUNDING
 
 
-def test_the_exact_flow_keeps_the_quaternions_length_and_an_euler_step_does_not() -> None:
+def test_quaternion_rates_preserve_the_norm_and_an_euler_step_does_not() -> None:
     quat, w, step = quaternion_of(rotation_about([0.6, 0.8, 0.0], 1.2)), np.array([0.0, 0.6, 0.8]), 0.1
     rates = quaternion_rates(quat, w)
     assert abs(quat @ rates) <= ROUNDING
@@ -202,7 +202,7 @@ def test_the_vector_in_7_17_is_the_links_angular_velocity() -> None:
     assert np.abs(skew(w_0) @ d_01 - exact).max() > 0.1
 
 
-def test_the_relative_velocity_of_7_61_is_expressed_in_the_frame_before() -> None:
+def test_the_relative_velocity_of_7_61_is_expressed_in_the_previous_frame() -> None:
     first, second = frame(0), frame(1)
     both = compose(first, second)
     exact = array(rate(lambda t: ORIGINS[0](t) + ORIENTATIONS[0](t) * ORIGINS[1](t), T))
@@ -211,7 +211,7 @@ def test_the_relative_velocity_of_7_61_is_expressed_in_the_frame_before() -> Non
     assert np.abs(rest + both.R_0_1 @ second.v_0_1 - exact).max() > 0.1
 
 
-def test_the_kind_in_7_62_is_that_of_joint_i() -> None:
+def test_the_joint_kind_in_7_62_is_that_of_joint_i() -> None:
     polar = motion("polar")
     turns = [True, False]
     right = sum(joint_angular_velocity(polar.axis(i), polar.v[i - 1], turns[i - 1]) for i in (1, 2))
@@ -237,14 +237,14 @@ def test_7_121_holds_for_a_robot_that_is_not_the_elbow() -> None:
     assert J_v.shape != (6, 6)
 
 
-def test_coriolis_is_perpendicular_to_the_velocity_as_frame_0_sees_it() -> None:
+def test_coriolis_acceleration_is_perpendicular_to_the_relative_velocity_in_frame_0() -> None:
     v_1 = array(rate(point, T))
     coriolis = point_acceleration(frame(0), array(point(mp.mpf(T))), v_1).coriolis
     assert abs(coriolis @ (frame(0).R_0_1 @ v_1)) <= 64 * ROUNDING
     assert abs(coriolis @ v_1) > 0.1
 
 
-def test_a_base_at_rest_has_no_angular_acceleration_either() -> None:
+def test_a_base_at_rest_also_has_zero_angular_acceleration() -> None:
     still, turning = np.zeros(6), BaseMotion(acceleration=np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
     elbow = motion("elbow")
     assert not robot("elbow").acceleration(elbow.q, still, still, "wrist", base=BaseMotion()).any()

@@ -92,7 +92,7 @@ def test_no_kernel_fuses_the_multiplication_and_the_addition() -> None:
 
 
 @pytest.mark.parametrize("exponent", [0, 3, 6, 7, 8, 12, 15, 22, 100, 300])
-def test_sine_and_cosine_are_right_to_the_last_digit_for_angles_of_any_size(exponent: int) -> None:
+def test_sine_and_cosine_are_accurate_to_the_last_digit_for_angles_of_any_size(exponent: int) -> None:
     # What the bound grants a joint for both: one eps. An angle of 1e300 needs 1e300's digits of pi.
     robot = urdfkin.load(text())
     x = np.random.default_rng(exponent).uniform(1.0, 10.0, 60) * 10.0**exponent
@@ -142,7 +142,7 @@ MISREAD = {
 
 
 @pytest.mark.parametrize("what", MISREAD)
-def test_a_rule_that_urdfkin_misreads_is_not_verified(what: str) -> None:
+def test_a_mimic_rule_that_urdfkin_misreads_is_not_verified(what: str) -> None:
     wrong = TEXT.replace(*MISREAD[what])
     assert wrong != TEXT
     robot = misread(TEXT, wrong)
@@ -166,7 +166,7 @@ def test_a_parser_that_loses_all_mimic_rules_is_not_verified() -> None:
     assert free.certificate().verified
 
 
-def test_joints_in_another_order_and_a_coordinate_of_another_joint_are_found() -> None:
+def test_joints_in_a_different_order_and_coordinates_of_other_joints_are_detected() -> None:
     text = robot_of(joint("x", "continuous", "a", "b"), joint("y", "continuous", "a", "c"))
     tree = tree_of(text.replace('"x"', '"z"').encode())  # read so, x stands after y
     for one in tree.joints:

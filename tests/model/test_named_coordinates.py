@@ -195,7 +195,7 @@ def test_any_text_gives_finite_numbers_or_a_urdfkin_error(text: str) -> None:
         assert np.isfinite(coordinate_layout(robot.tree, "q").read(text)).all()
 
 
-def test_a_text_of_any_length_is_refused_at_once(arm: Robot) -> None:
+def test_an_invalid_text_of_any_length_is_refused_without_delay(arm: Robot) -> None:
     for text in (" " * 200_000 + "1", *(each * 50_000 for each in ("1 ", "pi*", "==", "xx", "99"))):
         with pytest.raises((InputError, UnknownNameError)):
             q_of(arm, text)
@@ -251,7 +251,7 @@ def test_a_series_is_read_by_its_labels_in_any_order(arm: Robot) -> None:
 
 
 @pytest.mark.parametrize("kind", [DataFrame, Columns])
-def test_a_data_frame_is_a_batch_whose_columns_have_names(kind: Any, arm: Robot) -> None:
+def test_a_data_frame_is_a_batch_with_named_columns(kind: Any, arm: Robot) -> None:
     q = arm.sample(5, 3)
     found = arm.placement(kind(q[:, [2, 0, 1]], SHUFFLED), "e")
     np.testing.assert_array_equal(found, arm.placement(q, "e"))
@@ -330,7 +330,9 @@ NAMED: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("given", NAMED)
-def test_a_name_read_as_another_coordinate_disagrees(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_assigned_to_the_wrong_coordinate_name_are_detected(
+    given: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     robot = urdfkin.load(ARM)
     robot.placement(NAMED[given], "e")
     assert robot.certificate().verified

@@ -80,7 +80,7 @@ def report(called: Callable[[str], str]) -> Document:
     return cast("Document", json.loads(_report(called)))
 
 
-def test_a_report_fits_the_schema_and_its_page_and_junit_have_the_same_elements_under_any_names() -> None:
+def test_the_html_and_junit_forms_of_a_report_have_the_same_elements_with_any_names() -> None:
     jsonschema.validate(report(same), VALIDATION.schema())
     hostile, plain = (Page(as_html(report(called))) for called in (same, tame))
     assert hostile.skeleton == plain.skeleton
@@ -96,7 +96,7 @@ def test_a_report_fits_the_schema_and_its_page_and_junit_have_the_same_elements_
 
 
 @pytest.mark.parametrize("html", [True, False])
-def test_a_comment_in_markdown_has_the_same_elements_under_any_names(html: bool) -> None:
+def test_a_report_in_markdown_has_the_same_elements_with_any_names(html: bool) -> None:
     for write in (as_markdown, _compared):
         hostile, plain = (write(report(called)) for called in (same, tame))
         assert hostile.count("\n") == plain.count("\n")
@@ -129,7 +129,7 @@ def table(name: str) -> DHTable:
 
 
 @pytest.mark.parametrize("kind", IN_XML)
-def test_a_report_of_snapped_values_has_the_same_elements_under_any_name(kind: str) -> None:
+def test_a_report_of_snapped_values_has_the_same_elements_with_any_name(kind: str) -> None:
     def page(name: str) -> Page:
         text = urdf(name).replace('<origin xyz="0.3 0 0"/>', '<origin xyz="0.3 0 0" rpy="1.5708 0 0"/>')
         snapped = urdfkin.load(text).dh(snap=1e-3)
@@ -142,7 +142,7 @@ def test_a_report_of_snapped_values_has_the_same_elements_under_any_name(kind: s
 
 @pytest.mark.parametrize("html", [True, False])
 @pytest.mark.parametrize("kind", NAMES)
-def test_a_table_in_markdown_has_the_same_elements_under_any_name(kind: str, html: bool) -> None:
+def test_a_table_in_markdown_has_the_same_elements_with_any_name(kind: str, html: bool) -> None:
     hostile, plain = (rendered(export(table(name), "markdown"), html) for name in (NAMES[kind], "tame_name"))
     assert hostile.skeleton == plain.skeleton
     assert not re.search(r"@\w|://|www\.", hostile.prose)
@@ -159,7 +159,7 @@ def test_a_name_in_markdown_is_one_code_element_or_one_paragraph(kind: str) -> N
 
 
 @pytest.mark.parametrize("form", ["markdown", "terminal"])
-def test_the_whole_tree_has_the_same_lines_under_any_names(form: str) -> None:
+def test_a_table_of_the_whole_tree_has_the_same_lines_with_any_names(form: str) -> None:
     texts = [
         document(tree_parameters(urdfkin.load(chain_of_all(names, names[0])).tree), Units()).written(form)
         for names in (list(IN_XML.values()), [f"n{k}" for k in range(len(IN_XML))])
@@ -180,7 +180,7 @@ def test_a_name_in_latex_has_no_active_character(kind: str) -> None:
 
 @pytest.mark.parametrize("form", ["sympy", "roboticstoolbox", "ets"])
 @pytest.mark.parametrize("kind", NAMES)
-def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
+def test_python_code_is_the_same_with_any_name(kind: str, form: str) -> None:
     def code(name: str) -> str:
         tree = ast.parse(export(table(name), form))
         words = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
@@ -194,7 +194,7 @@ def test_python_code_is_the_same_under_any_name(kind: str, form: str) -> None:
 
 
 @pytest.mark.parametrize("kind", NAMES)
-def test_code_with_a_proof_is_the_same_under_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
+def test_code_with_a_proof_is_the_same_with_any_name_and_compiles(kind: str, tmp_path: Path) -> None:
     def code(name: str) -> list[str]:
         written = code_of_chain(table(name), ["placement"], name="chain", verify=False)
         words = written.identifiers["q"]
@@ -216,7 +216,7 @@ def test_code_with_a_proof_is_the_same_under_any_name_and_compiles(kind: str, tm
 
 @pytest.mark.parametrize("form", ["matlab-symbolic", "matlab-rst"])
 @pytest.mark.parametrize("kind", NAMES)
-def test_matlab_code_is_the_same_under_any_name(kind: str, form: str) -> None:
+def test_matlab_code_is_the_same_with_any_name(kind: str, form: str) -> None:
     def code(name: str) -> list[str]:
         first, *lines = export(table(name), form).split("\n")
         assert re.fullmatch(r"function (\w+|\[T, q\]) = \w+\(\)", first)
@@ -227,7 +227,7 @@ def test_matlab_code_is_the_same_under_any_name(kind: str, form: str) -> None:
 
 @pytest.mark.parametrize("form", ["json", "toml", "csv"])
 @pytest.mark.parametrize("kind", NAMES)
-def test_a_table_that_is_read_back_has_its_names(kind: str, form: str, tmp_path: Path) -> None:
+def test_a_table_that_is_written_and_read_has_the_same_names(kind: str, form: str, tmp_path: Path) -> None:
     file = tmp_path / f"table.{form}"
     file.write_text(export(table(NAMES[kind]), form), encoding="utf-8")
     found = read_table(file)
@@ -245,7 +245,7 @@ def test_a_name_in_csv_is_no_formula(name: str) -> None:
         assert from_csv_cell(cell) == name
 
 
-def test_a_drawing_has_the_same_elements_under_any_names() -> None:
+def test_a_drawing_has_the_same_elements_with_any_names() -> None:
     def elements(called: Callable[[str], str]) -> list[Any]:
         names = [called(name) for name in IN_XML.values()]
         robot = urdfkin.load(chain_of_all(names, called(NAMES["math"])))
@@ -260,6 +260,6 @@ def test_a_drawing_has_the_same_elements_under_any_names() -> None:
 
 
 @pytest.mark.parametrize("name", ["J$$(x)", "$x^2$", "J$$", r"$\frac{", r"\$x$"])
-def test_dollars_in_a_name_are_no_mathematics(name: str) -> None:
+def test_dollar_signs_in_a_name_are_not_rendered_as_mathematics(name: str) -> None:
     svg = etree.fromstring(drawing(table(name)).encode())
     assert name in " ".join("".join(map(str, element.itertext())) for element in svg.iter("{*}text"))

@@ -253,7 +253,7 @@ def test_a_parent_folder_that_is_replaceable_or_no_folder_is_refused(
 
 
 @pytest.mark.parametrize("whose", ["the folder", "the one above", "the file behind a link"])
-def test_a_folder_of_another_user_is_refused(
+def test_a_cache_folder_of_another_user_is_refused(
     whose: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Unpickling the files of another user could run any code. Only the superuser can change an owner."""

@@ -77,7 +77,7 @@ def test_a_fix_changes_only_the_bytes_of_its_finding() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_the_fixed_findings_of_an_odd_document_disappear_and_no_new_ones_appear(case: Case) -> None:
+def test_fixed_findings_of_an_unusual_document_disappear_and_no_new_findings_appear(case: Case) -> None:
     before, done = examine(Text(case.data, "<bytes>", "<bytes>")), mended(case.data)
     after = examine(done.text)
     assert len(after.findings) == len(before.findings) - len(done.fixed)

@@ -31,7 +31,7 @@ def test_only_the_bad_example_on_a_page_about_mjcf_or_usd_has_the_finding(code: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_each_case_has_exactly_its_findings_and_warns_of_those_that_affect_the_motion(case: Mjcf) -> None:
+def test_each_mjcf_case_has_exactly_the_expected_findings_and_warnings(case: Mjcf) -> None:
     pytest.importorskip("mujoco")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -46,6 +46,6 @@ def test_each_case_has_exactly_its_findings_and_warns_of_those_that_affect_the_m
     assert sum("MJCF101" in str(w.message) for w in caught) == [code for code, _ in found].count("MJCF101")
 
 
-def test_every_rule_has_cases_with_it_and_without() -> None:
+def test_every_rule_has_cases_with_and_without_the_finding() -> None:
     for code in OF_MJCF:
         assert {any(code == one for one, _ in case.findings) for case in CASES} == {True, False}

@@ -54,7 +54,9 @@ def cases(draw: st.DrawFn) -> tuple[FloatArray, FloatArray, FloatArray, int]:
 @pytest.mark.slow
 @settings(max_examples=150)
 @given(cases())
-def test_it_is_the_definition_to_the_last_bit(case: tuple[FloatArray, FloatArray, FloatArray, int]) -> None:
+def test_worst_of_each_equals_the_definition_to_the_last_bit(
+    case: tuple[FloatArray, FloatArray, FloatArray, int],
+) -> None:
     ours, theirs, scale, axes = case
     found = worst_of_each(ours, theirs, scale, axes)
     with np.errstate(over="ignore"):
@@ -65,7 +67,7 @@ def test_it_is_the_definition_to_the_last_bit(case: tuple[FloatArray, FloatArray
 
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
-def test_it_is_the_definition_for_results_as_they_come(seed: int) -> None:
+def test_worst_of_each_equals_the_definition_for_typical_results(seed: int) -> None:
     generator = np.random.default_rng(seed)
     ours = generator.standard_normal((33, 3, 6, 8))
     theirs = ours + EPS * generator.standard_normal(ours.shape)
@@ -74,7 +76,7 @@ def test_it_is_the_definition_for_results_as_they_come(seed: int) -> None:
 
 
 @pytest.mark.parametrize("frames", [1, 3])
-def test_a_scale_that_rows_share_in_threes_gives_the_definition(frames: int) -> None:
+def test_worst_of_each_equals_the_definition_for_a_scale_common_to_three_rows(frames: int) -> None:
     generator = np.random.default_rng(2)
     ours = generator.standard_normal((40, frames, 6, 8))
     theirs = ours + EPS * generator.standard_normal(ours.shape)
@@ -89,7 +91,7 @@ def test_a_scale_that_rows_share_in_threes_gives_the_definition(frames: int) -> 
 
 @pytest.mark.parametrize("place", range(16))
 @pytest.mark.parametrize("bad", NEVER)
-def test_what_is_not_finite_disagrees_wherever_it_stands(place: int, bad: float) -> None:
+def test_a_value_that_is_not_finite_disagrees_at_every_place(place: int, bad: float) -> None:
     right = np.ones((5, 1, 4, 4))
     spoiled = right.copy()
     spoiled[3].flat[place] = bad
@@ -99,14 +101,14 @@ def test_what_is_not_finite_disagrees_wherever_it_stands(place: int, bad: float)
     assert worst_of_each(spoiled, spoiled, right, 2)[:, 0].tolist() == expected
 
 
-def test_where_the_scale_is_zero_only_equal_numbers_agree() -> None:
+def test_with_the_scale_zero_only_equal_numbers_agree() -> None:
     ours = np.array([[0.0, 1.0], [0.0, 1.0], [-0.0, 1.0]])
     theirs = np.array([[0.0, 1.0], [5e-324, 1.0], [0.0, 1.0]])
     assert worst_of_each(ours, theirs, np.array([0.0, 1.0]), 1).tolist() == [0.0, np.inf, 0.0]
 
 
 @pytest.mark.parametrize(("shape", "axes"), [((0, 1, 4, 4), 2), ((3, 0, 6), 2), ((3, 2, 6, 0), 2), ((0,), 0)])
-def test_of_nothing_there_is_no_disagreement(shape: tuple[int, ...], axes: int) -> None:
+def test_the_disagreement_of_empty_arrays_is_zero(shape: tuple[int, ...], axes: int) -> None:
     nothing = np.zeros(shape)
     found = worst_of_each(nothing, nothing, nothing, axes)
     assert found.shape == shape[:axes]

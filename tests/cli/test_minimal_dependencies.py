@@ -48,14 +48,14 @@ def bare(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("style", ["terminal", "json", "sarif", "github"])
-def test_the_hooks_command_needs_what_the_hook_installs(style: str) -> None:
+def test_the_command_of_the_hook_needs_only_the_packages_that_the_hook_installs(style: str) -> None:
     assert "entry: urdfkin check\n" in hook()
     assert installed() == ["click"]
     done = bare("check", "--format", style, ROBOT)
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_explain_needs_no_more_and_another_command_names_the_missing_package(tmp_path: Path) -> None:
+def test_explain_needs_only_click_and_another_command_names_the_missing_package(tmp_path: Path) -> None:
     bad = tmp_path / "bad.urdf"
     bad.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
     done = bare("check", str(bad))

@@ -67,7 +67,7 @@ def connect(server: Any, path: str = "/KEY", **headers: str | None) -> int:
     return ask(server, path, **UPGRADE, **headers).status
 
 
-def test_the_viewer_listens_to_this_machine_alone_unless_told_otherwise(server: Any) -> None:
+def test_the_viewer_listens_only_on_the_loopback_address_by_default(server: Any) -> None:
     assert LOOPBACK == "127.0.0.1"
     assert inspect.signature(new_server).parameters["host"].default == "127.0.0.1"
     assert next(option for option in command.params if option.name == "host").default == "127.0.0.1"
@@ -79,7 +79,7 @@ def test_the_viewer_listens_to_this_machine_alone_unless_told_otherwise(server: 
     ]
 
 
-def test_the_page_and_a_connection_are_for_who_holds_the_key(server: Any) -> None:
+def test_the_page_and_a_connection_need_the_key_and_the_own_origin(server: Any) -> None:
     assert ask(server, "/KEY/").status == 200
     assert ask(server, "/KEY/?darkMode").status == 200
     for path in STRANGE_PATHS:
@@ -94,7 +94,7 @@ def test_the_page_and_a_connection_are_for_who_holds_the_key(server: Any) -> Non
         assert connect(server, Origin=origin) == 403, origin
 
 
-def test_a_name_that_someone_points_at_this_machine_is_refused(server: Any) -> None:
+def test_a_request_with_a_foreign_host_name_is_refused(server: Any) -> None:
     port = server.get_port()
     for host in (f"localhost:{port}", f"[::1]:{port}", "127.0.0.1:9000", "127.0.0.2"):
         assert ask(server, "/KEY/", Host=host).status == 200, host
@@ -104,7 +104,7 @@ def test_a_name_that_someone_points_at_this_machine_is_refused(server: Any) -> N
         assert connect(server, Host=strange, Origin=f"http://{strange}") == 403, strange
 
 
-def test_every_answer_forbids_frames_and_the_page_runs_its_own_scripts_alone(server: Any) -> None:
+def test_every_response_forbids_frames_and_the_page_allows_only_its_own_scripts(server: Any) -> None:
     for path in ("/KEY/", "/"):
         answer = ask(server, path)
         assert answer.getheader("X-Frame-Options") == "DENY"
@@ -118,7 +118,9 @@ def test_every_answer_forbids_frames_and_the_page_runs_its_own_scripts_alone(ser
     assert rules["connect-src"].endswith(f" 'self' ws://{LOOPBACK}:{server.get_port()}")
 
 
-def test_no_client_can_have_the_viewer_published(server: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_server_accepts_no_request_to_publish_the_viewer(
+    server: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     opened: list[object] = []
     monkeypatch.setattr("viser._viser.ViserTunnel", lambda *words: opened.append(words))
     heard = {message.__name__ for message in server._websock_server._incoming_handlers}
@@ -128,7 +130,7 @@ def test_no_client_can_have_the_viewer_published(server: Any, monkeypatch: pytes
 
 
 @pytest.mark.slow
-def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_viser_version_that_starts_a_server_differently_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     # A future version of viser could call another function than the one that urdfkin replaces.
     plain = SimpleNamespace(serve=websockets.asyncio.server.serve)
     monkeypatch.setattr(
@@ -146,7 +148,9 @@ def test_a_viser_that_begins_its_server_in_another_way_is_not_used(monkeypatch: 
         socket.create_connection((LOOPBACK, port), timeout=5)
 
 
-def test_a_server_without_the_gate_or_with_other_scripts_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_without_the_request_filter_or_with_other_scripts_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(module, "_SCRIPTS", (("<script data-other=", "{nonce}"),))
     with pytest.raises(UnguardedError, match="the page of viser has unexpected scripts"):
         new_server(port=free_port())
@@ -156,7 +160,7 @@ def test_a_server_without_the_gate_or_with_other_scripts_is_not_used(monkeypatch
         new_server(port=free_port())
 
 
-def test_on_the_whole_network_names_of_others_are_refused_and_an_address_elsewhere_is_an_error() -> None:
+def test_on_all_interfaces_foreign_host_names_are_refused() -> None:
     with pytest.raises(InputError, match=r"--host 192\.0\.2\.1: cannot listen on this address"):
         new_server("192.0.2.1")
     requests = RequestFilter("0.0.0.0", "key")

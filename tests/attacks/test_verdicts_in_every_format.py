@@ -112,7 +112,9 @@ def unescaped(text: str) -> str:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("name", CASES)
-def test_every_form_has_the_verdicts_and_the_reason(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_format_of_a_report_has_the_verdicts_and_the_reason(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     make, verdicts, reason, code, junit = CASES[name]
     document = make(monkeypatch)
     found = outcome_of(document)
@@ -143,7 +145,7 @@ def test_every_form_has_the_verdicts_and_the_reason(name: str, monkeypatch: pyte
 
 
 @pytest.mark.slow
-def test_no_form_of_a_passed_run_has_a_failure() -> None:
+def test_no_format_of_the_report_of_a_passed_run_has_a_failure() -> None:
     document = arms()
     assert (document["verdict"], document["reason"], outcome_of(document).exit_code) == ("verified", None, 0)
     assert [robot["reason"] for robot in document["robots"]] == [None, None]

@@ -28,7 +28,7 @@ from urdfkin.robot.loading import load
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("kinds", ["RRRRRR", "RRPRRR"])
-def test_the_cells_of_any_way_to_write_the_robot_come_back(seed: int, kinds: str) -> None:
+def test_a_table_like_an_equivalent_table_has_the_cells_of_that_table(seed: int, kinds: str) -> None:
     tree = elbow(kinds)
     reference = disguised(dh_table(tree, "tip"), seed)
     table = dh_table(tree, "tip", like=reference)
@@ -47,7 +47,7 @@ def test_the_cells_of_any_way_to_write_the_robot_come_back(seed: int, kinds: str
 @pytest.mark.slow
 @given(trees(min_joints=1, max_joints=6, mimics=False, tame=True), st.integers(0, 99))
 @settings(max_examples=25)
-def test_a_table_like_another_is_the_urdf_to_rounding(tree: KinematicTree, seed: int) -> None:
+def test_a_table_like_another_agrees_with_the_urdf_within_rounding(tree: KinematicTree, seed: int) -> None:
     for convention in CONVENTIONS:
         reference = to_convention(disguised(dh_table(tree, "tip"), seed), convention)
         table = dh_table(tree, "tip", convention=convention, like=reference)
@@ -57,7 +57,7 @@ def test_a_table_like_another_is_the_urdf_to_rounding(tree: KinematicTree, seed:
 
 
 @pytest.mark.parametrize("twist", [1.0, 0.25, 0.05])
-def test_a_slides_zero_may_stand_in_the_d_of_a_joint_that_turns_about_its_axis(twist: float) -> None:
+def test_the_zero_of_a_prismatic_joint_may_be_in_d_of_a_coaxial_revolute_joint(twist: float) -> None:
     rows = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, "P"], [0.0, twist, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
     tree = load(table_from_rows(rows, "standard")).tree
     tip = tree.links[-1]
@@ -72,7 +72,7 @@ def test_a_slides_zero_may_stand_in_the_d_of_a_joint_that_turns_about_its_axis(t
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(references()) - {"kinova"}))
-def test_a_vendors_table_comes_out_in_every_cell(name: str) -> None:
+def test_a_table_like_a_vendors_table_has_every_cell_of_that_table(name: str) -> None:
     data, reference = read_mapping(reference_path(name)), read_table(reference_path(name))
     ends = (reference.tip_frame, reference.base_frame, str(reference.convention))
     table = load(reference.robot).dh(*ends, like=reference, snap=data.get("snap", 0.0))
@@ -82,7 +82,7 @@ def test_a_vendors_table_comes_out_in_every_cell(name: str) -> None:
     np.testing.assert_allclose(table.tool, reference.tool, atol=1e-15)
 
 
-def test_kinovas_sheet_comes_out_with_its_zeros_and_the_urdfs_lengths() -> None:
+def test_a_table_like_kinovas_has_kinovas_zeros_and_the_lengths_of_the_urdf() -> None:
     reference = read_table(reference_path("kinova"))
     table = load("kinova").dh(reference.tip_frame, reference.base_frame, like=reference, snap=1e-9)
     text = export(table, "terminal", units_of("degrees", "millimetres"))
@@ -94,7 +94,7 @@ def test_kinovas_sheet_comes_out_with_its_zeros_and_the_urdfs_lengths() -> None:
     assert table.rows[3].d == pytest.approx(-0.31105, abs=1e-9)
 
 
-def test_another_robots_table_is_refused() -> None:
+def test_a_reference_table_of_a_different_robot_is_refused() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
     with pytest.raises(InputError, match=r"another robot.*compare the table with the URDF by --compare"):
         dh_table(elbow(), "tip", like=other)
@@ -103,7 +103,7 @@ def test_another_robots_table_is_refused() -> None:
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_x_points_so_that_a_or_alpha_is_not_negative(convention: str) -> None:
+def test_the_option_sign_makes_a_or_alpha_nonnegative(convention: str) -> None:
     inner = slice(0, 5) if convention == "standard" else slice(1, 6)
     by_a = dh_table(elbow(), "tip", convention=convention, sign="a").rows[inner]
     by_alpha = dh_table(elbow(), "tip", convention=convention, sign="alpha").rows[inner]
@@ -115,7 +115,7 @@ def test_x_points_so_that_a_or_alpha_is_not_negative(convention: str) -> None:
 
 @pytest.mark.parametrize("sign", ["theta", "a", "alpha"])
 @pytest.mark.parametrize("kinds", ["RRRRRR", "PRRRRR", "RRPRRR", "RRRRRP"])
-def test_craigs_first_row_and_minimal_slides_are_the_robot(kinds: str, sign: str) -> None:
+def test_tables_with_craigs_first_row_and_minimal_prismatic_rows_are_exact(kinds: str, sign: str) -> None:
     tree = elbow(kinds)
     table = dh_table(tree, "tip", convention="modified", first="joint", sign=sign, slide="minimal")
     assert (table.rows[0].d, table.rows[0].theta) == (0.0, 0.0)
@@ -123,7 +123,7 @@ def test_craigs_first_row_and_minimal_slides_are_the_robot(kinds: str, sign: str
     np.testing.assert_allclose(table.placement(q), chain(tree, "tip").placement(q), atol=1e-13)
 
 
-def test_a_minimal_slide_has_no_a_on_the_side_of_its_neighbour() -> None:
+def test_a_minimal_prismatic_row_has_a_equal_to_zero() -> None:
     tree = arm(
         shift(0, 0, 0.3), shift(0.2, 0.1, 0) @ rotation("x", 1.2), shift(0.3, 0.2, 0.1) @ rotation("y", 0.7),
         kinds="RPR", tip=shift(0.1, 0, 0.2),
@@ -134,7 +134,7 @@ def test_a_minimal_slide_has_no_a_on_the_side_of_its_neighbour() -> None:
 
 
 @pytest.mark.slow
-def test_columns_stand_in_the_order_asked_for() -> None:
+def test_columns_are_printed_in_the_requested_order() -> None:
     result = good("dh ur5 --like ur5 --columns alpha,a,d,theta --snap 1e-6 --degrees")
     lines = [line.split() for line in result.text.splitlines()]
     assert ["i", "joint", "alpha", "[deg]", "a", "[m]", "d", "[m]", "theta", "[deg]"] in lines
@@ -147,7 +147,7 @@ def test_columns_stand_in_the_order_asked_for() -> None:
 
 
 @pytest.mark.slow
-def test_a_robot_with_a_published_table_is_told_of_it() -> None:
+def test_a_hint_names_the_published_table_of_a_robot() -> None:
     assert published("xarm7") == [
         "published modified table of this robot: --like xarm7_modified --snap 1e-04",
         "published standard table of this robot: --like xarm7_standard --snap 1e-04",
@@ -159,7 +159,7 @@ def test_a_robot_with_a_published_table_is_told_of_it() -> None:
         assert DHConvention(read_mapping(reference_path(name))["convention"])
 
 
-def test_what_like_decides_is_not_decided_twice() -> None:
+def test_the_option_sign_is_refused_with_the_option_like() -> None:
     assert "--sign does nothing with --like" in refused("dh ur5 --like ur5 --sign a")
 
 
@@ -229,7 +229,9 @@ def arms_with_a_slide(draw: st.DrawFn) -> KinematicTree:
 @pytest.mark.slow
 @given(arms_with_a_slide(), st.integers(0, 99))
 @settings(max_examples=100)
-def test_another_zero_of_one_slide_is_no_difference_to_rounding(tree: KinematicTree, seed: int) -> None:
+def test_a_shifted_zero_of_one_prismatic_joint_is_no_difference_within_rounding(
+    tree: KinematicTree, seed: int
+) -> None:
     reference = disguised(dh_table(tree, "tip"), seed)
     table = dh_table(tree, "tip", like=reference)
     assert is_the_urdf(table, tree)
@@ -239,7 +241,9 @@ def test_another_zero_of_one_slide_is_no_difference_to_rounding(tree: KinematicT
 @pytest.mark.slow
 @given(arms_with_slides(), st.integers(0, 99), *map(st.sampled_from, (CONVENTIONS, CONVENTIONS)))
 @settings(max_examples=100)
-def test_other_zeros_are_no_difference_in_any_convention(tree: Any, seed: int, there: str, here: str) -> None:
+def test_shifted_zeros_of_prismatic_joints_are_no_difference_in_any_convention(
+    tree: Any, seed: int, there: str, here: str
+) -> None:
     reference = disguised(dh_table(tree, "tip"), seed)
     table = dh_table(tree, "tip", convention=here, like=to_convention(reference, there))
     assert table.convention == here
@@ -264,7 +268,9 @@ def along_slides(reference: DHTable) -> list[int]:
 @pytest.mark.slow
 @given(arms_with_slides(inner=True), st.integers(0, 99), st.floats(-0.5, 0.5))
 @settings(max_examples=50)
-def test_a_length_along_a_slide_may_stand_in_either_d(tree: KinematicTree, seed: int, moved: float) -> None:
+def test_a_length_along_a_prismatic_joint_may_be_in_d_of_either_row(
+    tree: KinematicTree, seed: int, moved: float
+) -> None:
     reference = disguised(dh_table(tree, "tip"), seed)
     assume(beside := along_slides(reference))
     i = beside[seed % len(beside)]
@@ -277,7 +283,9 @@ def test_a_length_along_a_slide_may_stand_in_either_d(tree: KinematicTree, seed:
 @pytest.mark.slow
 @given(arms_with_slides(inner=True), st.integers(0, 99), st.data())
 @settings(max_examples=60)
-def test_where_there_is_no_difference_the_robot_is_the_same(tree: Any, seed: int, data: Any) -> None:
+def test_a_changed_cell_without_a_difference_leaves_the_robot_the_same(
+    tree: Any, seed: int, data: Any
+) -> None:
     reference = disguised(dh_table(tree, "tip"), seed)
     cells = sorted(differences(reference, reference))
     i, cell = data.draw(st.sampled_from([one for one in cells if one[1] != "beta"]))

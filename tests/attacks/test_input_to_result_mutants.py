@@ -112,7 +112,7 @@ def replacing(before: str, after: str) -> Callable[[str], ast.Module]:
 
 @pytest.mark.long
 @pytest.mark.parametrize(("module", "before", "after"), FRAGMENTS)
-def test_a_slip_on_the_way_is_caught(
+def test_each_listed_mutant_between_input_and_result_is_detected(
     right: dict[str, FloatArray], module: str, before: str, after: str
 ) -> None:
     assert attempt(module, replacing(before, after), right) == "caught"
@@ -120,7 +120,7 @@ def test_a_slip_on_the_way_is_caught(
 
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(3))
-def test_of_any_slips_none_is_verified_and_none_blinds_the_check(
+def test_no_random_mutant_gives_a_wrong_verified_result_or_disables_the_check(
     right: dict[str, FloatArray], seed: int
 ) -> None:
     # All of them: python -m tests.attacks.slips_between

@@ -14,7 +14,7 @@ def _source(slip: Named) -> str:
     return slip.file.read_text(encoding="utf-8")
 
 
-def test_every_slip_can_still_be_made_and_its_test_is_there() -> None:
+def test_every_listed_mutant_can_be_made_and_names_an_existing_test() -> None:
     assert len({slip.claim for slip in SLIPS}) == len(SLIPS)
     for slip in SLIPS:
         rewritten(_source(slip), slip.before, slip.after)
@@ -24,12 +24,12 @@ def test_every_slip_can_still_be_made_and_its_test_is_there() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("slip", SLIPS, ids=[slip.claim.replace(" ", "-") for slip in SLIPS])
-def test_its_test_fails(slip: Named) -> None:
+def test_the_named_test_of_each_listed_mutant_fails(slip: Named) -> None:
     outcome = evaluate_named(slip, timeout=300.0)
     assert outcome.word == "noticed", outcome.by
 
 
-def test_a_text_that_does_not_stand_there_once_is_no_slip() -> None:
+def test_a_mutant_of_a_text_that_does_not_occur_exactly_once_is_an_error() -> None:
     for text in ("x = 1\nx = 1\n", "y = 2\n"):
         with pytest.raises(ValueError, match=r"found \d times"):
             rewritten(text, "x = 1", "x = 2")

@@ -82,12 +82,14 @@ def test_the_recursion_refuses_a_new_reference_frame(plan: Any, reference: Refer
 
 
 @pytest.mark.parametrize("name", ["velocity", "jacobian", "jacobian rate", "hessian", "acceleration"])
-def test_the_fast_functions_refuse_a_new_reference_frame(plan: Any, reference: Reference, name: str) -> None:
+def test_functions_for_single_configurations_refuse_a_new_reference_frame(
+    plan: Any, reference: Reference, name: str
+) -> None:
     with pytest.raises(REFUSED):
         single(name.replace(" ", "_"), plan, reference)
 
 
-def test_the_split_of_an_acceleration_refuses_a_new_reference_frame(robot: urdfkin.Robot) -> None:
+def test_the_breakdown_of_an_acceleration_refuses_a_new_reference_frame(robot: urdfkin.Robot) -> None:
     with pytest.raises(REFUSED):
         acceleration_breakdown(robot.tree, 3, X, X, X, NEW["bare"])
 
@@ -129,7 +131,7 @@ def test_the_oracles_refuse_a_new_reference_frame(
         row.ask(model, QueryBatch([frame], (X, X, X), reference, joints=joints))
 
 
-def test_the_kernels_and_the_command_line_know_the_members_of_the_enumeration() -> None:
+def test_kernels_and_command_line_support_every_reference_frame() -> None:
     assert dict(IN_KERNELS) == {reference: reference.value for reference in Reference}
     assert tuple(reference.name.lower() for reference in Reference) == REFERENCES
     assert set(REPRESENTATIONS) == {"rpy", QUATERNION, *SEQUENCES}

@@ -95,7 +95,7 @@ OPERATIONS: dict[str, Made] = {
 
 
 @pytest.mark.parametrize("op", OPERATIONS)
-def test_the_error_of_an_operation_is_within_the_bound_and_not_without_its_term(
+def test_the_bound_of_an_operation_holds_and_fails_without_the_term_of_the_operation(
     op: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert (0.9 if op in ("sin", "cos") else 0.2) < worst(OPERATIONS[op]) <= 1.0
@@ -125,7 +125,7 @@ PASSED: dict[tuple[str, int], Made] = {
 
 
 @pytest.mark.parametrize(("op", "operand"), PASSED)
-def test_an_error_that_an_operation_passes_on_is_in_the_bound(
+def test_the_bound_includes_the_propagated_error_of_each_operand(
     op: str, operand: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made, right = PASSED[op, operand], single._SLOPES[op]
@@ -141,21 +141,23 @@ def test_an_error_that_an_operation_passes_on_is_in_the_bound(
     assert worst(made) > 1.0
 
 
-def test_a_product_passes_on_the_error_of_its_first_operand_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_bound_of_a_product_includes_the_propagated_error_of_the_first_operand(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     made: Made = lambda g, x, y, z: inexact(x, y) * (z * z)  # noqa: E731
     assert worst(made) <= 1.0
     monkeypatch.setitem(single._SLOPES, "*", lambda value, x, y: (0.0 * y, x))
     assert worst(made) > 1.0
 
 
-def test_numbers_near_zero_have_an_error_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_bound_includes_the_underflow_error_of_numbers_near_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     made: Made = lambda g, x, y, z: x * y  # noqa: E731
     assert 0.0 < worst(made, 2.0**-68) <= 1.0
     monkeypatch.setattr(single, "SINGLE_SMALLEST", 0.0)
     assert worst(made, 2.0**-68) > 1.0
 
 
-def test_a_number_beyond_the_largest_has_no_bound() -> None:
+def test_a_number_that_overflows_in_single_precision_has_an_infinite_bound() -> None:
     of = function(lambda g, x, y, z: x * y)
     assert np.all(np.isinf(single.single_bounds(of, (inputs(2.0**65),))))
     assert np.all(np.isfinite(single.single_bounds(of, (inputs(2.0**60),))))
@@ -173,7 +175,9 @@ def shares(text: str, folder: Path) -> dict[tuple[str, str], float]:
     return found
 
 
-def test_a_file_needs_the_rounding_of_its_constants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_bounds_of_a_file_include_the_rounding_of_constants(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     text = _FIXED.format("0.1 0 0", "0 0 0")
     assert shares(text, tmp_path)["placement", "float32"] <= 1.0
     monkeypatch.setattr(single, "_constant", lambda x: 0.0)
@@ -181,7 +185,9 @@ def test_a_file_needs_the_rounding_of_its_constants(tmp_path: Path, monkeypatch:
     assert shares(text, tmp_path)["placement", "float64"] <= 1.0
 
 
-def test_a_file_needs_errors_of_its_double_constants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_bounds_of_a_file_include_the_errors_of_constants_in_double_precision(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     text = _FIXED.format("0 0 0", "1.5707963267948966 0 0")  # its cosine, 6e-17, is 0 in the code
     assert shares(text, tmp_path)["placement", "float32"] <= 1.0
     monkeypatch.setattr(proof, "EPS", 0.0)
@@ -203,7 +209,7 @@ _TURNED = urdfs.robot(
 
 @pytest.mark.parametrize("seed", range(1, 4))
 @pytest.mark.parametrize("large", ["angle", "multiplier", "offset"])
-def test_a_file_of_large_angles_and_rules_needs_the_rounding_of_their_decimals(
+def test_the_bounds_of_a_file_include_the_conversion_errors_of_large_angles_and_mimic_rules(
     large: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     usual = {"angle": 0.1, "multiplier": 2.0, "offset": 0.3}
@@ -226,7 +232,7 @@ _CANCELLED = urdfs.robot(
 
 
 @pytest.mark.parametrize("before", ["6732.655", "589262.492", "58731509.822"])
-def test_a_file_of_offsets_that_cancel_needs_the_size_of_each_offset(
+def test_the_bounds_of_a_file_include_the_size_of_each_cancelling_offset(
     before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = loaded(_CANCELLED.format(before=before, offset=Decimal(before) * Decimal("37.123")))
@@ -240,7 +246,7 @@ def test_a_file_of_offsets_that_cancel_needs_the_size_of_each_offset(
 
 @given(st.floats(1e-300, 1e300))
 @example(3.9268392647265107)
-def test_a_bound_is_rounded_up_by_two_millionths_or_down_by_ten_at_most(x: float) -> None:
+def test_a_printed_bound_is_rounded_up_by_at_most_2e_6_or_down_by_at_most_1e_5(x: float) -> None:
     assert x <= float(proof._rounded_up(x)) <= x * (1.0 + 2e-6)
     assert x * (1.0 - 1e-5) <= float(proof._rounded_down(x)) <= x
     assert proof._rounded_up(np.inf) == proof._rounded_down(np.nan) == "0.0"
@@ -265,7 +271,9 @@ def test_a_file_states_its_bounds_and_what_single_precision_cannot_represent(tmp
 @pytest.mark.parametrize(
     "name", ["panda", "sizes", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle", "floating_root"]
 )
-def test_the_bound_holds_in_many_configurations_and_is_not_much_larger(name: str, tmp_path: Path) -> None:
+def test_bounds_in_single_precision_hold_and_are_at_most_20_times_the_largest_error(
+    name: str, tmp_path: Path
+) -> None:
     robot = robot_of(name)
     written = code(robot, quantities=("placement", "jacobian", "jacobian_rate", "acceleration"))
     own = module_of(file(written, "array", tmp_path))

@@ -97,7 +97,7 @@ BATCHES = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("shape", "base"), BATCHES)
 @pytest.mark.usefixtures("lies")
-def test_the_worst_sample_is_named_in_whatever_part_it_stands(
+def test_the_error_names_the_worst_sample_in_any_part_of_the_batch(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], base: tuple[int, ...] | None
 ) -> None:
     q, v, a = batch(fresh, shape)
@@ -122,7 +122,7 @@ def test_the_worst_sample_is_named_in_whatever_part_it_stands(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("shape", "base"), BATCHES)
-def test_the_certificate_does_not_depend_on_the_parts(
+def test_the_certificate_does_not_depend_on_the_division_into_parts(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], base: tuple[int, ...] | None
 ) -> None:
     found = list[Certificate]()
@@ -144,7 +144,7 @@ def test_the_certificate_does_not_depend_on_the_parts(
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("mimic", [True, False])
 @pytest.mark.parametrize("frames", [FRAMES[:1], FRAMES])
-def test_pinocchios_jacobians_in_blocks_have_the_bits_of_those_at_once(
+def test_pinocchios_jacobians_are_equal_in_blocks_and_in_one_call(
     monkeypatch: pytest.MonkeyPatch, size: int, mimic: bool, frames: tuple[str, ...]
 ) -> None:
     robot = urdfkin.load("panda", mimic=mimic)
@@ -159,7 +159,7 @@ def test_pinocchios_jacobians_in_blocks_have_the_bits_of_those_at_once(
         assert len(blocks) == 1 or all(block.size <= max(size, at_once[0].size) for block in blocks)
 
 
-def test_a_robot_without_moving_joints_has_jacobians_without_columns_in_blocks_too() -> None:
+def test_blocks_of_jacobians_of_a_robot_without_moving_joints_have_no_columns() -> None:
     robot = urdfkin.load('<robot name="r"><link name="a"/></robot>')
     (block,) = robot.verifier.oracle().jacobian_blocks(QueryBatch(("a",), (np.zeros((40_000, 0)),)))
     assert block.shape == (40_000, 1, 6, 0)
@@ -170,7 +170,7 @@ def test_a_robot_without_moving_joints_has_jacobians_without_columns_in_blocks_t
 @pytest.mark.slow
 @pytest.mark.parametrize("base", [None, (), (250,)])
 @pytest.mark.parametrize("size", SIZES)
-def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
+def test_with_sample_a_part_of_a_large_batch_is_checked_and_the_rest_counted_as_unchecked(
     fresh: Robot, monkeypatch: pytest.MonkeyPatch, size: int, base: tuple[int, ...] | None
 ) -> None:
     monkeypatch.setattr(verifier, "_PART_SIZE", size)
@@ -189,7 +189,7 @@ def test_of_a_large_batch_a_sample_is_checked_and_the_rest_stated(
 
 
 @pytest.mark.parametrize("n", [0, 1, 99, SAMPLE])
-def test_a_sample_of_no_more_than_its_size_is_everything(fresh: Robot, n: int) -> None:
+def test_with_sample_a_small_batch_is_checked_completely(fresh: Robot, n: int) -> None:
     fresh.jacobian(fresh.sample(n, 1), "panda_hand", verify="sample")
     certificate = fresh.certificate()
     assert [(line.checked, line.unchecked) for line in certificate.lines] == [(n, 0)] * (n > 0)
@@ -199,7 +199,7 @@ def test_a_sample_of_no_more_than_its_size_is_everything(fresh: Robot, n: int) -
 
 @pytest.mark.parametrize("n", [101, 1000])
 @pytest.mark.parametrize("numbers", [1, 6, 48, 10**7])
-def test_the_sample_is_always_the_same_each_once_and_from_all_of_the_batch(n: int, numbers: int) -> None:
+def test_the_checked_sample_is_deterministic_distinct_and_spread_over_the_batch(n: int, numbers: int) -> None:
     drawn, again = (
         [i for part in parts("sample", n, numbers) for i in np.arange(n)[part].tolist()] for _ in range(2)
     )
@@ -211,7 +211,7 @@ def test_the_sample_is_always_the_same_each_once_and_from_all_of_the_batch(n: in
 
 @pytest.mark.parametrize("numbers", [0, 1, 48, 10**7])
 @pytest.mark.parametrize("n", [0, 1, 5000])
-def test_the_parts_of_everything_are_everything_once(n: int, numbers: int) -> None:
+def test_the_parts_of_a_complete_check_contain_each_configuration_once(n: int, numbers: int) -> None:
     choices: tuple[Verify, ...] = (True, "sample") if n <= SAMPLE else (True,)
     for verify in choices:
         indices = [i for part in parts(verify, n, numbers) for i in np.arange(n)[part].tolist()]
@@ -219,7 +219,7 @@ def test_the_parts_of_everything_are_everything_once(n: int, numbers: int) -> No
 
 
 @pytest.mark.usefixtures("lies")
-def test_a_lie_in_the_sample_is_found_and_one_outside_is_not(fresh: Robot) -> None:
+def test_an_error_in_the_checked_sample_is_detected_and_an_error_outside_is_not(fresh: Robot) -> None:
     drawn = np.concatenate([np.arange(250)[part] for part in parts("sample", 250, 48)])
     inside, outside = int(drawn[57]), int(np.setdiff1d(np.arange(250), drawn)[3])
     q, v, a = batch(fresh, (250,))
@@ -236,7 +236,7 @@ def test_a_lie_in_the_sample_is_found_and_one_outside_is_not(fresh: Robot) -> No
             assert caught.value.index == tuple(np.unravel_index(inside, shape))
 
 
-def test_a_robot_may_be_loaded_to_check_samples_and_a_call_ask_for_more_or_less() -> None:
+def test_a_call_can_override_the_option_verify_of_the_robot() -> None:
     robot = urdfkin.load("ur5", verify="sample")
     q = robot.sample(103, 1)
     robot.placement(q, "tool0")
@@ -252,7 +252,7 @@ def test_a_robot_may_be_loaded_to_check_samples_and_a_call_ask_for_more_or_less(
 
 
 @pytest.mark.parametrize("verify", ["sampled", "", "True", 1, 0, None, np.True_, np.ones(2), ["sample"]])
-def test_what_is_no_choice_is_refused(fresh: Robot, verify: Any) -> None:
+def test_an_invalid_value_of_verify_is_refused(fresh: Robot, verify: Any) -> None:
     refused = pytest.raises(InputError, match='verify must be True, False or "sample"')
     with refused:
         urdfkin.load("ur5", verify=verify)

@@ -42,7 +42,7 @@ def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_quantity_of_every_frame_agrees(name: str) -> None:
+def test_every_quantity_of_every_frame_agrees_with_pinocchio(name: str) -> None:
     text = urdf_of(name)
     report = urdfkin.validate(text, samples=5).robots[0]
     assert_verified(report, loaded(text), samples=5 + 3)
@@ -50,7 +50,7 @@ def test_every_quantity_of_every_frame_agrees(name: str) -> None:
 
 @pytest.mark.parametrize("root_joint", ["planar", "floating"])
 @pytest.mark.parametrize("name", ["mimic_hand_40", "tree_3", "single_link", "one_joint", "fixed_only"])
-def test_hung_from_a_root_joint_they_agree_as_well(name: str, root_joint: str) -> None:
+def test_unusual_robots_with_a_root_joint_agree_with_pinocchio(name: str, root_joint: str) -> None:
     text = urdf_of(name)
     report = urdfkin.validate(text, samples=5, root_joint=root_joint).robots[0]
     assert_verified(report, loaded(text, root_joint=root_joint), samples=5 + 3)
@@ -58,7 +58,7 @@ def test_hung_from_a_root_joint_they_agree_as_well(name: str, root_joint: str) -
 
 @pytest.mark.parametrize("reference", list(Reference))
 @pytest.mark.parametrize("name", NAMES)
-def test_a_robots_calls_give_what_pinocchio_gives_when_asked_directly(
+def test_results_of_an_unusual_robot_agree_with_direct_calls_of_pinocchio(
     name: str, reference: Reference
 ) -> None:
     robot = loaded(urdf_of(name), verify=False)
@@ -67,7 +67,7 @@ def test_a_robots_calls_give_what_pinocchio_gives_when_asked_directly(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_call_is_checked_and_the_certificate_counts_it(name: str) -> None:
+def test_the_certificate_counts_every_checked_call(name: str) -> None:
     robot = loaded(urdf_of(name))
     q, v, a = rates(robot, 2, 4)
     frame = robot.tip_frame
@@ -86,12 +86,12 @@ def test_every_call_is_checked_and_the_certificate_counts_it(name: str) -> None:
 
 @settings(max_examples=50)
 @given(st.integers(1000, 10**9))
-def test_any_tree_agrees(seed: int) -> None:
+def test_any_tree_agrees_with_pinocchio(seed: int) -> None:
     text = random_tree(seed)
     assert_verified(urdfkin.validate(text, samples=10, seed=seed).robots[0], loaded(text), samples=13)
 
 
-def test_a_name_of_two_places_must_be_told_apart_and_then_gives_both() -> None:
+def test_a_name_of_two_different_frames_needs_the_prefix_link_or_joint() -> None:
     robot = loaded(urdf_of("same_names"))
     q = robot.sample(1, 5)[0]
     with pytest.raises(urdfkin.InputError, match=r"write 'link:elbow' or 'joint:elbow'"):
@@ -101,7 +101,7 @@ def test_a_name_of_two_places_must_be_told_apart_and_then_gives_both() -> None:
     assert (robot.placement(q, "wrist") == robot.placement(q, "joint:wrist")).all()
 
 
-def test_a_prismatic_axis_of_length_two_slides_no_further_than_its_coordinate_says() -> None:
+def test_the_length_of_a_prismatic_axis_does_not_scale_the_displacement() -> None:
     robot = loaded(urdf_of("default_everything"))
     q = np.zeros(4)
     slide = robot.joint_names.index("joint_2")
