@@ -3,7 +3,7 @@
     python scripts/mutate.py --sample 40 --seed 1          forty random mutants of the whole package
     python scripts/mutate.py validation dh/snapping        all mutants of two parts
     python scripts/mutate.py --only urdfkin.validation.error_stats:17
-    python scripts/mutate.py --named                       the mutants of tests/attacks/named_slips.toml
+    python scripts/mutate.py --named                       the mutants of tests/attacks/named_mutants.toml
 
 The script runs the quick tests near the mutated file. With --slow it then runs the slow tests near this file,
 and with --whole all other quick tests. The script prints every undetected mutant, and skips the mutants
@@ -64,7 +64,7 @@ def module_of(path: Path) -> str:
 
 @cache
 def _texts() -> dict[Path, str]:
-    own = ("test_mutate", "test_named_slips")  # these tests make their own mutants
+    own = ("test_mutate", "test_named_mutants")  # these tests make their own mutants
     tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in own)
     return {path: path.read_text(encoding="utf-8") for path in tests}
 
@@ -102,8 +102,8 @@ class Named:
         return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 
 
-def named_slips() -> list[Named]:
-    text = (TESTS / "attacks" / "named_slips.toml").read_text(encoding="utf-8")
+def named_mutants() -> list[Named]:
+    text = (TESTS / "attacks" / "named_mutants.toml").read_text(encoding="utf-8")
     return [Named(**slip) for slip in tomllib.loads(text)["slip"]]
 
 
@@ -232,7 +232,7 @@ def main() -> int:
         parser.error(str(error))
     asks: list[Callable[[], Outcome]]
     if options.named:
-        named = [slip for slip in named_slips() if not options.parts or slip.module in modules]
+        named = [slip for slip in named_mutants() if not options.parts or slip.module in modules]
         asks = [partial(evaluate_named, slip, timeout=options.timeout) for slip in named]
     else:
         chosen = [mutant for mutant in mutants(options.parts) if options.only in (None, mutant.name)]

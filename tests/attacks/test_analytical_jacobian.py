@@ -13,7 +13,7 @@ import pytest
 
 import urdfkin
 from scripts.mutating.operators import function_at, mutated, slips
-from tests.attacks.slips_between import make
+from tests.attacks.input_to_result_mutants import make
 from urdfkin.errors import RepresentationSingularityError
 from urdfkin.kinematics import bodies as module
 from urdfkin.kinematics import rotation

@@ -1,16 +1,12 @@
-"""No slip between a user's numbers and the result is verified, and none blinds the check."""
-
-import ast
-from collections.abc import Callable
+"""No mutant between input and result gives a wrong verified result, and no mutant disables the check."""
 
 import pytest
 
-from scripts.mutating.operators import mutated
-from tests.attacks.slips_between import MODULES, attempt, slips_of, truth
+from scripts.mutating.operators import mutated, rewritten
+from tests.attacks.input_to_result_mutants import MODULES, attempt, slips_of, source_of, truth
 from urdfkin.model.tree import FloatArray
 
-#: Slips that change no number by itself but which way a thing is turned, ordered or shared: module, text that
-#: stands there once, what to write instead.
+#: Mutants that change an order, a direction or an assignment: the module, its code, and the replacement.
 FRAGMENTS = [
     # the base's motion
     ("model.base_motion", "self._rotation.reshape(", "np.swapaxes(self._rotation, -1, -2).reshape("),
@@ -20,7 +16,8 @@ FRAGMENTS = [
     ("model.base_motion", "  self.acceleration[..., 3:],\n", "  -self.acceleration[..., 3:],\n"),
     ("model.base_motion", "np.broadcast_to(part, (*shape, part.shape[-1]))",
      "np.broadcast_to(part, (*shape, part.shape[-1]))[::-1]"),
-    ("kinematics.rotation", "return nearest", "return np.swapaxes(nearest, -1, -2)"),
+    ("kinematics.rotation", "return M - M @ (0.5 * defect)",
+     "return np.swapaxes(M - M @ (0.5 * defect), -1, -2)"),
     ("kinematics.rotation", "M - M @ (0.5 * defect)", "M + M @ (0.5 * defect)"),
     # a call's inputs and its results
     ("verify.call", "np.ascontiguousarray(array.reshape(self.n, width))",
@@ -66,14 +63,15 @@ FRAGMENTS = [
      "return bool(R[axis, axis] > 0.9)"),
     ("compiled.plan", "op = Op.CARRY_X + along[0] if len(along) == 1 else Op.CARRY",
      "op = Op.CARRY_X + along[0]"),
-    ("compiled.plan", "how = int(self.plan.columns[c, Column.TURNS]) + 2 * (to != c)",
-     "how = int(self.plan.columns[c, Column.TURNS])"),
+    ("compiled.plan", "how = int(self.plan.columns[c, ColumnField.TURNS]) + 2 * (to != c)",
+     "how = int(self.plan.columns[c, ColumnField.TURNS])"),
     ("compiled.plan", "int(self.rules[i] > 0)", "0"),
     ("compiled.plan", "turned(joint).T, 0.0)", "turned(joint), 0.0)"),
     ("compiled.plan", "anchors[joint.parent].T @ joint.T_parent_joint @ turned(joint)",
      "joint.T_parent_joint @ anchors[joint.parent].T @ turned(joint)"),
     ("compiled.plan", "else (rule.multiplier, rule.offset)", "else (rule.multiplier, -rule.offset)"),
-    ("compiled.plan", "steps[row, Step.V] = tree.v_index[i]", "steps[row, Step.V] = tree.v_index[i] - 1"),
+    ("compiled.plan", "steps[row, StepField.V] = tree.v_index[i]",
+     "steps[row, StepField.V] = tree.v_index[i] - 1"),
     ("compiled.plan", "order = sorted(range(len(links)), key=lambda place: anchors[links[place]].step)",
      "order = sorted(range(len(links)), key=lambda place: -anchors[links[place]].step)"),
     ("kinematics.rotation", "return np.stack([*columns, axis]", "return -np.stack([*columns, axis]"),
@@ -102,12 +100,9 @@ def right() -> dict[str, FloatArray]:
     return truth()
 
 
-def replacing(before: str, after: str) -> Callable[[str], ast.Module]:
-    def change(source: str) -> ast.Module:
-        assert source.count(before) == 1, f"{source.count(before)} times: {before}"
-        return ast.parse(source.replace(before, after))
-
-    return change
+def test_the_code_of_each_listed_mutant_exists_once_in_its_module() -> None:
+    for module, before, after in FRAGMENTS:
+        rewritten(source_of(module), before, after)
 
 
 @pytest.mark.long
@@ -115,7 +110,7 @@ def replacing(before: str, after: str) -> Callable[[str], ast.Module]:
 def test_each_listed_mutant_between_input_and_result_is_detected(
     right: dict[str, FloatArray], module: str, before: str, after: str
 ) -> None:
-    assert attempt(module, replacing(before, after), right) == "caught"
+    assert attempt(module, lambda source: rewritten(source, before, after), right) == "caught"
 
 
 @pytest.mark.long
@@ -123,7 +118,7 @@ def test_each_listed_mutant_between_input_and_result_is_detected(
 def test_no_random_mutant_gives_a_wrong_verified_result_or_disables_the_check(
     right: dict[str, FloatArray], seed: int
 ) -> None:
-    # All of them: python -m tests.attacks.slips_between
+    # All of them: python -m tests.attacks.input_to_result_mutants
     found = {
         (module, number): attempt(module, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
         for module, number in slips_of(MODULES, 40, seed)

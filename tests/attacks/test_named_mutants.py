@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from scripts.mutate import ROOT, Named, evaluate_named, named_slips
+from scripts.mutate import ROOT, Named, evaluate_named, named_mutants
 from scripts.mutating.operators import rewritten
 
-SLIPS = named_slips()
+SLIPS = named_mutants()
 
 
 def _source(slip: Named) -> str:

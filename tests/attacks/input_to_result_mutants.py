@@ -1,17 +1,16 @@
-"""Run as a program: slips between what a user gives and what is handed out, and what each leads to.
+"""Make mutants of the code between a user's input and the result, and report the outcome of each mutant.
 
-    python -m tests.attacks.slips_between [--sample N --seed S] [MODULE...]
+    python -m tests.attacks.input_to_result_mutants [--sample N --seed S] [MODULE...]
 
-Each slip is one of `scripts.mutating.operators`, made in a process of its own in a function that has been
-imported already. That process then loads a robot that has everything (a follower of a follower, a planar and
-a floating joint, names that look like ours), and asks for every quantity in many ways. Printed is JSON: for
-each slip what became of it:
+Each mutant is one of `scripts.mutating.operators`. It changes an imported function in a new process. The
+process then loads a robot with all kinds of joints, chains of mimic joints and unusual names, and computes
+every quantity in many ways. The program prints the outcomes as JSON:
 
-    caught    a call raised VerificationError or OracleError, or Pinocchio was found to read another robot
-    refused   a call raised something else
-    same      every result is the right one
-    WRONG     a result is wrong, and the certificate says that it was verified
-    BLIND     of a robot that urdfkin misreads by a billionth, a result is handed out as verified
+    caught    a call raised VerificationError or OracleError, or Pinocchio reads another robot
+    refused   a call raised another error
+    same      every result is right
+    WRONG     a result is wrong, and the certificate states that it was verified
+    BLIND     urdfkin misreads a robot by a billionth, and a result is verified all the same
 """
 
 import argparse
@@ -45,7 +44,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
 
-#: Where a user's numbers pass on their way to the result, and on their way to Pinocchio.
+#: Modules between a user's input and the result, and between the input and Pinocchio.
 MODULES = (
     "verify.oracle", "verify.call", "model.chain", "model.configuration", "model.mimic",
     "dh.convert", "model.configuration_like",
@@ -57,11 +56,11 @@ MODULES = (
     "verify.quantities", "verify.tables", "verify.verifier",
 )  # fmt: skip
 
-#: A result is the right one when it is off by less than this share of the largest number.
+#: Maximum error of a right result, as a fraction of its largest number.
 TOLERANCE = 1e-9
-#: Results that are checked without an entry in the robot's ledger.
+#: Results that are checked, but not counted in the robot's certificate.
 UNCOUNTED = ("table", "robot of a table")
-#: Longest that a process may take, seconds.
+#: Time limit of a process, seconds.
 _PATIENCE = 60
 
 
@@ -98,7 +97,7 @@ COORDINATES = (
 
 
 def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
-    """Every way to be handed a result, by name; the same inputs each time."""
+    """Yield the name and the computation of each result, always with the same inputs."""
     generator = np.random.default_rng(3)
     q = generator.uniform(-1.0, 1.4, (2, 1, 13))
     q[..., 6:10] *= (1.0 + 4e-7) / np.linalg.norm(q[..., 6:10], axis=-1, keepdims=True)
@@ -157,7 +156,7 @@ def _of_table(q: FloatArray) -> FloatArray:
 
 
 def misread() -> Robot:
-    """The robot, each of its numbers off by a billionth in urdfkin's own reading, but not in Pinocchio's."""
+    """Return the robot with numbers that are wrong by a billionth for urdfkin, but not for Pinocchio."""
     tree = tree_of(
         re.sub(r'(?<=[" ])-?[0-9.]+(?=[" ])', lambda x: repr(float(x[0]) * (1 + 1e-9)), URDF).encode()
     )
@@ -165,7 +164,7 @@ def misread() -> Robot:
 
 
 def blind() -> list[str]:
-    """The ways by which the misread robot's results are handed out as verified now."""
+    """Return the names of the results of the misread robot that are verified by mistake."""
     warnings.simplefilter("ignore")
     found = []
     for name, compute in results():
@@ -182,7 +181,7 @@ def blind() -> list[str]:
 
 
 def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatArray]]:
-    """What becomes of a robot that is read and asked now."""
+    """Return the outcome of loading the robot and computing all results."""
     warnings.simplefilter("ignore")
     found: dict[str, FloatArray] = {}
     words, wrong = set[str](), list[str]()
@@ -226,7 +225,7 @@ def _codes(code: types.CodeType) -> Iterator[tuple[str, types.CodeType]]:
 
 
 def _functions(module: types.ModuleType) -> Iterator[types.FunctionType]:
-    """The functions and methods that a module defines, wrapped ones too."""
+    """Yield the functions and methods that a module defines, also wrapped ones."""
     for value in list(vars(module).values()):
         members = list(vars(value).values()) if inspect.isclass(value) else [value]
         for member in members:
@@ -249,7 +248,7 @@ def _unwrapped(member: Any) -> Iterator[types.FunctionType]:
 
 
 def make(module: types.ModuleType, tree: ast.Module) -> bool:
-    """Give the module's functions the code of a changed source; whether any has changed."""
+    """Replace the code of a module's functions; return whether any function has changed."""
     codes = dict(_codes(compile(tree, str(module.__file__), "exec")))
     changed = False
     for function in _functions(module):
@@ -263,9 +262,9 @@ def make(module: types.ModuleType, tree: ast.Module) -> bool:
 
 
 def attempt(name: str, change: Callable[[str], ast.Module], right: dict[str, FloatArray]) -> str:
-    """What a process in which a module's source was changed says; `unreached` where it cannot be made."""
+    """Return the outcome of a changed module in a new process; `unreached` if the change is not possible."""
     module = importlib.import_module(f"urdfkin.{name}")
-    tree = change(_source(name))
+    tree = change(source_of(name))
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
@@ -288,30 +287,26 @@ def attempt(name: str, change: Callable[[str], ast.Module], right: dict[str, Flo
     return answer or "refused: died"
 
 
-def _source(name: str) -> str:
+def source_of(name: str) -> str:
     return Path(str(importlib.import_module(f"urdfkin.{name}").__file__)).read_text(encoding="utf-8")
 
 
 def truth() -> dict[str, FloatArray]:
-    """What every way hands out without any slip.
-
-    Raises:
-        RuntimeError: then already something is refused, or a misread robot is not noticed.
-    """
+    """Return all results without a mutant; raise RuntimeError if one is refused or not checked."""
     (word, found), unseen = outcome(None), blind()
     if word != "same" or unseen:
-        raise RuntimeError(f"without any slip: {word}; not noticed: {unseen}")
+        raise RuntimeError(f"without a mutant: {word}; not detected: {unseen}")
     return found
 
 
 def slips_of(names: Sequence[str], sample: int | None, seed: int) -> list[tuple[str, int]]:
-    """Slips as (module, number): all of some modules, or a sample."""
-    places = [(name, i) for name in names for i in range(len(slips(ast.parse(_source(name)))))]
+    """Return mutants as (module, number): all mutants of some modules, or a sample."""
+    places = [(name, i) for name in names for i in range(len(slips(ast.parse(source_of(name)))))]
     return places if sample is None else random.Random(seed).sample(places, min(sample, len(places)))
 
 
 def main() -> None:
-    """Print what became of each slip, or of a sample."""
+    """Print the outcome of each mutant, or of a sample."""
     arguments = argparse.ArgumentParser()
     arguments.add_argument("modules", nargs="*")
     arguments.add_argument("--sample", type=int)
@@ -319,7 +314,7 @@ def main() -> None:
     asked = arguments.parse_args()
     right = truth()
     for name, number in slips_of(asked.modules or MODULES, asked.sample, asked.seed):
-        slip = slips(ast.parse(_source(name)))[number]
+        slip = slips(ast.parse(source_of(name)))[number]
         answer = attempt(name, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
         row = {"slip": f"{name}:{number}", "line": slip.line, "what": slip.what, "outcome": answer}
         print(json.dumps(row), flush=True)
