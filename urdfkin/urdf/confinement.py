@@ -50,7 +50,7 @@ class Ground:
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
             wide += _nearest_folder_with(mark, path.resolve())
-        home = os.path.expanduser("~")  # noqa: PTH111  Path.home() fails if there is no home folder
+        home = os.path.expanduser("~")  # noqa: PTH111  Path.home() may fail
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
         near = [path, path.parent, path.resolve().parent, *map(Path, search)]
@@ -70,7 +70,7 @@ class Ground:
 
 
 def _nearest_folder_with(mark: str, path: Path) -> list[Path]:
-    """Return the nearest folder above a path that contains a file `mark`, as a list of at most one item."""
+    """Return a list with the nearest folder above `path` in which `mark` exists, or an empty list."""
     return [folder for folder in path.parents if _exists(folder / mark)][:1]
 
 

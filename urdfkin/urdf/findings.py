@@ -378,7 +378,10 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """A comment that silences findings with the codes `codes`. `used` contains the codes with a finding."""
+    """A comment that silences findings with the codes `codes`.
+
+    `used` contains the codes for which the comment has silenced a finding.
+    """
 
     comment: Comment
     codes: tuple[str, ...]
@@ -427,7 +430,7 @@ SEARCHES = 20
 #: In one search for similar names: maximum number of compared names, and the argument `work` of `nearest`.
 CANDIDATES, WORK = 5_000, 250_000
 
-#: If at least this number of warnings (or notes) have one code, they are combined into one finding.
+#: If at least this number of warnings (or notes) have the same code, they are combined into one finding.
 #: `FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
@@ -457,7 +460,7 @@ class Reporter:
 
     Attributes:
         file: The name of the file in the findings.
-        data: The bytes of the file; the positions of attributes are indices of these bytes.
+        data: The bytes of the file; the positions of attributes are indices into these bytes.
         comments: The comments with an instruction for urdfkin.
         silenced: The findings that a comment silences, each with the reason in the comment.
     """

@@ -123,7 +123,7 @@ class Mjcf:
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """Return the body or site in `fused` that has the name of a frame of `model`, or None."""
+        """Return the body or site in `fused` with the same name as a frame of `model`, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
@@ -273,7 +273,10 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if whole and fuses:
             if merged := [body for body in aligned if body.bodies]:
-                what = "MuJoCo fuses static bodies into this free body and aligns its frame by the inertia"
+                what = (
+                    "MuJoCo fuses static bodies into this free body and aligns the frame with the inertial"
+                    " frame of the fused body"
+                )
                 where, remedy = f"{name}: body {merged[0].name}", 'write fusestatic="false" or align="false"'
                 raise InputError(what, where=where, remedy=remedy)
             fused = compiled(_spec(mujoco, source))
@@ -310,7 +313,7 @@ def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
 
 
 def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield each free body that MuJoCo aligns with its inertial frame; the body has no moving descendants."""
+    """Yield each free body without moving descendants that MuJoCo aligns with its inertial frame."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:

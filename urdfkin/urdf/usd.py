@@ -63,13 +63,13 @@ _LARGEST = float(np.finfo(np.float32).max)
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Limits up to this number (degrees) are not reported: the joint hardly moves, also if the unit is radians.
+#: Limits up to this number (degrees) are not reported: the joint hardly moves, even in radians.
 _SMALLEST_ANGLE = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a pointer file of Git LFS, which stands for a file that was not downloaded.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Regular expression for relationships to the mimicked joint. The group is the direction in PhysX's name.
+#: Regular expression for relationships to the mimicked joint. The group is the direction, such as rotX.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: Words in the names of types and applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
@@ -828,7 +828,10 @@ class _StageReader:
         if wanted is None:
             if len(found) > 1:
                 message = f"this stage has {len(found)} articulations"
-                remedy = "write --articulation PATH; the PATH of a prim above selects all articulations below"
+                remedy = (
+                    "choose one with --articulation PATH; the PATH of an ancestor chooses all articulations"
+                    " below it"
+                )
                 raise InputError(message, where=self.source, found=", ".join(paths[:8]), remedy=remedy)
             return found[0]
         if not wanted:

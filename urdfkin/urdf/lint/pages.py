@@ -116,7 +116,7 @@ def find_rule(word: str) -> Rule:
 
 
 def find_rules(word: str) -> tuple[Rule, ...]:
-    """Return the rules with a code, a short name or the first digits of codes, or all rules for ALL.
+    """Return the rules that a word selects: a code, a short name, the first digits of codes, or ALL.
 
     Raise UnknownNameError if there is no such rule.
 

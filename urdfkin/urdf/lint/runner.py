@@ -52,7 +52,7 @@ def check(
         limits: Limits on the size of the file, its elements, names and numbers.
         mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
             are notes. The default is True, except for robots of the catalogue with invalid mimic rules.
-        root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
+        root_joint: `"floating"` or `"planar"` if you will load the robot with this argument.
         xacro_args: Arguments for a .xacro file, which is expanded first. Line numbers of findings are those
             of the expanded text.
         fold: Whether to combine many warnings with one code into a single warning that lists the lines. If

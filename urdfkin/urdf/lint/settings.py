@@ -130,7 +130,7 @@ _WORDS = {
     str: "a string",
 }
 
-#: Default patterns of robot files in a folder, without .xacro: most .xacro files are a part of a robot.
+#: Default patterns of robot files in a folder. Most .xacro files contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 

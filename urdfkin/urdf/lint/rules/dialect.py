@@ -100,7 +100,7 @@ _Place = tuple[Element, str | None]
 def _report_xacro(
     report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
 ) -> bool:
-    """Report unexpanded xacro; return whether it is an error, because kinematics uses an element."""
+    """Report unexpanded xacro; return True if kinematics uses it, so that it is an error."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
     for group, severity, message in (
@@ -155,7 +155,7 @@ EXTENSIONS = frozenset(_COMMON.split())
 
 #: Lines of the form `element: attributes > child elements`.
 #: A line without a colon means that the attributes of the element are not checked.
-#: Elements without a line are not checked at all.
+#: The content of an element without a line is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -489,7 +489,7 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report each code in a comment that silences no finding. Call this after all other rules."""
+    """Report the unused codes in comments that silence findings. Call this after all other rules."""
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:

@@ -62,7 +62,7 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Return whether no link has several parent joints; report the second and all further parent joints.
+    """Report the second and all further parent joints of a link; return True if there are none.
 
     The links are visited depth first. If the child of a joint is on the current path, the joint closes a
     loop. If the child was visited on another path, the joint is a further parent joint.
@@ -153,7 +153,7 @@ LENGTH_ROUNDING = 2e-4
 #: Maximum difference of a unit vector's length from 1, as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: A planar axis counts as z if the length of its x and y part is at most this fraction of its z component.
+#: A planar joint's axis counts as z if its xy part is at most this fraction of its z component.
 _LEAN = 1e-9
 
 #: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
