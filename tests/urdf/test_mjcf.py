@@ -161,7 +161,7 @@ def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(tmp
     assert {"world", "base", "imu", "tool"} <= set(robot.link_names)
     sentences = " ".join(finding.sentence for finding in robot.findings)
     for words in (
-        "equality 'curve': a constraint (g and f) that is no linear relation of two joints",
+        "equality 'curve': a constraint (g and f) that is not a linear relation of two joints",
         "equality 'glue': a constraint (weld of tip and base) that a tree cannot represent",
         "tendons have no effect here",
         "joint 'root': qpos0 places this body at (0, 0, 1)",

@@ -687,7 +687,7 @@ def test_text_that_is_no_usd_is_an_error(write: Write, text: str) -> None:
     ("reference", "why"),
     [
         ("../../secret.usda", "outside"), ("/etc/passwd.usda", "outside"),
-        ("https://example.org/a.usda", "fetches nothing"), ("omniverse://host/a.usda", "fetches nothing"),
+        ("https://example.org/a.usda", "downloads nothing"), ("omniverse://host/a.usda", "downloads nothing"),
         ("./link.usda", "outside"), ("./.hidden/a.usda", "outside"), ("./notes.txt", "not USD"),
         ('`"./${X}.usda"`', "expression"),
     ],

@@ -6,8 +6,8 @@ robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`
 
 The folder of a package `name` is the first of these folders that exists:
 
-1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself if this is the name of the package, then
-   `src/name`, then `src/*/name`.
+1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself if the folder has the name of the
+   package, then `src/name`, then `src/*/name`.
 2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
 3. For each folder above the file: the folder itself if the folder or its `package.xml` has the name of the
    package, then the subfolder `name`.
@@ -42,8 +42,8 @@ class Entry:
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
         reason: The reason why the mimic rules are invalid, or None.
-        poses: Joint values (rad or m) by joint name, for each named pose. The value of other joints is 0.
-        own: True for a robot of urdfkin, False for a robot of example-robot-data.
+        poses: Joint values (rad or m) by joint name, for each named pose. Other joints are at 0.
+        own: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """
 
     name: str
@@ -196,10 +196,10 @@ class Described:
 
 
 def described(source: object) -> Described | None:
-    """Return the file of a robot description for its module or its name; None for any other source.
+    """Return the file of a robot in robot_descriptions, by its module or name; None for any other source.
 
     Raises:
-        InputError: the package is not installed, or the description has no URDF and no MJCF.
+        InputError: the package is not installed, or the description has neither a URDF nor an MJCF file.
         UnknownNameError: there is no description of this name. The message lists the nearest names.
         SourceError: the description cannot be downloaded.
     """

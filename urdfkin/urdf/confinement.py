@@ -20,12 +20,12 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum memory of the process in bytes. Python and the imported libraries need about a tenth.
+#: Maximum memory of the process in bytes. Python and the imported libraries need about a tenth of it.
 MEMORY = 2 * 1024**3
 
 #: Audit events that are always allowed.
 _HARMLESS = {"builtins.id", "compile", "glob.glob", "glob.glob/2", "object.__getattr__", "sys._getframe"}
-#: Audit events that are allowed for files that the process may read.
+#: Audit events that are allowed only for files that the process may read.
 _READING = {"open", "os.listdir", "os.scandir"}
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
@@ -35,8 +35,8 @@ class Ground:
     """The files that a confined process may read.
 
     Attributes:
-        roots: Folders and files that may be read, except hidden folders and files in these folders. The
-            target of a symbolic link must also be one of these files, or be in one of these folders.
+        roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
+            The target of a symbolic link must also be one of these files, or be in one of these folders.
         installed: Folders in which a symbolic link may point to a package in any other folder. An example is
             the install folder of `colcon build --symlink-install`.
     """
@@ -46,11 +46,11 @@ class Ground:
 
     @classmethod
     def around(cls, path: Path, search: list[str], arguments: list[str]) -> Ground:
-        """Allow a file's folder, package and repository, the search paths, and paths in xacro arguments."""
+        """Allow reading a file's folder, package and repository, search paths, and paths in arguments."""
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
             wide += _nearest_folder_with(mark, path.resolve())
-        home = os.path.expanduser("~")  # noqa: PTH111  Path.home() raises an error without a home
+        home = os.path.expanduser("~")  # noqa: PTH111  Path.home() may fail
         everything = {Path(home).resolve(), Path("/")}
         real = [place.resolve() for place in wide if _exists(place)]
         near = [path, path.parent, path.resolve().parent, *map(Path, search)]
@@ -59,7 +59,8 @@ class Ground:
 
     def holds(self, path: str) -> bool:
         real = os.path.realpath(path)
-        if os.path.basename(real) == "package.xml":  # noqa: PTH119  the search for packages reads this file
+        # The search for packages reads every package.xml.
+        if os.path.basename(real) == "package.xml":  # noqa: PTH119
             return True
         roots = self.roots
         as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
@@ -69,7 +70,7 @@ class Ground:
 
 
 def _nearest_folder_with(mark: str, path: Path) -> list[Path]:
-    """Return a list with the nearest folder above a path that contains a file; an empty list if none does."""
+    """Return a list with the nearest folder above `path` in which `mark` exists, or an empty list."""
     return [folder for folder in path.parents if _exists(folder / mark)][:1]
 
 
@@ -89,7 +90,7 @@ def _exists(path: Path) -> bool:
 
 
 def limit(seconds: int) -> None:
-    """Limit the memory and time of this process, and forbid the process to write files or start processes."""
+    """Limit memory and time of this process, and prevent it from writing files and starting processes."""
     import resource
 
     bounds = {
@@ -100,7 +101,7 @@ def limit(seconds: int) -> None:
         resource.RLIMIT_NOFILE: 64,
         resource.RLIMIT_CORE: 0,
     }
-    if sys.platform == "darwin":  # macOS refuses a limit of the address space
+    if sys.platform == "darwin":  # macOS does not support a limit on the address space
         del bounds[resource.RLIMIT_AS]
     for kind, most in bounds.items():
         hard = resource.getrlimit(kind)[1]
@@ -109,7 +110,7 @@ def limit(seconds: int) -> None:
 
 
 def confine(holds: Callable[[str], bool]) -> None:
-    """From now on, allow this process to read the files that `holds` accepts, and nothing else."""
+    """From now on, allow this process to read only the files that `holds` accepts."""
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
         if event in _HARMLESS:

@@ -22,7 +22,7 @@ from urdfkin.urdf.xacro import arguments_of
 #: Functions of xacro that would give an expression access to types and attributes.
 _FORBIDDEN = ("type", "vars")
 
-#: Expression that xacro itself evaluates, but urdfkin refuses.
+#: Test expression that xacro's own evaluation accepts, but urdfkin's evaluation refuses.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"the expansion takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -106,7 +106,7 @@ def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[
     """Return the function that finds packages for xacro's $(find name)."""
 
     def is_package(folder: Path) -> bool:
-        """Accept a folder that is allowed or has a package.xml, because `$(find etc)` must not find /etc."""
+        """Return whether a folder is allowed or has a package.xml; `$(find etc)` must not find /etc."""
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:

@@ -59,7 +59,7 @@ class RefusedError(Exception):
 
 
 def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
-    """Return the value of an expression, which may call `functions` and the methods of `_METHODS`.
+    """Return the value of an expression, in which only `functions` and `_METHODS` may be called.
 
     Raises:
         RefusedError: the expression contains something other than values, operators and allowed calls.
@@ -178,7 +178,7 @@ class _Evaluation:
             return
         loop, *others = loops
         for value in self.value(loop.iter):
-            # xacro evaluates a property when its name is read, so the outer scope must not be copied.
+            # Copying the outer scope would evaluate all properties; xacro evaluates only those that are read.
             scope = ChainMap(dict(_bound(loop.target, value)), self._names)  # type: ignore[arg-type]
             inner = _Evaluation(scope, self._functions)
             if all(inner.value(condition) for condition in loop.ifs):

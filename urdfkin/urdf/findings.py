@@ -46,14 +46,14 @@ def quoted(text: str, limit: int = QUOTED) -> str:
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: Number of characters that are printed of a longer line, and how many of them may precede the marked text.
+#: A longer line is cut to `SHOWN` characters, of which at most `BEFORE` precede the marked text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
 
 
 class Excerpts:
-    """The lines of a file, without its byte order mark, that are printed below findings."""
+    """Print lines of a file below findings. The data has no byte order mark."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
@@ -171,7 +171,7 @@ class Finding:
         oracle: None if Pinocchio reads the content as the URDF specification defines. Otherwise Pinocchio
             refuses the file or reads the content differently, and urdfkin cannot verify any result of the
             robot with Pinocchio.
-        also: Line numbers of further findings with the same code that this finding represents.
+        also: Line numbers of further findings with the same code that are combined into this finding.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
 
@@ -209,7 +209,7 @@ class Finding:
             return ""
         tag = shortened(self.element)
         if self.element == "prim" and self.name is not None and len(self.name) > QUOTED:
-            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # a path ends with the prim's name
+            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # a prim's path ends with its name
         return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
@@ -378,7 +378,10 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """A comment that silences findings with the codes `codes`. The codes `used` have silenced a finding."""
+    """A comment that silences findings with the codes `codes`.
+
+    `used` contains the codes for which the comment has silenced a finding.
+    """
 
     comment: Comment
     codes: tuple[str, ...]
@@ -391,7 +394,8 @@ class Silences:
     """The comments of a file that silence findings."""
 
     all: list[Silence] = field(default_factory=list)
-    #: The first comment for a code at a line (by number), an element (by `id`), or the file.
+    #: The first comment that silences a code. The key has the kind of place ("line", "element" or "file"),
+    #: the line number, the element's `id` or 0, and the code.
     _first: dict[tuple[str, int, str], Silence] = field(default_factory=dict)
 
     def add(self, silence: Silence) -> None:
@@ -409,7 +413,7 @@ class Silences:
             self._first.setdefault((*place, code), silence)
 
     def reason(self, code: str, line: int, at: Element | None) -> str | None:
-        """Return the reason of the nearest comment that silences a finding; None if there is none."""
+        """Return the reason in the nearest comment that silences a finding; None without such a comment."""
         places = [("line", line)]
         while at is not None:
             places.append(("element", id(at)))
@@ -423,17 +427,17 @@ class Silences:
 
 #: Maximum number of misspelt names in a file for which similar names are searched.
 SEARCHES = 20
-#: Maximum number of known names that one search compares, and the argument `work` of `nearest`.
+#: In one search for similar names: maximum number of compared names, and the argument `work` of `nearest`.
 CANDIDATES, WORK = 5_000, 250_000
 
-#: If a file has this number of warnings (or notes) with one code, they become one finding.
-#: `FOLDED_EXTRAS` is the number for the codes URDF7xx, about content that kinematics does not use.
+#: If at least this number of warnings (or notes) have the same code, they are combined into one finding.
+#: `FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
 #: Maximum number of errors with one code that are reported separately.
 ERRORS_SHOWN = 100
 
-#: Maximum number of findings with one code that are stored. Of further findings only the line is stored.
+#: Maximum number of complete findings with one code. For further findings, only the line number is stored.
 WRITTEN_OUT = 10_000
 
 
@@ -441,8 +445,8 @@ WRITTEN_OUT = 10_000
 class _Kind:
     """The findings of one code and severity.
 
-    `found` has at most `WRITTEN_OUT` findings, each with its weight (see `Reporter.add`). `lines` are the
-    line numbers of all further findings.
+    `found` has at most `WRITTEN_OUT` findings, each with its weight (see `Reporter.add`). `lines` contains
+    the line numbers of all further findings.
     """
 
     severity: Severity
@@ -456,7 +460,7 @@ class Reporter:
 
     Attributes:
         file: The name of the file in the findings.
-        data: The bytes of the file, in which attributes are located.
+        data: The bytes of the file; the positions of attributes are indices into these bytes.
         comments: The comments with an instruction for urdfkin.
         silenced: The findings that a comment silences, each with the reason in the comment.
     """
@@ -672,7 +676,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings of one kind; of many findings, one finding lists the lines of the others."""
+    """Return the findings of one kind. If there are many, the last one lists the lines of the others."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 #: Maximum number of joint names in a finding.
 _NAMED = 5
 
-#: Element of records that do not come from a file.
+#: Placeholder for the XML element in records that do not come from a file.
 _NO_ELEMENT = Element("", {}, None, 0, 0, 0)
 
 
@@ -131,7 +131,7 @@ def _text(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                if isinstance(child.tag, str):  # the tag of a comment or an instruction is a function
+                if isinstance(child.tag, str):  # not a comment or an instruction
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
     except (TypeError, AttributeError, RecursionError) as error:
@@ -151,7 +151,7 @@ _KINDS = {
     "JointModelFreeFlyer": JointKind.FLOATING,
     "JointModelPlanar": JointKind.PLANAR,
 }
-#: Limits above this number are treated as infinite. Pinocchio stores the largest double for no limit.
+#: Limits above this number are treated as infinite. Pinocchio stores a missing limit as the largest double.
 _ENDLESS = 1e300
 
 
@@ -160,8 +160,8 @@ class Modelled:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: Index of the Pinocchio joint whose frame is the frame of a link, by the name of the link.
-        frames: Index of the Pinocchio frame of each other link, by the name of the link.
+        joints: For each link whose frame is a joint frame: the index of the Pinocchio joint, by link name.
+        frames: For each other link: the index of the link's Pinocchio frame, by link name.
     """
 
     tree: KinematicTree
@@ -193,19 +193,20 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: The link that each joint moves, and the link of each frame that has been converted.
+        #: Name of the link that each joint moves, by the index of the joint.
         self.carriers = {j: unique(name, self.link_names) for j, name in names.items()}
+        #: Name of the link of each converted frame, by the index of the frame.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """Yield each joint with a body whose frame is the joint's frame, in the reverse order of bodies."""
+        """Yield the indices of joint and body if both have the same frame; the last body comes first."""
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i
 
     def read(self) -> Modelled:
-        """Convert all frames, then all moving joints. In a model, parent frames precede child frames."""
+        """Convert all frames, then all moving joints. In Pinocchio, a parent frame has a lower index."""
         for i in range(len(self.frames)):
             self._frame(i)
         frames = zip(self.frames, self.kinds, strict=True)
@@ -219,7 +220,7 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return the parent link of a frame and the frame's pose in the link; T is the pose in the joint."""
+        """Return the parent link of a frame, and its pose in this link; T is its pose in the joint frame."""
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T

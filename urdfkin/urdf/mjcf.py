@@ -43,12 +43,12 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: Limits (+- m) in the URDF of a prismatic joint without limits, because URDF requires limits.
+#: Limit (+- m) that is written for a prismatic joint without limits, because URDF requires limits.
 UNBOUNDED = 1000.0
 #: Regular expression for the beginning of an MJCF text. The matching time is linear in the text's length.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
-#: Number of bytes of a file in which the root element of MJCF is searched.
+#: Number of bytes at the beginning of a file in which the root element of MJCF is searched.
 _HEAD = 65_536
 
 
@@ -113,7 +113,7 @@ class Mjcf:
     def placements(self, q: FloatArray) -> FloatArray:
         """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
 
-        If there is a fused model, the placements of its frames are computed with the fused model.
+        Frames that the model `fused` contains are computed with this model.
         """
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
@@ -123,7 +123,7 @@ class Mjcf:
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """Return the body or site in `fused` that has the name of a frame of `model`, or None."""
+        """Return the body or site in `fused` with the same name as a frame of `model`, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
@@ -149,7 +149,7 @@ class Mjcf:
         return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """Return a sum of joint angles (n, frames), in rad, for bounds on rounding errors.
+        """Return a sum of hinge angles for each frame (n, frames), in rad, for bounds on rounding errors.
 
         The sum has a summand |q| + |ref| for each hinge between the world and the frame, if the reference
         value `ref` of the hinge is not 0.
@@ -171,9 +171,9 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return the quantity (n, frames) of each frame, from the quantities `at_body` (n, bodies) of bodies.
+        """Return a quantity for each frame (n, frames); `at_body` (n, bodies) is the quantity for each body.
 
-        A site has the quantity of its body plus the site's entry in `own` (sites,).
+        For a site, the result is the quantity of its body plus the site's entry in `own` (sites,).
         """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
@@ -201,11 +201,10 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """Return the size (n, equalities) of each mimic rule, for bounds on rounding errors.
+        """Return s(y) (k + 1) for each mimic rule (n, equalities), for bounds on rounding errors.
 
-        For the rule y = y0 + c0 + c1 (x - x0), the size of y is s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The
-        size of an independent joint x is s(x) = |x|. The result for a rule is s(y) (k + 1), where k is the
-        number of rules from the mimic joint y to an independent joint.
+        For the rule y = y0 + c0 + c1 (x - x0), s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). For an independent
+        joint x, s(x) = |x|. Here k is the number of rules from the mimic joint y to an independent joint.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
@@ -274,7 +273,10 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         aligned, fuses = list(_aligned_bodies(mujoco, spec)), bool(spec.compiler.fusestatic)
         if whole and fuses:
             if merged := [body for body in aligned if body.bodies]:
-                what = "MuJoCo fuses static bodies into a free body and aligns its frame with their inertia"
+                what = (
+                    "MuJoCo fuses static bodies into this free body and aligns the frame with the inertial"
+                    " frame of the fused body"
+                )
                 where, remedy = f"{name}: body {merged[0].name}", 'write fusestatic="false" or align="false"'
                 raise InputError(what, where=where, remedy=remedy)
             fused = compiled(_spec(mujoco, source))
@@ -305,13 +307,13 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
 def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
     spec.compiler.usethread = False  # a confined process cannot start threads
-    # The value -1 replaces large memory sizes in the file, which only dynamics needs.
+    # Only dynamics needs large memory sizes; -1 replaces the sizes in the file by the default.
     spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
 
 
 def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield each free body that MuJoCo aligns with its inertial frame; the body has no moving descendants."""
+    """Yield each free body without moving descendants that MuJoCo aligns with its inertial frame."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
@@ -477,7 +479,7 @@ class _MjcfReader:
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:
             message = "urdfkin does not support ball joints"
-            remedy = "use three hinges in one body (singular where the middle one is at a right angle)"
+            remedy = "use three hinges in one body (singular if the middle hinge is at a right angle)"
             raise InputError(message, where=f"{self.source}: joint {name}", remedy=remedy)
         at = int(m.jnt_qposadr[j])
         if kind == kinds.mjJNT_FREE:
@@ -502,7 +504,7 @@ class _MjcfReader:
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
             return JointKind.CONTINUOUS, None
-        what = f"a slide joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
+        what = f"a slide joint without limits gets +-{UNBOUNDED:g} m, because URDF requires limits"
         self.listed.append(Listed(what, f"joint {name}"))
         return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
 
@@ -519,7 +521,7 @@ class _MjcfReader:
                 continue
             if rule is None:
                 names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
-                what = f"a constraint ({names}) that is no linear relation of two joints"
+                what = f"a constraint ({names}) that is not a linear relation of two joints"
             elif rule[0] in rules or leads(rules, rule[1].leader, rule[0]):
                 what = f"joint {rule[0]} has two rules, or its rules form a circle"
             else:

@@ -57,7 +57,7 @@ XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16: a byte order mark, or the character '<'.
-#: The encoding UTF-32 comes first, because some of its first bytes begin with those of UTF-16.
+#: UTF-32 is tested first, because some of its byte sequences begin with a sequence of UTF-16.
 _WIDE = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
@@ -169,10 +169,10 @@ MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 #: Maximum depth of nested elements in older versions of libxml2.
 COMMON_DEPTH = 256
 
-#: Number of bytes that one call of the parser gets.
+#: Number of bytes that are passed to expat in one call.
 _PIECE = 1_000_000
 
-#: Maximum number of characters that the parser stores of an element's text.
+#: Maximum number of stored characters of an element's text.
 _STORED = 2 * QUOTED
 
 #: Attributes whose value is the name of a link or joint.
@@ -484,7 +484,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report a text that is too long for a number: the conversion of long texts takes quadratic time."""
+        """Report a text that is too long for a number, because its conversion takes quadratic time."""
         if len(written) <= most:
             return False
         found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
@@ -521,10 +521,10 @@ class NumberReader:
         )
 
 
-#: Elements whose tags are not in messages about numbers.
+#: Messages about the numbers of these elements do not contain the tag.
 _PLAIN = ("origin", "axis", "limit")
 
-#: Leading zeros of a character reference. `html.unescape` fails if there are thousands of zeros.
+#: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
 #: Patterns of invalid numbers with remedies; the first pattern that matches determines the remedy.
@@ -571,7 +571,7 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: Bounds between which the square of a length neither underflows nor overflows.
+#: If a length is between these bounds, its square neither underflows nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
 
 
@@ -635,7 +635,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
     if version is None:
         message = "a URDF version has the form 1.0"
     elif version > NEWEST:
-        message = "the URDF version is later than 1.2, the last that urdfdom and Pinocchio read"
+        message = "the URDF version is later than 1.2, the last version that urdfdom and Pinocchio read"
         remedy = "write the version that the file follows, 1.0 to 1.2"
     elif version < (1, 0):
         message = "this URDF version does not exist"
@@ -683,7 +683,7 @@ class JointReader:
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
         """Return a required attribute; report a missing or empty attribute and return None.
 
-        With `number`, an empty attribute is not reported, because `NumberReader` reports it.
+        If `number` is True, an empty attribute is not reported, because `NumberReader` reports it.
         """
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
@@ -749,7 +749,7 @@ class JointReader:
         axis = joint.axis_element = joint.element.first("axis")
         if axis is None:
             return
-        if joint.kind in ("fixed", "floating"):  # URDF readers do not use the axis of such a joint
+        if joint.kind in ("fixed", "floating"):  # the axis of such a joint has no effect
             NumberReader(self.report, IGNORED, IGNORED).vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
@@ -757,7 +757,7 @@ class JointReader:
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
             return  # rule URDF212 reports text between tags
-        message = "<axis> without xyz is 1 0 0 to some readers and 0 0 0 to urdfdom"
+        message = "some readers read <axis> without xyz as 1 0 0, and urdfdom as 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
         # A planar joint moves in the XY plane, whatever its axis is (URDF505).
         severity = Severity.WARNING if joint.kind == "planar" else None
@@ -828,5 +828,5 @@ def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: A longer word is not similar to any tag or attribute of URDF.
+#: Words with more characters are not similar to any tag or attribute of URDF.
 _LONGEST_WORD = 32

@@ -32,7 +32,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
     kind with the name `root_joint` connects the root link with the world.
 
     Raises:
-        InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is another word.
+        InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is invalid.
         UnknownNameError: the mimicked joint of a mimic joint does not exist.
     """
     name = urdf.element.attributes.get("name", "")

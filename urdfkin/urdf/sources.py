@@ -152,8 +152,8 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
     """Read a URDF from any source.
 
     A catalogue name has priority over a file with this name in the current folder. For a file `panda`, write
-    `./panda`. At most `most` + 1 bytes are read (characters of an open text file), also from an infinite
-    device such as `/dev/zero`. A .xacro file is expanded with the arguments `xacro_args`.
+    `./panda`. The function reads at most `most` + 1 bytes (or characters of an open text file), even from an
+    infinite device such as `/dev/zero`. A .xacro file is expanded with the arguments `xacro_args`.
 
     Raises:
         SourceError: the file cannot be read.
@@ -272,7 +272,7 @@ def _read_file(path: Path, most: int) -> Text:
 
 
 def as_word(path: Path) -> str:
-    """Return the path as text that `load` does not take for an option, a URDF text or a catalogue name."""
+    """Return the path as text that `load` cannot mistake for an option, URDF text or a catalogue name."""
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word
 

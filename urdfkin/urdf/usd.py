@@ -55,7 +55,7 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: Largest number in single precision. If a joint has no limit, the file contains this number or infinity.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Largest cosine between two axes of a frame without shear, in multiples of u n.
+#: Up to this number times u n, the cosine between two axes of a frame is a rounding error, not shear.
 #: Here n is the number of prims on the path to the frame's prim.
 #: The factor u is the largest relative error of rounding to single precision.
 #: Each entry of a stored rotation matrix has an error of u.
@@ -63,13 +63,13 @@ _LARGEST = float(np.finfo(np.float32).max)
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Largest limit (degrees) of a joint that hardly moves, whether its limits are in degrees or in radians.
+#: Limits up to this number (degrees) are not reported: the joint hardly moves, even in radians.
 _SMALLEST_ANGLE = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
-#: First bytes of a pointer file, which Git LFS has not yet replaced by the real file.
+#: First bytes of a pointer file of Git LFS, which stands for a file that was not downloaded.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Regular expression for relationships to the mimicked joint; the group is the direction in PhysX's schema.
+#: Regular expression for relationships to the mimicked joint. The group is the direction, such as rotX.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: Words in the names of types and applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
@@ -248,20 +248,20 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
     if written.startswith("`"):
         raise _refused("a reference is an expression", where, written)
     if "://" in written:
-        raise _refused("a reference is an address, and urdfkin fetches nothing", where, written)
+        raise _refused("a reference is a network address, and urdfkin downloads nothing", where, written)
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
-        # OpenUSD finds no such file beside the layer, and would search in the current folder.
+        # Without a file beside the layer, OpenUSD searches in the current folder.
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
-        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  `outer` may be an invalid path
+        outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
     if not ground.holds(outer):
         what = "a reference leads outside the folder, package and repository of the stage"
         raise _refused(what, where, written)
     if Path(inner or outer).suffix.lower() not in USD:
         raise _refused("a reference names a file that is not USD", where, written)
-    return address if os.path.exists(outer) else None  # noqa: PTH110  `outer` may be an invalid path
+    return address if os.path.exists(outer) else None  # noqa: PTH110  Path.exists() can fail
 
 
 def _refused(what: str, where: str, found: str) -> InputError:
@@ -274,7 +274,7 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    `variants` are pairs of a variant set and a variant, which is selected in all prims that have the set.
+    `variants` are pairs of a variant set and a variant. All prims with this set select the variant.
     `articulation` is the path or name of the articulation to read; None if there is only one.
 
     Raises:
@@ -347,7 +347,7 @@ class _Edge:
     """A joint prim.
 
     Attributes:
-        name: The name of the prim, and then the unique name of the joint in the tree.
+        name: At first the name of the prim; later the unique name of the joint in the tree.
         ends: The paths of the two bodies that the joint connects; None is the world.
         frames: The poses of the joint frame in these bodies.
         size: See `JointReading`.
@@ -375,7 +375,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Read a stage. `source` is its name in messages, and `opened` are the paths of expanded instances."""
+    """Read a stage. `source` is the stage's name in messages; `opened` has the expanded instances' paths."""
 
     pxr: Any
     stage: Any
@@ -514,7 +514,7 @@ class _StageReader:
             scale = -scale
         R = M[:3, :3] / scale
         if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR * SINGLE * prim.GetPath().pathElementCount:
-            message = "the frame of a prim has shear, so it is no frame of a rigid body"
+            message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
             raise InputError(message, where=where, found=self._uneven_scale(prim), remedy=remedy)
         U, _, V = np.linalg.svd(R)
@@ -694,7 +694,7 @@ class _StageReader:
                 ends = (float(self._value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
                 return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
         if prim.IsA(physics.SphericalJoint):
-            remedy = "use three revolute joints (singular where the middle one is at a right angle)"
+            remedy = "use three revolute joints (singular if the middle joint is at a right angle)"
             raise InputError("urdfkin does not support spherical joints", where=path, remedy=remedy)
         if prim.GetTypeName() != "PhysicsJoint":
             message = "urdfkin does not support this kind of joint"
@@ -736,7 +736,7 @@ class _StageReader:
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            message = "a limit of a joint is blocked, and OpenUSD's readers differ in its value"
+            message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
             where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
             remedy = "write a number; -inf and inf mean no limit"
             raise InputError(message, where=where, found=found, remedy=remedy)
@@ -828,7 +828,10 @@ class _StageReader:
         if wanted is None:
             if len(found) > 1:
                 message = f"this stage has {len(found)} articulations"
-                remedy = "choose one with --articulation PATH, or all below the PATH of another prim"
+                remedy = (
+                    "choose one with --articulation PATH; the PATH of an ancestor chooses all articulations"
+                    " below it"
+                )
                 raise InputError(message, where=self.source, found=", ".join(paths[:8]), remedy=remedy)
             return found[0]
         if not wanted:
@@ -988,7 +991,7 @@ class _StageReader:
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            what = f"a prismatic joint without limits: the URDF, which requires limits, has +-{UNBOUNDED:g} m"
+            what = f"a prismatic joint without limits gets +-{UNBOUNDED:g} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
             lower, upper = (x if math.isfinite(x) else math.copysign(UNBOUNDED, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)
@@ -1034,7 +1037,7 @@ class _StageReader:
                 leader = by_path.get(rule.leader)
                 if leader is None or leader.kind.nq != 1 or edge.kind.nq != 1 or leader is edge:
                     named = rule.leader or "nothing"
-                    what = f"this joint mimics {named}, which is no joint with one coordinate"
+                    what = f"this joint mimics {named}, which is not a joint with one coordinate"
                     self._report("lost-mimic", edge.path, what, "correct the relationship")
                 elif edge.path in rules or leads(rules, rule.leader, edge.path):
                     what = "this joint has two mimic rules, or its rules form a circle"
@@ -1046,7 +1049,7 @@ class _StageReader:
             yield by_path[path].name, replace(rule, leader=by_path[rule.leader].name)
 
     def _rules(self, edge: _Edge) -> Iterator[Mimic]:
-        """Yield each mimic rule of a joint, with the path of the mimicked joint, in rad or m."""
+        """Yield each mimic rule of a joint, in rad or m; the leader is the path of the mimicked joint."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1156,7 +1159,7 @@ class _StageReader:
             self._report("up-axis", path, f"{what}; the layer is not turned", remedy)
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
-        """Return whether the scale of a prim in the world is a factor, up to rounding to single precision."""
+        """Return whether a prim's scale in the world is `factor`, up to rounding to single precision."""
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())

@@ -133,6 +133,6 @@ def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iter
 
 
 def before(data: bytes, at: Element, element: str) -> Edit:
-    """Return the edit that inserts the text `element` before the element `at`, with equal indentation."""
+    """Return the edit that inserts the text `element` before the element `at`, with the same indentation."""
     indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
     return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))

@@ -95,8 +95,8 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
     Raises:
         SourceError: the file does not exist.
         UnknownNameError: the file does not declare an argument.
-        XacroError: xacrodoc is not installed, or xacro cannot expand the file. For example, the file opens a
-            forbidden file, starts a program, or needs too much memory or more than `patience` seconds.
+        XacroError: xacrodoc is not installed, or xacro cannot expand the file. Examples: the file opens
+            a forbidden file, starts a program, or needs too much memory or more than `patience` seconds.
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))

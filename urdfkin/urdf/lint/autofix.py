@@ -5,13 +5,13 @@ urdfkin accepts a fix if three conditions hold:
 - The new file has fewer findings with the code of the fix.
 - The new file has no new findings.
 - The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
-  exceptions. Rounding may change the direction of a joint axis. The rotation of a joint origin may change by
-  at most `Fix.turns` (rad).
+  exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
+  change by at most `Fix.turns` (rad).
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
-a CI service, for example an escape sequence or a GitHub workflow command. If such text were escaped in the
-patch, `git apply` would refuse the patch. The patch is then a binary patch of git in ASCII, after the escaped
-text of the patch as a comment.
+a CI service, for example an escape sequence or a GitHub workflow command. Such text must be escaped, but
+`git apply` refuses a patch with escaped lines. The changes are then written as a git binary patch, which is
+ASCII. The escaped lines precede this patch as a comment.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ TILT = Fraction(1, 2**52)
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """A fixed file, the fixed findings, and for each code that was not fixed, the reason."""
+    """A fixed file, the fixed findings, and the reasons, by code, why other findings were not fixed."""
 
     text: Text
     fixed: tuple[Finding, ...]
@@ -86,8 +86,8 @@ def mend(
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # Codes with more findings than a reporter stores are left out.
-    # After a fix, the reporter can store another of these findings, which would then look new.
+    # A reporter stores only some of the findings if a code has very many.
+    # After a fix, it may store others, which would look like new findings, so these codes are not compared.
     many = {finding.code for finding in before.findings if finding.also}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
@@ -134,12 +134,12 @@ def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor for the rounding errors of `Fix.turns`, which is a sum of doubles.
+#: Factor that covers the rounding errors of `Fix.turns`, which is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 
 def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) -> bool:
-    """Return whether two vectors have the same direction within `TILT`, computed without rounding."""
+    """Return whether the angle between two vectors is at most `TILT`, computed without rounding."""
     if a is None or b is None:
         return a is b
     (ax, ay, az), (bx, by, bz) = map(Fraction, a), map(Fraction, b)
@@ -163,7 +163,7 @@ def _rule(joint: JointRecord) -> tuple[str, float, float] | None:
 
 #: Number of bytes in each line of git's binary patch.
 _IN_A_LINE = 52
-#: Letters for the number of bytes in a line of git's binary patch.
+#: Letters with which a line of git's binary patch states its number of bytes.
 _COUNTS = string.ascii_uppercase + string.ascii_lowercase
 
 

@@ -3,7 +3,7 @@
 The rules are defined in the parser and in the modules of `lint.rules`. Beside each module, a TOML file with
 the name of the module contains a page for each rule. An entry `cure`, `others` or `question` at the top of
 the file is the default for all pages. The table `parts` defines texts that replace `{name}` in examples. Each
-of these texts is a string, or a pair [text, times] for a repeated text, in which `{i}` is the index of the
+entry is a string, or a pair [text, times] for a repeated text. In a repeated text, `{i}` is the index of the
 repetition. Line breaks in prose have no meaning.
 """
 
@@ -37,7 +37,7 @@ RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda r
 #: The rules about MJCF and USD files by code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: Code of each rule, by all names of the rule: the code in lower case, its digits, and the short name.
+#: Code of each rule. The keys are the code in lower case, the digits of the code, and the short name.
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
@@ -52,10 +52,10 @@ class Page:
         title: The problem in one line.
         why: The consequences of the problem for a user.
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. An example
-            that begins with a joint or a comment also needs the links `base` and `tip`.
+            that begins with a joint or a comment is completed with the links `base` and `tip`.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
-        question: The entry about the problem in docs/questions.md, or None.
+        question: The section about the problem in docs/questions.md, or None.
     """
 
     title: str
@@ -116,7 +116,7 @@ def find_rule(word: str) -> Rule:
 
 
 def find_rules(word: str) -> tuple[Rule, ...]:
-    """Return the rules with a code, a short name or the first digits of codes, or all rules for ALL.
+    """Return the rules that a word selects: a code, a short name, the first digits of codes, or ALL.
 
     Raise UnknownNameError if there is no such rule.
 

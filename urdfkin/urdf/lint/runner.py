@@ -44,7 +44,7 @@ def check(
 ) -> Findings:
     """Check a URDF and return the findings by line.
 
-    Besides the text of the URDF, the function checks that packages and mesh files in the text exist. No mesh
+    The function also checks that the packages and mesh files in the URDF exist. No mesh
     is opened.
 
     Args:
@@ -52,7 +52,7 @@ def check(
         limits: Limits on the size of the file, its elements, names and numbers.
         mimic: Whether mimic joints follow their mimicked joints. If False, all findings about mimic joints
             are notes. The default is True, except for robots of the catalogue with invalid mimic rules.
-        root_joint: `"floating"` or `"planar"` if you will load the robot with such a joint.
+        root_joint: `"floating"` or `"planar"` if you will load the robot with this argument.
         xacro_args: Arguments for a .xacro file, which is expanded first. Line numbers of findings are those
             of the expanded text.
         fold: Whether to combine many warnings with one code into a single warning that lists the lines. If
@@ -128,7 +128,7 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """Return the file of a text; None if the text has no file."""
+    """Return the path of the file that contains a text; None if there is no file."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 

@@ -130,13 +130,13 @@ _WORDS = {
     str: "a string",
 }
 
-#: Default patterns of robot files in a folder; most .xacro files contain only a part of a robot.
+#: Default patterns of robot files in a folder. Most .xacro files contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """A table of checked settings. `file` is the file of the table; None without a table."""
+    """A table of checked settings. `file` is the file that contains the table; None without a table."""
 
     file: Path | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -270,13 +270,13 @@ class Choice:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # Each baseline must count the finding, but `any` would not call `knows` of the second baseline.
+            # `any` would stop at the first baseline that knows the finding, but each baseline must count it.
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Return the function of `of` with copies of the baselines, for a second check of a file."""
+        """Like `of`, but count in copies of the baselines, so that a file can be checked a second time."""
         copies = [known and replace(known, counts=Counter(known.counts)) for known in (self.baseline, before)]
         return replace(self, baseline=copies[0]).of(text, copies[1])
 

@@ -60,7 +60,7 @@ CASES = [
     Mjcf(
         "a-curve-between-two-joints",
         _held('<joint name="bent" joint1="b" joint2="a" polycoef="0 0 1 0 0"/>'),
-        "MJCF101 equality bent: a constraint (b and a) that is no linear relation of two joints",
+        "MJCF101 equality bent: a constraint (b and a) that is not a linear relation of two joints",
     ),
     Mjcf(
         "a-joint-held-twice",
@@ -86,7 +86,7 @@ CASES = [
     ),
     Mjcf(
         "a-slide-without-limits", _two(joint='type="slide"'),
-        "MJCF102 joint b: a slide joint without limits: the URDF, which requires limits, has +-1000 m",
+        "MJCF102 joint b: a slide joint without limits gets +-1000 m, because URDF requires limits",
     ),
     Mjcf(
         "radians-in-a-file-in-degrees", _hinge("-1.5 3.1416"),

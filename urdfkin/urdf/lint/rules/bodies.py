@@ -15,17 +15,17 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: Largest mass (kg) and coordinate (m) of a centre of mass that are not reported.
+#: A larger mass (kg), or a larger coordinate (m) of a centre of mass, is reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: Mass (kg) below which moments of inertia are not checked, because the mass is probably a placeholder.
+#: Moments of inertia of a smaller mass (kg) are not checked, because the mass is probably a placeholder.
 NEGLIGIBLE = 1e-3
 
 #: Largest moment of inertia per kg (m^2) that is treated as a rounding error.
 #: Only bodies smaller than about 0.03 mm have such small moments.
 ROUNDING = 1e-9
 
-#: Relative rounding error of moments of inertia, for which exporters write few digits.
+#: Relative rounding error of moments of inertia, which exporters write with few digits.
 _WRITTEN = 1e-6
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -98,7 +98,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
     if small < -slack:
         what, found = "a principal moment of inertia is negative", f"{small:.3g}"
     elif large > middle + small + slack:
-        what = "the largest principal moment exceeds the sum of the others"
+        what = "the largest principal moment exceeds the sum of the other two"
         found = f"{small:.3g}, {middle:.3g} and {large:.3g}"
     else:
         return

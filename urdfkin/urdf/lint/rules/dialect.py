@@ -100,7 +100,7 @@ _Place = tuple[Element, str | None]
 def _report_xacro(
     report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
 ) -> bool:
-    """Report unexpanded xacro; return whether kinematics uses one of the elements (an error)."""
+    """Report unexpanded xacro; return True if kinematics uses it, so that it is an error."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
     for group, severity, message in (
@@ -154,7 +154,8 @@ _COMMON = (
 EXTENSIONS = frozenset(_COMMON.split())
 
 #: Lines of the form `element: attributes > child elements`.
-#: The attributes of an element without a colon are not checked, nor are elements that have no line.
+#: A line without a colon means that the attributes of the element are not checked.
+#: The content of an element without a line is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -181,10 +182,10 @@ ATTRIBUTES = {
     if colon
 }
 
-#: Names of poses in other formats, as an element or an attribute. URDF readers skip them.
+#: Tags and attributes that other formats use for a pose or a part of a pose. URDF readers skip them.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
-#: Attributes of other elements or formats, which `--fix` does not remove.
+#: Attributes that `--fix` does not remove, because other elements or formats define them.
 _MEANT = frozenset().union(*ATTRIBUTES.values()) | _FOREIGN | EXTENSIONS
 
 #: Child elements that may occur only once in an element, by the tag of the element.
@@ -196,7 +197,7 @@ _ONCE = {
 #: Elements in which text between the tags is reported.
 _VALUES = {"origin", "axis", "limit", "mimic", "parent", "child", "robot", "joint", "link"}
 
-#: Elements in which text between the tags is a value that belongs in an attribute.
+#: Elements in which text between the tags is probably a value that belongs in an attribute.
 _VECTORS = ("origin", "axis")
 
 
@@ -265,7 +266,7 @@ def _is_part(element: Element) -> bool:
 
 _PARTS = frozenset({"link", "joint"})
 
-#: Length of a tag from which on the tag is not similar to `link` or `joint`.
+#: A tag with at least this number of characters is not similar to `link` or `joint`.
 _LONGEST_PART = 8
 
 
@@ -361,7 +362,7 @@ def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield the prefixes of an element's tag (attribute None) and of its attributes."""
+    """Yield each namespace prefix with the name of its attribute; None for the prefix of the tag."""
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:
@@ -375,7 +376,7 @@ ODD_NAME = Rule("URDF405", "odd-name", WARNING)
 NAME_BLANKS = Rule("URDF406", "line-break-in-name", WARNING, DIFFERS)
 LOOKALIKE = Rule("URDF407", "lookalike-names", WARNING)
 
-#: Maximum number of characters in a name that is not reported. Longer names break tables and file paths.
+#: Names with more characters are reported, because long names break tables and file paths.
 LONGEST = 200
 
 
@@ -488,7 +489,7 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report each code in a comment that silences no finding. All other rules must have run before."""
+    """Report the unused codes in comments that silence findings. Call this after all other rules."""
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:

@@ -62,7 +62,7 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Return whether no link has several parent joints; report the second and all further parent joints.
+    """Report the second and all further parent joints of a link; return True if there are none.
 
     The links are visited depth first. If the child of a joint is on the current path, the joint closes a
     loop. If the child was visited on another path, the joint is a further parent joint.
@@ -146,21 +146,21 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Difference of an axis's length from 1 below which the finding is only a note.
-#: Axes that are written with few digits have differences of this size.
+#: If the length of an axis differs from 1 by less than this number, the finding is only a note.
+#: Such differences are usual if an axis is written with few digits.
 LENGTH_ROUNDING = 2e-4
 
 #: Maximum difference of a unit vector's length from 1, as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: Maximum fraction of the z component that the x and y components of a z axis may have.
+#: A planar joint's axis counts as z if its xy part is at most this fraction of its z component.
 _LEAN = 1e-9
 
 #: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
 #: Eigen's function `isApprox`, which compares squared lengths, has this default tolerance.
 _SNAPPED = 1e-12
 
-#: Maximum tilt (rad) that is not reported, because the error bounds in `verify.bounds` include it.
+#: Smaller tilts (rad) are not reported, because the error bounds in `verify.bounds` include them.
 _TILT = 2.0**-52
 
 
@@ -222,7 +222,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         message = f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}"
-        remedy = f'write xyz="{written}"; if the tilt is intended, double all three numbers'
+        remedy = f'write xyz="{written}"; to keep the tilt, double all three numbers'
         report.add(
             NEARLY_COORDINATE_AXIS, message, element,
             attribute="xyz", found=_written(joint), remedy=remedy, weight=tilt,
@@ -334,10 +334,10 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
+#: A larger multiplier or offset (rad or m) of a mimic joint is reported.
 LARGEST = 1e6
-#: Largest unusable fraction of a mimicked joint's range that is not reported.
-#: The limits of mimic joints are often written with few digits.
+#: The finding is reported if the limits exclude more than this fraction of the mimicked joint's range.
+#: Smaller fractions are common, because limits are often written with few digits.
 LEAST_LOST = 1e-3
 
 
@@ -504,23 +504,23 @@ SAME_PLACE = Rule("URDF605", "same-place", NOTE)
 OVERFLOW = Rule("URDF606", "overflow", ERROR)
 NEUTRAL = Rule("URDF608", "neutral-outside", NOTE)
 
-#: Coordinate (m) of a joint origin from which on the origin is probably in millimetres.
+#: A joint origin with a coordinate of at least this number (m) is probably in millimetres.
 FAR = 100.0
 
-#: Total length (m) of a robot below which the lengths were probably scaled twice.
+#: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
 TINY = 1e-4
 
-#: Smallest whole number that, as a limit, is probably in degrees.
-#: Some exporters write limits of at least `ENDLESS` for a joint without limits.
+#: A limit that is a whole number from `MANY` to `ENDLESS` is probably in degrees.
+#: For a joint without limits, some exporters write limits of at least `ENDLESS`.
 MANY, ENDLESS = 30.0, 1000.0
 
-#: Largest displacement (m) of a link by a rounded multiple of pi for which the finding is only a note.
+#: If a rounded multiple of pi displaces a link by more than this length (m), the finding is a warning.
 NOTICEABLE = 1e-3
 
-#: Largest difference (rad) between an angle and a multiple of pi that is not reported.
+#: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, each with the number of decimals from which on its rounded value is recognized.
+#: Multiples of pi. The second number is the least number of decimals of a recognized rounded value.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -565,7 +565,7 @@ def _written_bounds(limit: LimitRecord) -> str:
 
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
-    """Report the rounded multiple of pi that has the largest rounding error of the angles of an origin."""
+    """Report that an origin has rounded multiples of pi, and name the one with the largest error."""
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
@@ -680,7 +680,7 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _reach(robot: RobotRecord) -> dict[str, float]:
-    """Return an upper bound (m) on the distance between each link and the links below it."""
+    """Return an upper bound (m) on the distance from each link to its descendants."""
     below = _joints_by_parent(robot.joints)
     order = list(robot.links.keys() - {joint.child for joint in robot.joints})
     for link in order:

@@ -43,7 +43,7 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 _SEARCHED = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Tags of MJCF elements without a name, and the tags that findings about these elements have.
+#: Tags of MJCF elements that findings name only by a tag, each with the tag in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
 #: Regular expression for a prim in a USD text file, or a character that begins or ends other content.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
@@ -55,7 +55,7 @@ _NO_PRIM = {
     b"@@@": re.compile(rb"@@@"),
     b"@": re.compile(rb"@"),
 }
-#: Line and column (from 1) and width of each element, by tag and name.
+#: Line (from 1), column (from 1) and width of each element, by tag and name.
 _Places = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
@@ -156,7 +156,7 @@ def _prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
         if found[1] is not None:
             prim = "/" + found[1].decode("utf-8", "replace")
             yield "prim", "".join(above) + prim, found.start(), found.end()
-        elif token in b"()":  # in the metadata between parentheses, braces enclose dictionaries
+        elif token in b"()":  # braces inside parentheses enclose dictionaries, not prims
             inside += 1 if token == b"(" else -1
         elif token == b"{":
             above += [] if inside else [prim]
