@@ -1,7 +1,7 @@
 """Compare how other libraries read a robot file: the joints, the order of the joints, and the link poses.
 
 Each library runs in a separate process, with its adapter in `urdfkin/verify/adapters.py`. A joint counts as
-different if the pose of its child link in its parent link differs.
+different if the pose of its child link relative to its parent link differs.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 #: Tolerance for the entries of poses, relative to max(1, largest entry).
 #: Libraries that compute in double precision differ by less than 1e-13.
 _TOLERANCE = 1e-9
-#: Tolerance `_TOLERANCE` of libraries that compute in single precision.
+#: The same tolerance for libraries that compute in single precision.
 _TOLERANCE_SINGLE = 1e-5
-#: Time limit of a library, in seconds.
+#: Time limit for the process of one library, in seconds.
 _PATIENCE = 60.0
 #: Maximum number of bytes that a library's process may return.
 _MOST_BYTES = 400_000_000
-#: Maximum length of a library's message in a result, in characters.
+#: Maximum length of a library's error message, in characters.
 _MOST_CHARACTERS = 200
 
 
@@ -44,7 +44,7 @@ _MOST_CHARACTERS = 200
 class ReaderDifference:
     """A joint that a library reads differently, and the element of the file that explains the difference.
 
-    `size` is the largest difference between entries of the child link's pose in the parent link.
+    `size` is the largest difference between entries of the child link's pose relative to the parent link.
     """
 
     joint: str
@@ -59,11 +59,12 @@ class LibraryReading:
 
     Attributes:
         refused: Reason why the library does not read the file; None if it reads the file.
-        joints: The joints with a coordinate in the library, in the library's order.
+        joints: The joints that have a coordinate in the library, in the library's order.
         same_order: Whether the library has the same joints as urdfkin, in the same order.
-        missing: Links that the library's model does not contain; in USD, only links with a prim of their own.
-        worst: Largest difference between the link poses of the two libraries, relative to the root link; 0 if
-            all poses are equal up to rounding.
+        missing: Links that the library's model does not contain. Links without their own prim in a USD file
+            do not count.
+        worst: Largest difference between link poses (relative to the root link) in the library and in
+            urdfkin; 0 if all poses are equal up to rounding.
         differences: The joints that the library reads differently from urdfkin.
     """
 
@@ -92,7 +93,7 @@ def installed(form: str = "urdf") -> tuple[str, ...]:
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare the models that libraries and urdfkin read from a robot's file, by default all installed ones.
+    """Compare how urdfkin and other libraries (by default all installed ones) read a robot's file.
 
     The poses of all links are compared at q = 0 and at random configurations.
 
@@ -164,7 +165,7 @@ def _reading(
     if not shared:
         return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
-    # The text lacks a root joint that `load` added, so poses are relative to the first common link.
+    # `load` may add a root joint that the text lacks, so poses are relative to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(theirs - ours[:, shared]).max())
@@ -206,7 +207,7 @@ def _source(robot: Robot) -> tuple[str, str]:
 
 
 def _without_shapes(text: str) -> str:
-    """Return a URDF text without shapes, because some libraries search the disk for the files of meshes."""
+    """Return a URDF text without shapes; with shapes, some libraries search the disk for mesh files."""
     from xml.etree.ElementTree import tostring
 
     robot = plain_xml(text)
@@ -248,7 +249,8 @@ def _cause(
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link, first at q = 0.
+    `T` (urdfkin) and `T_theirs` (library) are poses of the child link relative to the parent link. The first
+    pose is at q = 0.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
