@@ -31,7 +31,7 @@ _ROUNDING = 10.0**-_DECIMALS
 
 
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
-    """Return the URDF's bytes with new origins (4, 4) of joints, by name.
+    """Return the URDF's bytes with new joint origins; `origins` contains them (4, 4) by joint name.
 
     A number that is unchanged up to rounding keeps its digits. A rotation has several triples of roll, pitch
     and yaw angles; the triple nearest to the old angles is written. Errors in the text, or a joint that does

@@ -363,7 +363,7 @@ def _choices_error(
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in choices.orders:
         if not b.allows_order(names, comparator.tolerance):
-            return f"`orders`: the axes do not allow the order {', '.join(names)}"
+            return f"`orders`: the order {', '.join(names)} would change the motion"
         b = b.reordered(names)
     return None
 
@@ -460,7 +460,7 @@ def _interval_errors(
 def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Yield errors if `q_a` and `q_b` are invalid, or if their distance or angle is smaller than stated."""
+    """Check `q_a` and `q_b`, and that the distance and the angle there are at least as large as stated."""
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.correspond(q_a, q_b):

@@ -123,7 +123,7 @@ def compare_readers(
             raise InputError(f"{LIBRARIES[name].title} is not installed", remedy=f"pip install {package}")
     if any(joint.lock is not None for joint in robot.tree.joints):
         raise InputError(
-            "other libraries read the file, which has no locked joints",
+            "other libraries cannot lock joints",
             where=robot.name,
             remedy="load the robot without locks",
         )
@@ -163,7 +163,9 @@ def _reading(
     tolerance *= max(1.0, float(np.abs(ours).max()))
     shared = [i for i, link in enumerate(links) if all(link in poses for poses in answer["poses"])]
     if not shared:
-        return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
+        return LibraryReading(
+            title, number, "its model contains none of the robot's links", tuple(answer["joints"])
+        )
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
     # `load` may add a root joint that the text lacks, so poses are relative to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
@@ -195,7 +197,7 @@ def _source(robot: Robot) -> tuple[str, str]:
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
             raise InputError(
-                "other libraries read the whole USD stage",
+                "other libraries cannot select a variant or an articulation of a USD stage",
                 remedy="load the stage without variants and articulation",
             )
         return str(source), "usd"

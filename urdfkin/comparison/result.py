@@ -148,7 +148,7 @@ class Difference:
             case "axis":
                 sizes = [f"tilted by {angle(self.radians)}"] if self.radians else []
                 sizes += [f"{length(self.metres)} off"] if self.metres else []
-                alone = " (the links after this joint are not)" if self.detail == "alone" else ""
+                alone = " (the links after this joint agree)" if self.detail == "alone" else ""
                 return f"{place}: its axis is {' and '.join(sizes)}{alone}"
             case "place":
                 return f"{place} is {size_words(self.metres, self.radians)} on its rigid body"
@@ -212,9 +212,9 @@ class JointDifference:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if `b` states the size of the difference.
-        b: The parameter's value in B, or a text. The text states the size of the difference, or why the
-            models cannot be compared here.
+        a: The parameter's value in A; None if `b` contains no value.
+        b: The parameter's value in B. If `a` is None, `b` is a text: the size of the difference, or the
+            reason why the models cannot be compared here.
         explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
     """
 
@@ -536,14 +536,14 @@ class Sameness(Displayable):
             one = joints_of_b.get(joint.name)
             if one is None or tree_a.joints[tree_a.joint_index(one.a)].kind.nq != joint.kind.nq:
                 raise InputError(
-                    "a joint of B has no joint of A",
+                    "a joint of B has no matching joint in A",
                     where="map",
                     found=joint.name,
                     remedy="match it with map={JOINT_OF_A: JOINT_OF_B} (--map), or make it fixed in B",
                 )
             if one.conversion is not None:
                 raise InputError(
-                    "a free joint has another frame in B",
+                    "a planar or floating joint has another frame in B",
                     where="map",
                     found=joint.name,
                     remedy="convert q with to_b: a convention cannot describe another frame of a joint",

@@ -633,7 +633,7 @@ class JointComparison:
     position error and the rotation error of this frame. The multiplier and the offset of a mimic rule have a
     relative error of at most 2^-24.
 
-    In B, the link P may not be an ancestor of the link: the paths to P and to the link may branch at a common
+    In B, P may not be an ancestor of the compared link: the paths to P and to the link may branch at a common
     ancestor. Let W and E be the position error and the rotation error of the link relative to this common
     ancestor. Let V and F be the position error and the rotation error of P relative to the common ancestor.
     Let d be the distance between the link and P. Then the position error of the link relative to P is at most
