@@ -116,7 +116,7 @@ class ParametricChain:
     def columns(
         self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, [linear; angular].
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
         `frames` is the result of the method `frames` for `values` and `at`, if the caller has computed it.
         """

@@ -194,7 +194,7 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest distance (m) and angle (rad) between the `tool0` frames of two arms at samples."""
+    """Return the largest distance (m) and angle (rad) between two arms' `tool0` at sampled configurations."""
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)

@@ -88,7 +88,7 @@ class CertifiedJoint(TypedDict):
 
     a: Annotated[str, says("Name of the joint in A.")]
     b: Annotated[str, says("Name of the joint in B.")]
-    sense: Annotated[Literal[1, -1], says("Sign in: value in B = `sense` * value in A + `offset`.")]
+    sense: Annotated[Literal[1, -1], says("1 or -1; value in B = `sense` * (value in A) + `offset`.")]
     offset: Annotated[float, says("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
@@ -150,11 +150,15 @@ class SameCertificate(Header):
     ]
     joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
     links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
-    tools: Annotated[list[ToolEntry], says("Matched links whose poses differ: different tools.")]
-    orders: Annotated[list[list[str]], says("Consecutive joints of B, in the changed order.")]
+    tools: Annotated[
+        list[ToolEntry], says("Matched links with different poses, which count as different tools.")
+    ]
+    orders: Annotated[
+        list[list[str]], says("Consecutive joints of B whose order was changed, in the new order.")
+    ]
     base: Annotated[Matrix, says("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
-        list[str], of_length(2), says("Links of A and B relative to which poses are compared.")
+        list[str], of_length(2), says("Poses are compared relative to these links of A and B.")
     ]
     rounding: Rounding
     frames: Annotated[

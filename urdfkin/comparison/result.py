@@ -631,7 +631,7 @@ def changes_of_b(
     """Return the changes that make B equal to A: the kind of each (an entry of `FREE`) and a line of text.
 
     The function sets the tool poses in `alignment`. If one model is a Denavit-Hartenberg table (`tables`),
-    every frame that differs is a tool, because the poses of a table's frames depend on its convention.
+    every frame that differs counts as a tool, because the poses of a table's frames depend on its convention.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -666,9 +666,9 @@ def changes_of_b(
 
 
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Yield the kind "tools" and a line of text for each changed tool.
+    """For each changed tool, yield the kind "tools" and a line of text.
 
-    A frame that differs is a tool if it has no children, or if it describes how the robot is mounted.
+    A frame that differs counts as a tool if it has no children, or if it describes how the robot is mounted.
     """
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
@@ -840,7 +840,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; 0 if within rounding."""
+    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; rounding errors become 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 
 

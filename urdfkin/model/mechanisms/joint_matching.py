@@ -78,7 +78,7 @@ class Pairing:
         """Pair the joints at two bodies; return the joint pairs, and the unpaired joints of A and of B.
 
         `via` contains the joints before these bodies; None at the first bodies. G (4, 4) moves the body of A
-        from its zero configuration to the current pose of B's body; XC (4, 4) moves the body of B from its
+        from its zero configuration to the current pose of B's body. XC (4, 4) moves the body of B from its
         zero configuration to its current pose.
         """
         named, left_a, left_b = self.by_names(bodies, via)
@@ -104,7 +104,7 @@ class Pairing:
     def by_names(
         self, bodies: tuple[int, int], via: Via
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the joint pairs found by name, and the joints of A and of B that geometry must pair."""
+        """Pair joints by name; return the pairs, and the remaining joints of A and of B."""
         if (known := self._by_names.get((bodies, via))) is None:
             left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not via[0]]
             left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not via[1]]
@@ -390,7 +390,7 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return pairs of the first revolute axes after two bodies; without revolute axes, of prismatic axes.
+    """Return pairs of the first revolute axes after two bodies, or else pairs of prismatic axes.
 
     Each result has three parts: a pair of axes, the pairs before it, and the pairs after it.
     """
@@ -498,7 +498,7 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Pair each joint of A with a different joint of B, so that all subtrees match exactly; else None."""
+        """Pair all joints of A with joints of B so that all subtrees match exactly; None if impossible."""
         if not left:
             return [], rates
         at = min(range(len(left)), key=lambda i: len(candidates[i]))

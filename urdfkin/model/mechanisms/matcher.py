@@ -177,7 +177,7 @@ class MechanismMatcher:
                     yield base, X
 
     def _most_matches(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of matching joints and links from two first bodies.
+        """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
 
         Two matched branches have at most as many matches as the smaller branch has joints and links. The sum
         over all branches is largest if the branches at the two bodies are matched in the order of their
@@ -218,7 +218,7 @@ class MechanismMatcher:
         yield from islice(some, MOST_ROOT_POSES)
 
     def _root_poses_by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield the pose of A's root, then the poses of B's root that align links of equal names."""
+        """Yield poses of B's root: first the identity, then those that align links of equal names."""
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
@@ -426,7 +426,7 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        The first candidate is the identity, or `plane` for a planar joint. The second is the N of the zero
+        The first candidate is the identity, or `plane` for a planar joint. The second keeps B in its zero
         configuration. The others make a link or an axis of B coincide with a link or an axis of A.
 
         Args:
@@ -589,7 +589,7 @@ def _best_of(scored: Sequence[tuple[_Choice, BodyPair, Score]]) -> tuple[_Choice
 
 
 def better(score: Score, than: Score) -> bool:
-    """Return whether `score` has more matches than `than`, or as many and less than half its difference."""
+    """Return whether the first score has more matches, or as many and less than half the difference."""
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
@@ -690,7 +690,7 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Replace joint pairs (a, b), (c, d) by (a, d), (c, b) if this is better; it helps with mirrored arms."""
+    """Replace joint pairs (a, b), (c, d) by (a, d), (c, b) if this is better, as for two mirrored arms."""
     if best.only_a or best.only_b:  # some joints have no partner, so no exchange can make A and B equal
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_AHEAD)
@@ -826,7 +826,7 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 
 
 def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
-    """Yield groups of joint pairs that depend on one coordinate of A and one coordinate of B."""
+    """Group the joint pairs that depend on the same coordinate of A and the same coordinate of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(alignment.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):

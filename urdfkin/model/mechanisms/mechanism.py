@@ -31,9 +31,9 @@ exception. If two revolute joints have the same line as axis, only the sum of th
 links after them.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
-is a variable. A coordinate of B is a linear function of a variable, given by the sign and the zero offset of
-the joint. If a joint can move independently only in B, its coordinate is one more variable. In A, such a
-joint is a mimic joint or a fixed joint, for example.
+is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
+determine this function. If a joint can move independently only in B, its coordinate is one more variable. In
+A, such a joint is a mimic joint or a fixed joint, for example.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between two poses."""
-    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # thousands of calls are faster with plain floats
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # in thousands of calls, floats are faster than arrays
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
@@ -196,8 +196,8 @@ def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
     M must keep or reverse the plane's normal. M then consists of a translation along the normal and a motion
-    in the plane, and of half a turn about x if M reverses the normal. N contains the opposite translation,
-    and the same half turn.
+    in the plane. If M reverses the normal, M also contains half a turn about x. N contains the opposite
+    translation and the same half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -401,7 +401,7 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
-    ux, uy, uz = s.direction.tolist()  # thousands of calls are faster with plain floats
+    ux, uy, uz = s.direction.tolist()  # in thousands of calls, floats are faster than arrays
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
@@ -555,7 +555,7 @@ class Alignment:
 
     @property
     def names(self) -> dict[str, str]:
-        """The names of the matched joints: name in A to name in B."""
+        """The name of each matched joint in A, mapped to its name in B."""
         joints = self.a.tree.joints, self.b.tree.joints
         return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
 
