@@ -1,4 +1,4 @@
-"""Calibrate a robot: fit its parameters to measured poses, and report their uncertainty and warnings.
+"""Calibrate a robot: fit its parameters to measured poses, and report uncertainties and warnings.
 
 A fit that is not plausible (`plausible.py`) is refused. Otherwise the parameters that changed by more than
 two standard deviations are fitted again and written. The other parameters keep their original values.

@@ -4,7 +4,7 @@
 a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
 parameters. For each singular value, `urdfkin.verify.singular_values` computes a lower bound, which takes
 rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
-lower bound, so no tolerance must be chosen.
+lower bound, so no tolerance is needed.
 
 The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis, if the next
 frame compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
@@ -39,13 +39,13 @@ distributed, with 3 degrees of freedom for a position and 6 for a full pose. The
 one of a hundred data sets without outliers exceeds the limit. One outlier can hide another, so each step
 removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
 
-**Start values.** Base and tool are computed from the poses before the fit. With the robot's poses T_i, the
-measured poses M_i, the base B and the tool X, M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are linear in
-the two unknown rotations, which together form the null vector of the equations (Shah, 2013). The measured
-positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only positions are
-measured, the base and the position of the target on the tip are unknown. The equations for the base are
-linear if the target is known, and the equations for the target are linear if the base is known. The module
-therefore computes base and target alternately.
+**Start values.** Base and tool are computed from the poses before the fit. The robot's poses T_i, the
+measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are
+linear in the two unknown rotations, which together form the null vector of the equations (Shah, 2013). The
+measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only
+positions are measured, the base and the position of the target on the tip are unknown. The equations for the
+base are linear if the target is known, and the equations for the target are linear if the base is known. The
+module therefore computes base and target alternately.
 """
 
 from __future__ import annotations

@@ -192,7 +192,7 @@ class CalibrationModel:
         return self._change(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
-        """Return the new origin (4, 4) of each joint of the URDF whose origin moved, by joint name.
+        """Return the new origin (4, 4) of each URDF joint whose origin moved, by joint name.
 
         The origin of a locked joint does not include the value at which the joint is locked.
         """
@@ -291,9 +291,9 @@ class _ModelBuilder:
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
     """Make a parametric model of a URDF's path; `fit` selects the sets of parameters.
 
-    The last fixed joint before the tip also has parameters. Other fixed joints have none, because parameters
-    of the neighbouring moving joints have the same effect. An unknown frame or set raises UnknownNameError; a
-    planar or floating joint on the path raises InputError.
+    A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
+    parameters of the neighbouring moving joints have the same effect. An unknown frame or set raises
+    UnknownNameError; a planar or floating joint on the path raises InputError.
     """
     path: FrameChain = chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0

@@ -84,9 +84,8 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    if (
-        math.cos(pitch) <= ANGLE * EPS
-    ):  # roll and yaw have the same axis, so only their sum or difference is defined
+    # If roll and yaw have the same axis, only their sum or difference is defined.
+    if math.cos(pitch) <= ANGLE * EPS:
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [

@@ -143,7 +143,7 @@ class DistanceSearch:
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses as the method `poses` does, but for configurations and computed by `computed`."""
+        """Return poses (n, frames, 4, 4) of A and of B at configurations; `computed` computes the poses."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.alignment.base[1]]
@@ -315,7 +315,7 @@ class Boxes:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (module docstring), (n, 3), and its derivatives (n, 3, variables) at the middles `c`."""
+        """Return D (module docstring) (n, 3), and its derivatives (n, 3, variables), at the middles `c`."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)

@@ -80,7 +80,9 @@ class CertifiedConversion(TypedDict):
 
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
-    back: Annotated[bool, says("Whether the pose in A is inverted, because a joint is reversed.")]
+    back: Annotated[
+        bool, says("Whether the pose in A is inverted, because one model has the joint reversed.")
+    ]
 
 
 class CertifiedJoint(TypedDict):
@@ -464,7 +466,7 @@ def _interval_errors(
 def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Check `q_a` and `q_b`, and that the distance and the angle there are at least as large as stated."""
+    """Yield errors if `q_a` and `q_b` do not correspond, or attain less than the stated distance or angle."""
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.correspond(q_a, q_b):

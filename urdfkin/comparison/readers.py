@@ -192,7 +192,7 @@ def _reading(
 
 
 def _source(robot: Robot) -> tuple[str, str]:
-    """Return a library's input (a URDF text without shapes, or the path of another file) and its format."""
+    """Return a library's input (a URDF text without shapes, or an MJCF or USD path) and its format."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:

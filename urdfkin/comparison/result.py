@@ -67,7 +67,7 @@ class SameQuestion:
 
     Attributes:
         within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they are
-            written. None asks whether the models are equivalent.
+            written. With None, the question is whether the models are equivalent.
         strict: If true, the answer is also no for models that are equivalent only after changes, and for
             models with remarks, such as different joint limits.
     """
@@ -295,7 +295,7 @@ class Sameness(Displayable):
         names: The robots' names.
         sources: The sources of A and B, as the user gave them.
         digests: SHA-256 of the two texts.
-        verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, `UP_TO_SINGLE`, or `DIFFERS`.
+        verdict: `Verdict.SAME`, `SAME_AFTER` (after the changes in `after`), `UP_TO_SINGLE`, or `DIFFERS`.
         after: The changes that bring B closest to A, with one line of text for each change. The changes are
             listed even if the models still differ after these changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
@@ -368,7 +368,7 @@ class Sameness(Displayable):
 
     @property
     def _verdict(self) -> str:
-        """The verdict in words; for `Verdict.SAME_AFTER` with the kinds of the changes of B."""
+        """The verdict in words; `Verdict.SAME_AFTER` includes the kinds of the changes of B."""
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
@@ -546,7 +546,7 @@ class Sameness(Displayable):
                     "a planar or floating joint has another frame in B",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with to_b: a convention cannot describe another frame of a joint",
+                    remedy="convert q with to_b, because a convention cannot describe another joint frame",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
@@ -628,7 +628,7 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 def changes_of_b(
     alignment: Alignment, rounding: Tolerance, *, tables: bool = False
 ) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A: the kind of each (an entry of `FREE`) and a line of text.
+    """Return the changes that make B equal to A; each is a kind (an entry of `FREE`) and a line of text.
 
     The function sets the tool poses in `alignment`. If one model is a Denavit-Hartenberg table (`tables`),
     every frame that differs counts as a tool, because the poses of a table's frames depend on its convention.

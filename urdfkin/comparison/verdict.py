@@ -437,7 +437,7 @@ class Comparator:
         attained: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:
-        """Return a frame's interval; `attained` is the largest distance (m) found and its variables."""
+        """Return a frame's interval; `attained` is the largest distance (m) found, with its variables."""
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
             return Interval(*names, 0.0, *upper, 0.0, (), ())
@@ -518,8 +518,8 @@ def _with_idle_joints_fixed(
 ) -> KinematicTree:
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
-    A joint with the multiplier 0 never moves. The joint remains a mimic joint if the other model has a
-    matching joint (as in `_fixed_only_here`) that moves: then `same` compares the two joints.
+    A joint with the multiplier 0 never moves. If a matching joint of the other model moves, the joint remains
+    a mimic joint, so that `same` compares the two joints. Joints match as in `_fixed_only_here`.
     """
     moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
@@ -700,7 +700,7 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
-        """Return the link's nearest ancestor in A that both models have, and the joints between the two.
+        """Return the link's nearest ancestor in A that both models have, and the joints between them.
 
         If there is no such ancestor, the result contains the link at which all paths begin.
         """

@@ -47,7 +47,7 @@ def family(kind: JointKind) -> str:
 
 
 class Pairing:
-    """Find pairs of a joint of mechanism A and a joint of mechanism B, for each pair of bodies.
+    """Pair the joints of mechanism A with joints of mechanism B, for each pair of bodies.
 
     `given` contains names of joints of `a`, each with the name of the corresponding joint of `b`.
     """

@@ -100,7 +100,7 @@ class MechanismMatcher:
     Args:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
-        pairing: Finds the joints of `a` and `b` that may be matched.
+        pairing: Object that finds the joints of `a` and `b` that may be matched.
         choices: Prescribed choices, for example zero offsets. None: the matcher finds the choices for which
             most joints and links agree.
         ahead: Number of joint pairs that the matcher may compare ahead of the current joint.
@@ -426,8 +426,8 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        The first candidate is the identity, or `plane` for a planar joint. The second keeps B in its zero
-        configuration. The others make a link or an axis of B coincide with a link or an axis of A.
+        The first candidate is the identity, or `plane` for a planar joint. The second candidate keeps B in
+        its zero configuration. The others make a link or an axis of B coincide with a link or an axis of A.
 
         Args:
             there: The bodies after the joint, with B in its zero configuration.
@@ -767,7 +767,8 @@ class _Rule:
         d: Offset of B's rule.
         offset: Zero offset o of B's joint in the alignment.
         turns: Whether the joint is revolute.
-        free: Whether any o is possible, because no axis and no link with the same name follows the joint.
+        free: Whether any offset o is possible, because no axis and no link with the same name follows the
+            joint.
         meets: Whether links of A and of B coincide on the body after the joint.
     """
 

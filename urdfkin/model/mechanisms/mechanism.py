@@ -86,7 +86,7 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
 
 
 def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
-    """Return the rotation by the smallest angle from one unit vector to another, and the angle."""
+    """Return the smallest rotation from one unit vector to another, and its angle."""
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)

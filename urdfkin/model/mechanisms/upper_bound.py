@@ -33,9 +33,9 @@ vector. With d and y as above, the derivatives with respect to a joint value are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
-with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
-and t' are the screw, axis, point and value of the matched joint in B. A derivative is a free vector: a joint
-between the base and this joint rotates the derivative and does not translate it.
+with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A. The symbols
+S', u', o' and t' belong to the matched joint in B. A derivative is a free vector: a joint between the base
+and this joint rotates the derivative and does not translate it.
 """
 
 from __future__ import annotations
@@ -398,8 +398,8 @@ def _common_difference(
     Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
     second derivative. If t' = t + c, the second derivative is R' P' x' - R P x, up to its sign. Here x is the
     vector from A's axis to y, P is the projection perpendicular to A's axis, and R is the rotation about A's
-    axis. The symbols x', P' and R' are the same for B's axis. With the axes' directions u and u', |R' - R| <=
-    2 |u'
+    axis. The corresponding symbols for B's axis are x', P' and R'. With the axes' directions u and u', |R' -
+    R| <= 2 |u'
     - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes. If t and
     t' have different slopes, the second derivative is at most the sum of two terms, one for each joint. Each
     term is the square of the slope of t or t', times the largest distance of y from the joint's axis.
@@ -558,7 +558,7 @@ def relevant_joints(
 
     Most joints before the first difference of the models only rotate D. But an earlier joint changes the
     length of D if a joint after the first difference mimics it. So the result begins with the first joint
-    that differs, or whose variable also moves a joint after the first difference.
+    that differs, or with an earlier joint whose variable also moves a joint after the first difference.
     """
     steps, pairs = (
         alignment.path(frame.previous),
