@@ -76,7 +76,7 @@ def test_an_added_root_joint_is_no_difference_and_a_locked_joint_is_an_error() -
     (found,) = compare_readers(robot, ["yourdfpy"])
     assert found.agrees, found
     assert (found.same_order, found.missing) == (True, ())
-    with pytest.raises(urdfkin.InputError, match="no locked joints"):
+    with pytest.raises(urdfkin.InputError, match="cannot lock joints"):
         compare_readers(urdfkin.load(TEXTS["two revolute"]).locked({"j1": 0.1}), ["yourdfpy"])
 
 

@@ -1,4 +1,4 @@
-"""Calibrate a robot: fit its parameters to measured poses, and report their uncertainty and warnings.
+"""Calibrate a robot: fit its parameters to measured poses, and report uncertainties and warnings.
 
 A fit that is not plausible (`plausible.py`) is refused. Otherwise the parameters that changed by more than
 two standard deviations are fitted again and written. The other parameters keep their original values.
@@ -57,15 +57,15 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general`.
 _GENERAL = 40
-#: Number of standard deviations by which the residuals must differ from the stated noise for a warning.
+#: A warning is given if the residuals differ from the stated noise by more standard deviations than this.
 _UNLIKELY = 4.0
 #: Ratio of uncertainties (`Calibration.weak`) above which a parameter is poorly observable.
 _WEAK = 10.0
 #: Seed of the random configurations for `Calibration.weak`.
 _WEAK_SEED = 1
-#: Diagonal entry of R in J = Q R below which columns count as dependent, relative to R's largest entry.
+#: The columns of J = Q R count as dependent if a diagonal entry of R is at most this fraction of the largest.
 _DEPENDENT = 1e-12
-#: Divisors of the robot's size that give the coordinates of a target that lies on no joint axis.
+#: The robot's size divided by these numbers gives the coordinates of a target that lies on no joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding` for the comparison with Pinocchio.
 #: Pinocchio rounds more often: it reads the written file, and computes the poses of base and tip separately.
@@ -89,7 +89,7 @@ class Calibration:
         general: The parameters that are identifiable from random poses.
         fitted: The fit; None without poses.
         before: The fit of only base and tool, with the robot's original parameters.
-        odd: Indices of those poses that are outliers.
+        odd: Indices of the outlier poses.
         without_odd: The fit without the outliers.
         weak: Indices of poorly observable parameters, each with a ratio of uncertainties: the uncertainty at
             the measured configurations, divided by the uncertainty at as many random configurations.
@@ -212,8 +212,8 @@ def calibrate(
 ) -> Calibration:
     """Fit the parameters of a robot or a table to measured poses.
 
-    urdfkin loads the written model again. It compares the tip's poses at the measured configurations with the
-    poses that Pinocchio computes.
+    Afterwards urdfkin loads the written model, and compares the tip's poses at the measured configurations
+    with the poses that Pinocchio computes.
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
@@ -321,7 +321,7 @@ def fitted_model(
 
 
 def _general_target(model: CalibrationModel) -> FloatArray:
-    """Return the model's parameters (p,), with a fitted target position that is on no joint axis."""
+    """Return the model's parameters (p,); if the target position is fitted, it lies on no joint axis."""
     at = model.chain.start.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -398,7 +398,7 @@ def _fit(
 
 
 def _significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """Return the parameters to write, which always include base and tool, and their fit."""
+    """Return the parameters to write and their fit; base and tool are always included."""
     model, kept, found = fit.model, fit.identification.kept, fit.fitted
     is_end = [model.chain.parameters[k].end for k in kept]
     change = found.at[list(kept)] - model.chain.start[list(kept)]
@@ -420,8 +420,9 @@ def _add_identifiable(
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values, if they significantly reduce the residuals.
 
-    Fewer parameters are identifiable in special cases, and a nominal model is often such a case. For example,
-    the position of a tip depends on the last joint's angle, but not if the tip is on the last axis.
+    In special geometries, fewer parameters are identifiable; the original model often has such a geometry.
+    For example, if the tip lies on the last joint's axis, its position does not depend on the last joint's
+    angle.
     """
     again = identify(model, measured.values, complete=measured.complete, at=found.at)
     more = again.rank - identification.rank
@@ -546,12 +547,12 @@ def _warnings(found: Calibration) -> Iterator[str]:
         )
 
 
-#: Largest error of a rotation matrix or of a quaternion's length in a file, which contains rounded digits.
+#: Largest accepted error of a rotation matrix or of a quaternion's length; numbers in files are rounded.
 _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 _LAST_ROW = tuple(f"T3{j}" for j in range(4))
-#: Length (m) of each unit of positions.
+#: Units of measured positions, each with its length in metres.
 UNITS = {"m": 1.0, "mm": 1e-3}
 
 

@@ -4,7 +4,7 @@
 a change is in the null space of the stacked Jacobian. The rank of this Jacobian is the number of identifiable
 parameters. For each singular value, `urdfkin.verify.singular_values` computes a lower bound, which takes
 rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
-lower bound, so no tolerance must be chosen.
+lower bound, so no tolerance is needed.
 
 The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis, if the next
 frame compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
@@ -13,13 +13,13 @@ parameters of each prismatic joint. All 6 parameters of the tip are identifiable
 1987). If only positions are measured, 3 fewer parameters are identifiable, because the tool's orientation is
 unknown.
 
-Orthogonal elimination chooses the parameters that are not fitted, joint by joint, from base to tip. Each
-parameter has a column in the Jacobian. In each step, the elimination subtracts from every other column its
-projection onto the kept columns. The length of the remainder measures how independent the column is. A column
-is a candidate if its remainder is at least half as long as the longest remainder. The elimination keeps the
-first candidate in the model's order of preference. As a result, no fitted parameter becomes large to
-compensate for a fixed parameter. Without this choice, four parameters of nearly parallel axes would become
-hundreds of metres long and cancel each other.
+Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
+has a column in the Jacobian. In each step, the elimination subtracts from each remaining column its
+projection onto the chosen columns. The length of the remainder measures how independent the column is. A
+column is a candidate if its remainder is at least half as long as the longest remainder. The elimination
+chooses the first candidate in the model's order of preference; the fit then includes this parameter. As a
+result, no fitted parameter must become large to have the effect of a parameter that is not fitted. Without
+this choice, four parameters of nearly parallel axes would become hundreds of metres and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -29,7 +29,7 @@ and r the weighted residuals. The covariance of the parameters is
 
 The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
 
-Noise that you do not state is estimated from the residuals, separately for positions and rotations. The
+If you do not state the noise, it is estimated from the residuals, separately for positions and rotations. The
 variance of the positions is the sum of the squared position residuals, divided by the sum of the redundancies
 1 - H_ii of the measured position coordinates. The variance of the rotations is computed in the same way. The
 estimates are repeated until they are constant (Foerstner's variance components).
@@ -39,13 +39,13 @@ distributed, with 3 degrees of freedom for a position and 6 for a full pose. The
 one of a hundred data sets without outliers exceeds the limit. One outlier can hide another, so each step
 removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
 
-**Start values.** Base and tool are computed from the poses before the fit. With the robot's poses T_i, the
-measured poses M_i, the base B and the tool X, M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are linear in
-the two unknown rotations, which together form the null vector of the equations (Shah, 2013). The measured
-positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only positions are
-measured, the base and the position of the target on the tip are unknown. The equations for the base are
-linear if the target is known, and the equations for the target are linear if the base is known. The module
-therefore computes base and target alternately.
+**Start values.** Base and tool are computed from the poses before the fit. The robot's poses T_i, the
+measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are
+linear in the two unknown rotations, which together form the null vector of the equations (Shah, 2013). The
+measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only
+positions are measured, the base and the position of the target on the tip are unknown. The equations for the
+base are linear if the target is known, and the equations for the target are linear if the base is known. The
+module therefore computes base and target alternately.
 """
 
 from __future__ import annotations
@@ -66,11 +66,11 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: Smallest remainder of a column that the elimination may keep, as a fraction of the longest remainder.
+#: A column is a candidate if its remainder is at least this fraction of the longest remainder.
 _AS_GOOD = 0.5
-#: Maximum number of fitted parameters that a message names because they have the effect of a fixed parameter.
+#: Maximum number of fitted parameters that a message names as having the same effect as a fixed parameter.
 _NAMED = 3
-#: Smallest fraction of a fixed parameter's effect for which a message names a fitted parameter.
+#: A message names a fitted parameter only if it has more than this fraction of a fixed parameter's effect.
 _SHARE = 1e-6
 
 
@@ -97,7 +97,7 @@ class Identification:
 def stacked(
     model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
 ) -> FloatArray:
-    """Return the Jacobian (rows, p) of all measured coordinates, for the arguments of `identify`.
+    """Return the Jacobian (rows, p) of all measured coordinates; the arguments are those of `identify`.
 
     All entries are in metres: the rows for rotations are multiplied by the length `chain.size`.
     """
@@ -165,14 +165,14 @@ def first_names(names: Iterable[str], most: int) -> str:
     return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
-#: Smallest sum of all redundancies with which a fit can be checked; the sum is a whole number up to rounding.
+#: A fit can be checked if its total redundancy is at least this number; without rounding, it is an integer.
 _ONE_OR_MORE = 0.5
-#: Fraction of the largest eigenvalue of 1 - H_ii below which an eigenvalue is replaced by zero.
-#: The residuals do not show an error of the pose along the eigenvector of such an eigenvalue.
+#: Eigenvalues of 1 - H_ii below this fraction of the largest eigenvalue are replaced by zero.
+#: The residuals do not show pose errors along the eigenvectors of these eigenvalues.
 _UNOBSERVED = 1e-9
 #: Maximum number of estimates of the noise.
 _ESTIMATES = 20
-#: Relative change of the estimated noise at which the estimation ends.
+#: The estimation ends when the relative change of the estimated noise is at most this number.
 _CONSTANT = 1e-3
 #: Probability that an outlier is reported for a data set without outliers.
 FALSE_ALARM = 0.01
@@ -437,10 +437,10 @@ def quantile(share: float, freedom: int) -> float:
 
 #: Maximum number of repetitions that compute base and target alternately.
 _REPETITIONS = 200
-#: Relative change of the target's position at which the repetitions end.
+#: The repetitions end when the relative change of the target's position is at most this number.
 _CONSTANT_TARGET = 1e-9
 #: Largest plausible spread of measured positions, divided by the spread of the robot's tip positions.
-#: With positions in millimetres by mistake, this quotient is about 1000.
+#: If positions are in millimetres by mistake, this quotient is about 1000.
 _LARGEST_SPREAD = 100.0
 
 
@@ -522,7 +522,7 @@ def _translations(
 
 
 def demand_metres(model: CalibrationModel, measured: Measured) -> None:
-    """Raise InputError if measured positions spread 100 times more than the positions of the robot's tip."""
+    """Raise InputError if the measured positions spread 100 times farther than those of the robot's tip."""
     T = model.chain.poses(measured.values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)

@@ -3,8 +3,8 @@
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
 origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
 an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
-joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the angle or length of
-the motion, multiplied by the joint's value.
+joint's value by (1 + g). The derivative of the tip's pose with respect to g is its derivative with respect to
+the motion's angle or length, multiplied by the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
 to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the
@@ -65,7 +65,7 @@ class Drive(ElementaryMotion):
 
     Attributes:
         parameter: Index of the parameter that is the angle or length. For the motion of a joint: index of the
-            gain, or None without a gain.
+            gain that scales the joint's value, or None if the value is not scaled.
         joint: Index of the joint whose value is the angle or length; None for the motion of a parameter.
         sense: -1 if the path leads from the joint's child to the joint's parent, or if the table's row
             subtracts the joint's value; else 1.
@@ -96,7 +96,7 @@ class ParametricChain:
 
     @property
     def size(self) -> float:
-        """Sum (m) of all lengths of the model, or 1 if the sum is 0; converts radians to metres."""
+        """Sum (m) of the model's lengths, or 1 if it is 0; a factor that converts radians to metres."""
         constant = [
             float(np.linalg.norm(step[:3, 3]))
             for step in self.path.steps
@@ -116,7 +116,7 @@ class ParametricChain:
     def columns(
         self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, [linear; angular].
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
         `frames` is the result of the method `frames` for `values` and `at`, if the caller has computed it.
         """
@@ -154,11 +154,11 @@ PARALLEL = math.radians(5.0)
 
 #: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
-#: Name, whether the motion is a rotation, and index of the coordinate axis, for each parameter of an origin.
-#: The parameters have the order of multiplication.
+#: For each parameter of an origin: name, whether it is a rotation, and index of the coordinate axis.
+#: The motions are multiplied in this order.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order of preference of parameters with equal effects, for revolute (True) and prismatic joints.
+#: Order in which parameters are fitted if their effects are equal, for revolute (True) and prismatic joints.
 #: The joint's zero comes first, then motions of the axis, then motions of the frame alone.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
@@ -192,7 +192,7 @@ class CalibrationModel:
         return self._change(which, at, end=True)
 
     def origins(self, at: FloatArray) -> dict[str, FloatArray]:
-        """Return the new origins (4, 4) of the URDF's joints that moved, by joint name.
+        """Return the new origin (4, 4) of each URDF joint whose origin moved, by joint name.
 
         The origin of a locked joint does not include the value at which the joint is locked.
         """
@@ -209,7 +209,7 @@ class CalibrationModel:
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:
-        """Return the table with the parameters `at`; None if the model describes a URDF."""
+        """Return the table with the parameter values `at`; None if the model describes a URDF."""
         if not isinstance(self.source, DHTable):
             return None
         cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.chain.parameters) if not p.end}
@@ -224,7 +224,7 @@ class CalibrationModel:
         return replace(self.source, rows=tuple(rows), base=T_base, tool=T_tool, snap=None)
 
     def _change(self, where: str, at: FloatArray, *, end: bool = False) -> FloatArray:
-        """Return the (4, 4) motion by the six parameters of a joint, the base or the tool."""
+        """Return the (4, 4) motion that is given by the six parameters of a joint, the base or the tool."""
         parameters = enumerate(self.chain.parameters)
         values = {p.what: float(at[k]) for k, p in parameters if (p.where, p.end) == (where, end)}
         motion = np.eye(4)
@@ -291,9 +291,9 @@ class _ModelBuilder:
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
     """Make a parametric model of a URDF's path; `fit` selects the sets of parameters.
 
-    The last fixed joint before the tip also has parameters. Other fixed joints have none, because parameters
-    of the neighbouring moving joints have the same effect. An unknown frame or set raises UnknownNameError; a
-    planar or floating joint on the path raises InputError.
+    A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
+    parameters of the neighbouring moving joints have the same effect. An unknown frame or set raises
+    UnknownNameError; a planar or floating joint on the path raises InputError.
     """
     path: FrameChain = chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0

@@ -3,8 +3,8 @@
 A fit always has some result, even if joint angles are in degrees, rows of q are shifted, or the sign of a
 joint is reversed. A fit is refused if its residuals are a large fraction of the robot's reach, or if it
 hardly improves the original model. A fit that tilts a joint's axis by a large angle, or that has no
-redundancy, is refused too. The module then corrects each common mistake in the data and fits again. If the
-fit is plausible after a correction, the corrected mistake is the likeliest one.
+redundancy, is refused too. To find the reason, the module corrects common mistakes in the data, one at a
+time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest one.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTr
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: An error above both fractions, of the reach and of the spread of positions, is not plausible.
+#: An rms error above both of these fractions, of the reach and of the positions' spread, is not plausible.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: An error above both fractions, of the reach and of the error before the fit, is not plausible.
+#: An rms error above both of these fractions, of the reach and of the error before the fit, is not plausible.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
-#: Rms errors above which common mistakes in the data are corrected: fraction of the reach, and radians.
+#: Rms errors above which common mistakes in the data are tried: a fraction of the reach, and radians.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Difference of joint values (rad, m) below which two configurations count as one.
 _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is compared with a limit.
-#: The tilt of an axis near the target is poorly observable.
+#: This excludes uncertain changes, such as the tilt of an axis near the target.
 _UNCERTAIN = 5.0
-#: Largest error after a correction, as a fraction of the error of an accepted fit and of a refused fit.
+#: Largest error after a correction, divided by the error before it: for accepted fits, and for refused fits.
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Number of corrections that are fitted; the most promising corrections are fitted first.
 _FITTED = 4
@@ -65,8 +65,8 @@ class Plausibility:
     Attributes:
         objections: A message for each reason; empty for a plausible fit.
         reason: The likeliest mistake and its remedy; None if no correction makes the fit plausible.
-        is_in_degrees: Whether joint angles look like degrees. The fit is then returned only if `radians` is
-            true.
+        is_in_degrees: Whether joint angles look like degrees although `radians` is false. The fit is then
+            always refused.
     """
 
     objections: tuple[str, ...] = ()
@@ -109,7 +109,7 @@ class FitWithData:
         return _norm(self.fitted.errors, reach) / math.sqrt(max(self.fitted.freedom, 1.0))
 
     def too_few(self) -> list[str]:
-        """Return a message if the measured numbers do not exceed the fitted parameters."""
+        """Return a message if there are not more measured numbers than fitted parameters."""
         steps = np.round(self.measured.values / _ONE_CONFIGURATION)
         distinct, each = len(np.unique(steps, axis=0)), self.fitted.errors.shape[1]
         rank = self.identification.rank
@@ -339,7 +339,7 @@ class _Trial:
         self.measured = Measured(model.coupling.values(correction.q), chosen.p, chosen.R)
         self.start = start_values(model, self.measured)
         errors_before = _norm(errors(model, self.measured, self.start), original.reach)
-        #: Error (m) per pose of a fit of only base and tool.
+        #: Error (m) per pose if only base and tool are fitted.
         self.error_before = errors_before / math.sqrt(len(self.measured))
 
     @cached_property

@@ -1,10 +1,10 @@
 """Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
-The controller stores Denavit-Hartenberg parameters. Two axes of the arm deviate from parallel axes by about a
-milliradian. The d of one row is therefore hundreds of metres, and the d of the next row compensates it. The
-driver's program `ur_calibration` shifts the link frames along their axes, so that these large offsets
-disappear. The program writes the pose of each joint in the frame of the previous joint: x, y, z, roll, pitch
-and yaw.
+The controller stores Denavit-Hartenberg parameters. Two axes of the arm are parallel except for about a
+milliradian, so their common normal is far away. The d of one row is therefore hundreds of metres, and the d
+of the next row compensates it. The driver's program `ur_calibration` shifts the link frames along their axes,
+so that these large offsets disappear. The program writes the pose of each joint in the frame of the previous
+joint: x, y, z, roll, pitch and yaw.
 
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
@@ -117,8 +117,9 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
     If all six joints turn about z, as in the current ROS description, the joint origins are replaced by the
     origins in the calibration file. In other URDFs, for example of the older ROS description, the joint
-    origins are fitted, so that `tool0` has the poses of the calibrated arm in `base`. A robot that is not a
-    Universal Robots arm raises InputError; the errors of the file are those of `read_calibration`.
+    origins are fitted, so that the poses of `tool0` in `base` are those of the calibrated arm. A robot that
+    is not a Universal Robots arm raises InputError; a wrong file raises the same errors as in
+    `read_calibration`.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)
@@ -193,7 +194,7 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest distance (m) and angle (rad) on samples between the frames `tool0` of two arms."""
+    """Return the largest distance (m) and angle (rad) between two arms' `tool0` at sampled configurations."""
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)

@@ -31,7 +31,7 @@ _ROUNDING = 10.0**-_DECIMALS
 
 
 def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
-    """Return the URDF's bytes with new origins (4, 4) of joints, by name.
+    """Return the URDF's bytes with new joint origins; `origins` contains them (4, 4) by joint name.
 
     A number that is unchanged up to rounding keeps its digits. A rotation has several triples of roll, pitch
     and yaw angles; the triple nearest to the old angles is written. Errors in the text, or a joint that does
@@ -84,7 +84,8 @@ def nearest_rpy(R: FloatArray, old: Vector) -> FloatArray:
     [3.1, 3.0, 3.1]
     """
     roll, pitch, yaw = rpy_of(R).tolist()
-    if math.cos(pitch) <= ANGLE * EPS:  # roll and yaw have one axis: only their combination is defined
+    # If roll and yaw have the same axis, only their sum or difference is defined.
+    if math.cos(pitch) <= ANGLE * EPS:
         roll, yaw = old[0], yaw + (old[0] - roll) * math.copysign(1.0, pitch)
     turns = ([roll, pitch, yaw], [roll + math.pi, math.pi - pitch, yaw + math.pi])
     wrapped = [

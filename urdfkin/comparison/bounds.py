@@ -1,19 +1,19 @@
-"""Bound the largest distance between the poses of a frame in two models, from below and from above.
+"""Compute lower and upper bounds on the largest distance between a frame's positions in two models.
 
 **Search.** The search starts at the random configurations with the largest distances, and varies one
-coordinate at a time. The largest distance that it attains is a lower bound. The method works well because a
-position depends on the sine and the cosine of each joint value.
+coordinate at a time. The largest distance found by the search is a lower bound.
 
-**Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` adds the effects of all
-differences, each at its own worst configuration. If the models differ in many places, this sum is far above
-the largest distance. `tighten` computes a sharper bound. The function divides the space of all variables into
-boxes, and bounds D(q) = p_B - p_A in each box. In a box with middle c and half widths h,
+**Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
+between the models. Each term is the largest effect of one difference over all configurations. If the models
+differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. The
+function divides the space of all variables into boxes. In each box, it bounds D(q) = p_B - p_A, the
+difference of the frame's positions in B and A. In a box with middle c and half widths h,
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 
-Here D_i is the derivative of D by variable i, and M_ij bounds the second derivatives at every configuration
-(`urdfkin.model.mechanisms.upper_bound.curvature`). If the bound of a box is below the target, the box is
-finished. Every other box is halved.
+Here D_i is the derivative of D with respect to variable i, and M_ij bounds the second derivatives at every
+configuration (`urdfkin.model.mechanisms.upper_bound.curvature`). A box whose bound is at most the target
+needs no further work. Every other box is halved.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ from urdfkin.verify.oracle import QueryBatch
 SAMPLES = 512
 #: Number of sampled configurations in which each variable is at an end of its range.
 CORNERS = 128
-#: Number of sampled configurations at which a search starts.
+#: Number of sampled configurations from which the search for one frame starts.
 STARTS = 4
-#: Number of values of a coordinate that one step of a search tries.
+#: Number of values that one step of the search tries for one coordinate.
 TRIED_VALUES = 13
 #: Number of frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: Fraction of a coordinate's range over which the coordinate is varied, for each round of a search.
+#: Fraction of a coordinate's range that the search covers in each round.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -57,10 +57,10 @@ Placements = Callable[[Robot, FloatArray, Sequence[str]], FloatArray]
 
 
 class DistanceSearch:
-    """Search over the common variables of two aligned robots.
+    """Search for the configurations at which two aligned robots differ most.
 
-    If `as_written`, B's root keeps its pose, even if the matching begins at another link of B. Otherwise,
-    B is moved so that the link where the matching begins keeps its pose.
+    If `as_written` is true, the pose of B's root in A's root frame is constant. Otherwise, the pose of B's
+    first matched link in the frame of A's first matched link is constant.
     """
 
     def __init__(
@@ -82,8 +82,8 @@ class DistanceSearch:
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether the distances depend on the motion between B's root and the link where the matching begins.
-        #: `upper_bounds` and `tighten` do not bound this motion.
+        #: Whether joints between a root and its first matched link change the distances.
+        #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
         self.unbounded = as_written and not all(self.base_fixed)
 
     def _ends(self, name: str) -> tuple[float, float]:
@@ -120,7 +120,7 @@ class DistanceSearch:
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Return whether `q_b` (1, nq) corresponds to `q_a`, and both are within the joint ranges."""
+        """Return whether `q_a` and `q_b` (1, nq) are corresponding configurations within the joint ranges."""
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
             return False
@@ -137,13 +137,13 @@ class DistanceSearch:
         return alike and bool((low - rounding <= z).all() and (z <= high + rounding).all())
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return poses (n, frames, 4, 4) of A and of B in A's root frame, at values (n, variables)."""
+        """Return poses (n, frames, 4, 4) of A and of B in A's root frame, for values `z` (n, variables)."""
         return self.poses_at(*self.configurations(z), frames, own_poses)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the result of `poses` at configurations (n, nq), computed by the function `computed`."""
+        """Return poses (n, frames, 4, 4) of A and of B at configurations; `computed` computes the poses."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.alignment.base[1]]
@@ -161,7 +161,7 @@ class DistanceSearch:
     def distances_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
-        """Return the distances (n, frames) between the origins of matching frames (m) at q (n, nq)."""
+        """Return the distances (n, frames), m, between matching frames."""
         a, b = self.poses_at(q_a, q_b, frames, computed)
         return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
 
@@ -171,11 +171,11 @@ class DistanceSearch:
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (n, frames) between the origins of matching frames (m) at values `z`."""
+        """Return the distances (n, frames), m, between matching frames for values `z`."""
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
     def sampled_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return the distances (n, frames) at sampled values (n, variables), and these values."""
+        """Sample the variables; return the distances (n, frames), m, and the values (n, variables)."""
         low, high = self.ends.T
         z = self.random_values(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
@@ -183,7 +183,7 @@ class DistanceSearch:
         return self.distances(z, frames), z
 
     def largest_distances(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
-        """Return the largest distance (m) found for each frame, with the values of the variables there."""
+        """Search for each frame's largest distance (m); return it with the values of the variables."""
         largest: list[tuple[float, FloatArray]] = []
         for first in range(0, len(frames), SEARCHED_TOGETHER):
             batch = frames[first : first + SEARCHED_TOGETHER]
@@ -232,7 +232,7 @@ class DistanceSearch:
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
         """Return distances (frames, starts, values) for values `z` (frames, starts, values, variables)."""
-        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # -1 fails for a robot without variables
+        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # the size -1 fails for an empty array
         distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(distances[n, :, :, n])
@@ -270,16 +270,17 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
 
-#: Maximum number of boxes that exist at a time; the bound of a frame then takes one or two seconds.
+#: Maximum number of boxes in memory; with this number, bounding one frame takes one or two seconds.
 MOST_BOXES = 2**17
 #: Number of boxes computed in one batch; the Jacobians of more boxes would take gigabytes of memory.
 BATCH = 2**16
 
 
 class Boxes:
-    """Upper bounds on the distance between a frame's origin in A and in B, each for a box of configurations.
+    """Upper bounds on the distance between a frame's origins in A and B, one bound for each box.
 
-    A box is a range for each variable. `names` are the names of the variables that change the distance.
+    A box contains all configurations whose variables are in given ranges. `names` are the names of the
+    variables that change the distance.
     """
 
     def __init__(self, search: DistanceSearch, frame: FramePair, names: Sequence[str]) -> None:
@@ -293,7 +294,7 @@ class Boxes:
         #: (4, 4) pose of B's root in A's root frame.
         self.T_a_b = search.T_root_base @ inverse(own_poses(search.robots[1], q, [base])[0, 0])
         self.tool = inverse(frame.tool)[:3, 3]
-        #: (nv, variables) derivatives of each robot's joint values by the variables.
+        #: For each robot, derivatives (nv, variables) of its joint values with respect to the variables.
         self.rates = [np.zeros((tree.nv, len(names))) for tree in trees]
         lines = {
             joint.name: LinearFunction(f"a:{joint.name}", 1.0, 0.0)
@@ -314,7 +315,7 @@ class Boxes:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and its derivatives (n, 3, variables) at values (n, variables)."""
+        """Return D (module docstring) (n, 3), and its derivatives (n, 3, variables), at the middles `c`."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -326,7 +327,7 @@ class Boxes:
     def _origin(
         self, robot: Robot, q: FloatArray, frame: str, tool: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the position (n, 3) of a frame's point, and its Jacobian (n, 3, nv)."""
+        """Return the position (n, 3) of the point `tool` of a frame, and its Jacobian (n, 3, nv)."""
         inputs = _flat_inputs(robot, q, [frame])
         T, J = placements(*inputs)[:, 0], jacobians(*inputs)[:, 0]
         if not tool.any():
@@ -338,14 +339,16 @@ class Boxes:
 def tighten(
     search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST_BOXES
 ) -> float:
-    """Return a proven upper bound (m) on a frame's distance, computed with at most `most` boxes at a time.
+    """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
 
-    The result is `target` if the function proves this bound, and otherwise at most the proven bound `upper`.
+    The argument `upper` is a bound that is already proven. The function returns `target` if it proves this
+    bound. Otherwise it returns the smallest bound that it proves, or `upper`.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]
-    # The search covers one turn of an unlimited revolute joint, but no other unlimited range.
+    # One turn contains all poses of an unlimited revolute joint.
+    # Other unlimited ranges cannot be divided into boxes.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
         for step, pair in zip(steps, some, strict=False)
@@ -361,7 +364,7 @@ def tighten(
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
         return upper
-    if not names:  # no variable changes the distance between the frame's poses in A and B
+    if not names:  # the distance is the same in all configurations
         return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
         i = _worst_variable(h, M)

@@ -1,4 +1,4 @@
-"""Write the result of `urdfkin same` as a certificate, and check a certificate again without a search."""
+"""Write the result of `urdfkin same` as a certificate, and check a certificate against two models."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, of_length, plain, says
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
-#: Maximum number of boxes in memory while a bound of a certificate is proven again.
+#: Maximum number of boxes in memory when `recheck` proves a bound again.
 MOST_AGAIN = 2**22
-#: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) near zero.
-#: The tolerances allow for the rounding of another machine that wrote the certificate.
+#: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
+#: Another machine may have written the certificate, with other rounding errors.
 _RELATIVE, _ZERO = 1e-9, 1e-15
 #: Relative tolerance of a bound that is proven again, in units of the machine epsilon.
 _BOUND_TOLERANCE = 64.0
@@ -61,7 +61,7 @@ Value = str | float | list[str | float | None] | CertifiedRule | None
 
 
 class DifferenceEntry(TypedDict):
-    """A difference of the two models at one joint or link."""
+    """A difference between the two models at one joint or link."""
 
     place: Annotated[str, says("Name of the joint or link of A that differs.")]
     what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
@@ -76,11 +76,13 @@ class DifferenceEntry(TypedDict):
 
 
 class CertifiedConversion(TypedDict):
-    """The conversion of a planar or floating joint's pose from A to B: before * (pose in A) * behind."""
+    """The pose of a planar or floating joint in B is before * (pose in A) * behind."""
 
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
-    back: Annotated[bool, says("Whether the pose in A is inverted: one model has the joint reversed.")]
+    back: Annotated[
+        bool, says("Whether the pose in A is inverted, because one model has the joint reversed.")
+    ]
 
 
 class CertifiedJoint(TypedDict):
@@ -88,7 +90,7 @@ class CertifiedJoint(TypedDict):
 
     a: Annotated[str, says("Name of the joint in A.")]
     b: Annotated[str, says("Name of the joint in B.")]
-    sense: Annotated[Literal[1, -1], says("Factor `sense` in: value in B = `sense` * value in A + `offset`.")]
+    sense: Annotated[Literal[1, -1], says("1 or -1; value in B = `sense` * (value in A) + `offset`.")]
     offset: Annotated[float, says("Constant `offset`, rad or m.")]
     conversion: Annotated[
         CertifiedConversion | None,
@@ -117,8 +119,8 @@ class FrameEntry(TypedDict):
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
     lower: Annotated[Size, says("Lower bound of the largest distance, metres: the distance at `q_a`, `q_b`.")]
-    upper: Annotated[Size | None, says("Proven upper bound of the distance, metres; null without a bound.")]
-    radians: Annotated[Size | None, says("Proven upper bound of the angle, radians; null without a bound.")]
+    upper: Annotated[Size | None, says("Proven upper bound of the distance, metres; null if none is proven.")]
+    radians: Annotated[Size | None, says("Proven upper bound of the angle, radians; null if none is proven.")]
     radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
     q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
     q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
@@ -129,19 +131,19 @@ class Confirmed(TypedDict):
 
     state: Annotated[ConfirmationState, says("Whether the oracle confirmed the bounds.")]
     by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
-    configurations: Annotated[Count, says("Number of configurations of the oracle's check.")]
+    configurations: Annotated[Count, says("Number of configurations at which the oracle checked the bounds.")]
     metres: Annotated[Size, says("Largest distance that the oracle computed, metres.")]
     reason: Annotated[str, says("Reason why the oracle computed no distances; empty if it computed them.")]
 
 
 class SameCertificate(Header):
-    """A statement whether two models are the same robot, with the data for a proof. Units are m and rad."""
+    """A statement whether two models describe the same robot, with proof data. Units are m and rad."""
 
     a: CertifiedModel
     b: CertifiedModel
     up_to: Annotated[
         list[Literal["base", "zeros", "senses", "free joints", "tools"]],
-        says("Kinds of changes of B with which the models agree best."),
+        says("Kinds of changes that bring B closest to A."),
     ]
     differences: Annotated[list[DifferenceEntry], says("Differences, in order from the base to the tips.")]
     remarks: Annotated[
@@ -150,20 +152,24 @@ class SameCertificate(Header):
     ]
     joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
     links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
-    tools: Annotated[list[ToolEntry], says("Matched links whose poses differ, as those of different tools.")]
-    orders: Annotated[list[list[str]], says("Adjacent joints of B that were compared in this other order.")]
+    tools: Annotated[
+        list[ToolEntry], says("Matched links with different poses, which count as different tools.")
+    ]
+    orders: Annotated[
+        list[list[str]], says("Consecutive joints of B whose order was changed, in the new order.")
+    ]
     base: Annotated[Matrix, says("Pose of B's root link in A's root frame, in the zero configuration.")]
     base_links: Annotated[
-        list[str], of_length(2), says("The link of A and the link of B in whose frames poses are compared.")
+        list[str], of_length(2), says("Poses are compared relative to these links of A and B.")
     ]
     rounding: Rounding
     frames: Annotated[
         list[FrameEntry],
-        says("Interval of the largest distance of each matched link, after the changes of B."),
+        says("Interval of the largest distance for each pair of matched links, after B is changed."),
     ]
     as_written: Annotated[
         FrameEntry | None,
-        says("Interval of the farthest frame without any change of B; null if B needs no change."),
+        says("Interval for the frame with the largest distance before B is changed; null without changes."),
     ]
     checked: Confirmed
 
@@ -214,11 +220,12 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
 
     The certificate states which joints match, and how the coordinates of A are converted to those of B. The
     function checks these statements. The transforms must be rigid motions, and the named joints must exist.
-    If the certificate changes the order of joints, the new order must give the same motion. The function
-    then uses the statements, so it needs no search. Only the verdict "differs" needs a search, because
-    another alignment could make the models agree. The function computes the verdict, the changes and the
-    remarks again, and compares them with the certificate. A lower bound is a distance at a configuration in
-    the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound is proven again.
+    If the certificate changes the order of joints, the new order must give the same motion. The function then
+    uses the stated joint pairs, so it does not search for matching joints. Only for the verdict "differs", it
+    searches, because other joint pairs could make the models agree. The function computes the verdict, the
+    changes and the remarks again, and compares them with the certificate. A lower bound is a distance at a
+    configuration in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound
+    is proven again.
 
     Raises:
         InputError: the certificate was made for models with other texts, or names a joint or link that a
@@ -362,7 +369,7 @@ def _choices_error(
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in choices.orders:
         if not b.allows_order(names, comparator.tolerance):
-            return f"`orders`: the axes do not allow the order {', '.join(names)}"
+            return f"`orders`: the order {', '.join(names)} would change the motion"
         b = b.reordered(names)
     return None
 
@@ -419,10 +426,10 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Yield the wrong statements about an interval: compute its lower bound again, prove the upper bounds.
+    """Compute an interval's lower bound again, prove its upper bounds again, and yield wrong statements.
 
-    Two frames are treated as equal if they differ by at most `rounding` (m, rad). If `sharply` is true, an
-    upper bound may be proven by branch and bound, which is slow.
+    Two frames are treated as equal if they differ by at most `rounding` (m, rad). If `sharply` is true, the
+    function may prove an upper bound by branch and bound, which is slow.
     """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
@@ -459,7 +466,7 @@ def _interval_errors(
 def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Yield errors if `q_a` and `q_b` are invalid, or if a distance or angle there is smaller than stated."""
+    """Yield errors if `q_a` and `q_b` do not correspond, or attain less than the stated distance or angle."""
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.correspond(q_a, q_b):
@@ -475,5 +482,5 @@ def _lower_bound_errors(
 
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:
-    """Return whether the proven bound is at most the claimed bound, except for rounding."""
+    """Return whether the proven bound is at most the claimed bound, up to rounding."""
     return proven <= claimed + rounding + _BOUND_TOLERANCE * EPS * abs(claimed) or not math.isfinite(claimed)

@@ -1,7 +1,7 @@
 """List the changes between two versions of a robot description, and bound how far they move the frames.
 
-Two files of one format are compared attribute by attribute. Each format has its own attributes, so the
-changes between files of two formats are the differences that `same` finds.
+Two files of the same format are compared attribute by attribute. Files of different formats have different
+attributes, so `diff` then lists the differences that `same` finds.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Changes of a link that displace the link, in a comparison of two formats.
+#: Attributes of a link whose change displaces the link, if the versions have different formats.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -58,7 +58,7 @@ class ModelChange:
         what: The attribute, for example "origin x" or "mass"; "" if the whole element was added or removed.
         old: The value in the old version; None if the old version has no value.
         new: The value in the new version; None if the new version has no value.
-        size: A text with the size of the change, in a comparison of two formats; otherwise empty.
+        size: Size of the change as text if the versions have different formats; otherwise empty.
     """
 
     element: str
@@ -84,14 +84,14 @@ class ModelChange:
 
 
 def word(value: Value | None) -> str:
-    """Return a value as text: the shortest decimal number that reads back exactly, or "none"."""
+    """Return a value as text; the text of a number has enough digits to give the same number again."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
 
 
 def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
-    """Return the distance by which changes move a frame as text, or the angle of a pure rotation."""
+    """Return as text how far a frame moves: the distance, or the angle if the frame only rotates."""
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -120,11 +120,11 @@ class Changes:
     Attributes:
         sources: The sources of the old and the new version, as the user gave them.
         changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
-        effects: For each changed joint that moves links, the effect if only this joint is changed.
+        effects: For each joint whose changes move links, the effect if only this joint is changed.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
-        rounding: (m, rad) bound on the pose error of any frame by the single precision of USD files, which is
-            not listed in `changes`. None if the files also have other differences; infinite if the bound was
-            not computed.
+        rounding: (m, rad) bound on the pose error that the single precision of USD files causes in any frame.
+            `changes` does not list this error. None if the files also have other differences; infinite if the
+            bound was not computed.
     """
 
     sources: tuple[str, str]
@@ -145,8 +145,8 @@ class Changes:
 def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: bool = True) -> Changes:
     """List the changes from one version of a description to another, attribute by attribute.
 
-    The two versions may have different formats (URDF, MJCF, USD). Then the changes are the differences that
-    `same` finds. The listed joints and links have the names of the old version.
+    If the versions have different formats (URDF, MJCF, USD), the changes are the differences that `same`
+    finds. The listed joints and links have the names of the old version.
 
     Args:
         a: The old version: a robot, or a source for `load`.
@@ -229,7 +229,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield the differences that `same` finds, if some joint of the models cannot be compared."""
+    """Yield the differences that `same` finds if the models cannot be compared joint by joint."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}
@@ -255,11 +255,11 @@ def _change_of(one: Difference) -> Iterator[ModelChange]:
 
 
 def _renamed(result: Sameness) -> KinematicTree:
-    """Return B's tree, in which each matched joint and link has A's name."""
+    """Return B's tree with A's names for all matched joints and links."""
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
-    for i, joint in enumerate(tree.joints):  # a fixed joint gets the name of A's joint with the same link
+    for i, joint in enumerate(tree.joints):  # name a fixed joint after A's joint with the same child link
         link = links.get(tree.links[i + 1])
         if joint.name not in names and link in old.links[1:]:
             names[joint.name] = old.joints[old.link_index(link) - 1].name
@@ -293,7 +293,7 @@ def _changes(old: str, new: str) -> Iterator[ModelChange]:
 
 
 def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
-    """Return the attributes of an element and its children, with defaults, by names such as "origin x"."""
+    """Map names such as "origin x" to the attributes of an element and its children, with defaults."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -345,6 +345,6 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
 
 
 def _quiet_robot(tree: KinematicTree) -> Robot:
-    """Return a robot without warnings about the URDF that urdfkin writes for its tree."""
+    """Return a robot for a tree, and suppress warnings about the URDF that urdfkin writes for the tree."""
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)

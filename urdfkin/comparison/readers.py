@@ -1,7 +1,7 @@
 """Compare how other libraries read a robot file: the joints, the order of the joints, and the link poses.
 
 Each library runs in a separate process, with its adapter in `urdfkin/verify/adapters.py`. A joint counts as
-different if the pose of its child link in its parent link differs.
+different if the pose of its child link relative to its parent link differs.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 #: Tolerance for the entries of poses, relative to max(1, largest entry).
 #: Libraries that compute in double precision differ by less than 1e-13.
 _TOLERANCE = 1e-9
-#: Tolerance `_TOLERANCE` of libraries that compute in single precision.
+#: The same tolerance for libraries that compute in single precision.
 _TOLERANCE_SINGLE = 1e-5
-#: Time limit of a library, in seconds.
+#: Time limit for the process of one library, in seconds.
 _PATIENCE = 60.0
 #: Maximum number of bytes that a library's process may return.
 _MOST_BYTES = 400_000_000
-#: Maximum length of a library's message in a result, in characters.
+#: Maximum length of a library's error message, in characters.
 _MOST_CHARACTERS = 200
 
 
@@ -44,7 +44,7 @@ _MOST_CHARACTERS = 200
 class ReaderDifference:
     """A joint that a library reads differently, and the element of the file that explains the difference.
 
-    `size` is the largest difference between entries of the child link's pose in the parent link.
+    `size` is the largest difference between entries of the child link's pose relative to the parent link.
     """
 
     joint: str
@@ -59,11 +59,12 @@ class LibraryReading:
 
     Attributes:
         refused: Reason why the library does not read the file; None if it reads the file.
-        joints: The joints with a coordinate in the library, in the library's order.
+        joints: The joints that have a coordinate in the library, in the library's order.
         same_order: Whether the library has the same joints as urdfkin, in the same order.
-        missing: Links that the library's model does not contain; in USD, only links with a prim of their own.
-        worst: Largest difference between the link poses of the two libraries, relative to the root link; 0 if
-            all poses are equal up to rounding.
+        missing: Links that the library's model does not contain. Links without their own prim in a USD file
+            do not count.
+        worst: Largest difference between link poses (relative to the root link) in the library and in
+            urdfkin; 0 if all poses are equal up to rounding.
         differences: The joints that the library reads differently from urdfkin.
     """
 
@@ -92,7 +93,7 @@ def installed(form: str = "urdf") -> tuple[str, ...]:
 def compare_readers(
     robot: Robot, libraries: Iterable[str] | None = None, *, samples: int = 5, seed: int = 0
 ) -> tuple[LibraryReading, ...]:
-    """Compare the models that libraries and urdfkin read from a robot's file, by default all installed ones.
+    """Compare how urdfkin and other libraries (by default all installed ones) read a robot's file.
 
     The poses of all links are compared at q = 0 and at random configurations.
 
@@ -122,7 +123,7 @@ def compare_readers(
             raise InputError(f"{LIBRARIES[name].title} is not installed", remedy=f"pip install {package}")
     if any(joint.lock is not None for joint in robot.tree.joints):
         raise InputError(
-            "other libraries read the file, which has no locked joints",
+            "other libraries cannot lock joints",
             where=robot.name,
             remedy="load the robot without locks",
         )
@@ -162,9 +163,11 @@ def _reading(
     tolerance *= max(1.0, float(np.abs(ours).max()))
     shared = [i for i, link in enumerate(links) if all(link in poses for poses in answer["poses"])]
     if not shared:
-        return LibraryReading(title, number, "its model has none of the links", tuple(answer["joints"]))
+        return LibraryReading(
+            title, number, "its model contains none of the robot's links", tuple(answer["joints"])
+        )
     theirs = np.array([[poses[links[i]] for i in shared] for poses in answer["poses"]])
-    # The text lacks a root joint that `load` added, so poses are relative to the first common link.
+    # `load` may add a root joint that the text lacks, so poses are relative to the first common link.
     theirs = np.linalg.inv(theirs[:, :1]) @ theirs
     ours = np.linalg.inv(ours[:, shared[:1]]) @ ours
     worst = float(np.abs(theirs - ours[:, shared]).max())
@@ -189,12 +192,12 @@ def _reading(
 
 
 def _source(robot: Robot) -> tuple[str, str]:
-    """Return a library's input (a URDF text without shapes, or the path of another file) and its format."""
+    """Return a library's input (a URDF text without shapes, or an MJCF or USD path) and its format."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
             raise InputError(
-                "other libraries read the whole USD stage",
+                "other libraries cannot select a variant or an articulation of a USD stage",
                 remedy="load the stage without variants and articulation",
             )
         return str(source), "usd"
@@ -206,7 +209,7 @@ def _source(robot: Robot) -> tuple[str, str]:
 
 
 def _without_shapes(text: str) -> str:
-    """Return a URDF text without shapes, because some libraries search the disk for the files of meshes."""
+    """Return a URDF text without shapes; with shapes, some libraries search the disk for mesh files."""
     from xml.etree.ElementTree import tostring
 
     robot = plain_xml(text)
@@ -248,7 +251,8 @@ def _cause(
 ) -> tuple[str, str]:
     """Return the element that explains a difference, and the difference in words.
 
-    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link, first at q = 0.
+    `T` (urdfkin) and `T_theirs` (library) are poses of the child link relative to the parent link. The first
+    pose is at q = 0.
     """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:

@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from urdfkin.model.conventions import Convention
 
 #: Smallest numbers that are written without a unit prefix (0.9 m) and with a unit prefix (0.1 mm).
-#: They include numbers that are rounded up to 0.9 or 0.1.
+#: They are slightly below 0.9 and 0.1, because printed numbers are rounded.
 _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
 class Verdict(Enum):
-    """The verdict: two models are the same, the same after the changes in `Sameness.up_to`, or different.
+    """The verdict: two models are the same, are the same after some changes of B, or differ.
 
     Two models are the same up to single precision if each joint differs by no more than the error that single
     precision can cause in the numbers of this joint.
@@ -55,21 +55,21 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes that do not make two models different, in the order of the headline.
+#: Kinds of changes that do not make two models different, in the order of the printed verdict.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
-#: Kinds of differences that leave the distances of matching frames bounded.
+#: Kinds of differences for which the distance between matching frames has an upper bound.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 
 @dataclass(frozen=True, slots=True)
 class SameQuestion:
-    """A yes-or-no question about two models: whether they are equivalent, or within a distance of each other.
+    """A yes-or-no question: are two models equivalent, or are matching frames within a given distance?
 
     Attributes:
         within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they are
-            written. None: the question is whether the models are equivalent.
-        strict: Whether the answer is also no for models that are equivalent but not the same, and for models
-            with remarks, such as different joint limits.
+            written. With None, the question is whether the models are equivalent.
+        strict: If true, the answer is also no for models that are equivalent only after changes, and for
+            models with remarks, such as different joint limits.
     """
 
     within: float | None = None
@@ -141,14 +141,14 @@ class Difference:
         return a, b
 
     @property
-    def words(self) -> str:  # noqa: PLR0911, PLR0912  each parameter has its own line
+    def words(self) -> str:  # noqa: PLR0911, PLR0912  each kind of difference has its own return
         """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         match what:
             case "axis":
                 sizes = [f"tilted by {angle(self.radians)}"] if self.radians else []
                 sizes += [f"{length(self.metres)} off"] if self.metres else []
-                alone = " (the links after this joint are not)" if self.detail == "alone" else ""
+                alone = " (the links after this joint agree)" if self.detail == "alone" else ""
                 return f"{place}: its axis is {' and '.join(sizes)}{alone}"
             case "place":
                 return f"{place} is {size_words(self.metres, self.radians)} on its rigid body"
@@ -206,15 +206,15 @@ def _range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference between two models at one joint or link that rounding does not explain.
+    """A difference at one joint or link that is too large to be caused by rounding.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if `b` is the difference between A and B.
-        b: The parameter's value in B, or a text. The text states the size of the difference, or why the
-            models cannot be compared here.
+        a: The parameter's value in A; None if `b` contains no value.
+        b: The parameter's value in B. If `a` is None, `b` is a text: the size of the difference, or the
+            reason why the models cannot be compared here.
         explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
     """
 
@@ -253,7 +253,8 @@ _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified
 class Confirmation:
     """Pinocchio's confirmation of the bounds, or the reason why there is none.
 
-    `metres` is the largest distance that the oracle computed at a number of configurations.
+    `metres` is the largest distance that Pinocchio computed; `configurations` is the number of
+    configurations.
     """
 
     state: ConfirmationState
@@ -273,8 +274,8 @@ class Confirmation:
 class JointMap:
     """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
 
-    For a planar or floating joint, `sense` is 1 and `offset` is 0. If A and B describe this joint by
-    different poses, `conversion` converts the pose in A to the pose in B.
+    For a planar or floating joint, `sense` is 1 and `offset` is 0. If A and B define the joint's frames
+    differently, `conversion` converts the pose in A to the pose in B.
     """
 
     a: str
@@ -294,7 +295,7 @@ class Sameness(Displayable):
         names: The robots' names.
         sources: The sources of A and B, as the user gave them.
         digests: SHA-256 of the two texts.
-        verdict: `Verdict.SAME`, `SAME_AFTER` the changes in `after`, `UP_TO_SINGLE`, or `DIFFERS`.
+        verdict: `Verdict.SAME`, `SAME_AFTER` (after the changes in `after`), `UP_TO_SINGLE`, or `DIFFERS`.
         after: The changes that bring B closest to A, with one line of text for each change. The changes are
             listed even if the models still differ after these changes.
         up_to: The kinds of change in `after`: "base", "zeros", "senses", "free joints", "tools".
@@ -311,10 +312,10 @@ class Sameness(Displayable):
             if the two roots coincide.
         base_links: A link of A and a link of B. The poses of A are compared relative to the first link, and
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
-        rounding: (m, rad) distances and angles between matching frames up to these values are rounding
-            errors.
-        single: (m, rad) bound on the distance and the angle between matching frames, if single precision is
-            the only cause. None if no file has single precision.
+        rounding: (m, rad) the largest distance and angle between matching frames that rounding errors can
+            cause.
+        single: (m, rad) bound on the distance and the angle between matching frames that single precision can
+            cause. None if no file has single precision.
         unexplained: The differences of the unchanged models that rounding does not explain, joint by joint.
             The numbers of a USD file are rounded to single precision.
         frames: The interval for each pair of matching links, after the changes in `after`.
@@ -323,8 +324,8 @@ class Sameness(Displayable):
         written: (m, rad) proven bound on the distance and the angle of all pairs of matching frames, for the
             models as they are written. The bound is infinite if no bound was proven. If one model is a
             Denavit-Hartenberg table, only frames with the same name in A and B count.
-        narrowed: One line of text for each joint whose mimic joint can exceed its own limits. The distances
-            in `frames` are nevertheless computed for the whole range of the mimicked joint.
+        narrowed: One line of text for each mimicked joint whose range lets a mimic joint exceed its limits.
+            The distances in `frames` are computed for the whole range of the mimicked joint.
         checked: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
 
@@ -367,7 +368,7 @@ class Sameness(Displayable):
 
     @property
     def _verdict(self) -> str:
-        """The verdict in words; for `Verdict.SAME_AFTER` with the kinds of the changes of B."""
+        """The verdict in words; `Verdict.SAME_AFTER` includes the kinds of the changes of B."""
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
@@ -418,11 +419,11 @@ class Sameness(Displayable):
 
     @property
     def within_single(self) -> bool:
-        """Whether the models differ, but no frame by more than the bound on the error of single precision.
+        """Whether the models differ, but no frame differs by more than single precision can cause.
 
-        The models are compared as they are written. The bound is a sum of the rounding errors of all joints.
-        An error in one joint can be smaller than this sum. Therefore, only `up_to_single` proves that
-        rounding is the cause.
+        The models are compared as they are written. The limit is the sum of the rounding errors of all
+        joints. A real error in one joint can be smaller than this sum. Therefore, only `up_to_single` proves
+        that rounding is the cause.
 
         >>> import urdfkin
         >>> urdfkin.same("ur5", "ur10").within_single
@@ -463,7 +464,7 @@ class Sameness(Displayable):
         """Return 0 if the models are equivalent, or within the given distance; else 1.
 
         Args:
-            strict: Whether the result is also 1 for models that are equivalent but not the same, and for
+            strict: If true, the result is also 1 for models that are equivalent only after changes, and for
                 models with remarks, such as different joint limits.
             within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they
                 are written.
@@ -535,17 +536,17 @@ class Sameness(Displayable):
             one = joints_of_b.get(joint.name)
             if one is None or tree_a.joints[tree_a.joint_index(one.a)].kind.nq != joint.kind.nq:
                 raise InputError(
-                    "a joint of B has no joint of A",
+                    "a joint of B has no matching joint in A",
                     where="map",
                     found=joint.name,
                     remedy="match it with map={JOINT_OF_A: JOINT_OF_B} (--map), or make it fixed in B",
                 )
             if one.conversion is not None:
                 raise InputError(
-                    "a free joint has another frame in B",
+                    "a planar or floating joint has another frame in B",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with to_b: a convention cannot describe another frame of a joint",
+                    remedy="convert q with to_b, because a convention cannot describe another joint frame",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
@@ -627,10 +628,10 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 def changes_of_b(
     alignment: Alignment, rounding: Tolerance, *, tables: bool = False
 ) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A: the kind of each (an entry of `FREE`) and a line of text.
+    """Return the changes that make B equal to A; each is a kind (an entry of `FREE`) and a line of text.
 
     The function sets the tool poses in `alignment`. If one model is a Denavit-Hartenberg table (`tables`),
-    every frame that differs is a tool, because the poses of a table's frames depend on its convention.
+    every frame that differs counts as a tool, because the poses of a table's frames depend on its convention.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -665,9 +666,9 @@ def changes_of_b(
 
 
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Yield the kind "tools" and a line of text for each changed tool.
+    """For each changed tool, yield the kind "tools" and a line of text.
 
-    A frame that differs is a tool if it has no children, or if it describes how the robot is mounted.
+    A frame that differs counts as a tool if it has no children, or if it describes how the robot is mounted.
     """
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
@@ -712,8 +713,9 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
     """Return two sets of links of the root body: links before the robot, and links beside the robot.
 
-    A fixed child link of a link before the robot, such as a pedestal, carries all moving joints. A link
-    beside the robot, such as a table, carries none. If the robot has no moving joint, both sets are empty.
+    A link before the robot, such as a pedestal, has a fixed child link that carries all moving joints. A link
+    beside the robot, such as a table, carries no moving joint. If the robot has no moving joint, both sets
+    are empty.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -800,9 +802,9 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
 
 
 def _on_matched_bodies(alignment: Alignment, link: str) -> bool:
-    """Return whether both bodies of a link, in A and in B, have a matching body in the other model.
+    """Return whether a link's body in A and its body in B each have a matching body in the other model.
 
-    For any other body, `differences` already reports the joint of only one model that moves the body.
+    If a body has no matching body, `differences` already reports its joint as a joint of only one model.
     """
     return all(
         mechanism.body_of[mechanism.tree.link_index(link)] not in {mechanism.body_of[j + 1] for j in only}
@@ -838,7 +840,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; 0 if within rounding."""
+    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; rounding errors become 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 
 
@@ -888,7 +890,7 @@ def _in_order(which: str, value: Value) -> tuple[Value, Value]:
 
 
 def idle(joint: Joint) -> Lock | None:
-    """Return the lock of a mimic joint with the multiplier 0, which `same` treats as fixed; else None."""
+    """Return the constant value of a mimic joint with the multiplier 0; None for any other joint."""
     lock = joint.lock
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 

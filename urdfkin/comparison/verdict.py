@@ -88,8 +88,8 @@ def same(
     Args:
         a: A robot, or a source for `load`.
         b: The other robot, or a source for `load`.
-        map: For each joint name of `a`, the name of the matching joint in `b`. Give the pairs of joints that
-            names and axes do not determine.
+        map: Joint names of `a`, each with the name of the matching joint in `b`. Give the joints that urdfkin
+            cannot match by names and axes.
         bounds: Whether to bound the largest distances between frames. If the models differ, these bounds take
             most of the computing time.
         boxes: Maximum number of boxes of configurations that exist at the same time in branch and bound.
@@ -371,7 +371,7 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) for all frames; sharpen it only if it can then prove `within`."""
+        """Return one bound (m, rad) for all frames; use branch and bound only if it may prove `within`."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -384,7 +384,7 @@ class Comparator:
         return largest[0] + metres, largest[1] + radians
 
     def _upper_bounds(self, alignment: Alignment, variables: Variables) -> list[tuple[float, float]]:
-        """Return the bound (m, rad) of each frame; the largest bounds are computed on a finer grid."""
+        """Return an upper bound (m, rad) for each frame; compute the largest bounds on a finer grid."""
         frames = alignment.frames
         uppers = [upper_bounds(alignment, variables, frame) for frame in frames]
         different = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
@@ -404,7 +404,7 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Prove with boxes that no two matching frames are farther apart than a target (m)."""
+        """Try to prove by branch and bound that matching frames are at most `target` (m) apart."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -464,7 +464,7 @@ class Comparator:
         for interval, metres in zip(frames, distances, strict=False):
             if not metres <= interval.upper * (1.0 + EPS):
                 raise UrdfkinError(
-                    "Pinocchio finds a distance beyond its proven bound",
+                    "Pinocchio finds a distance above the proven bound",
                     where=f"frame {interval.frame}",
                     found=f"{metres:.6g} m, bound {interval.upper:.6g} m",
                     remedy="please report this as an error of urdfkin, with both robots",
@@ -472,7 +472,7 @@ class Comparator:
         return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(distances.max(initial=0.0)))
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
-        """Return each frame's largest distance (m) at `CONFIRMED` configurations, by Pinocchio."""
+        """Let Pinocchio compute each frame's largest distance (m) at `CONFIRMED` configurations."""
         search = self.search(alignment, variables)
         q_a, q_b = search.configurations(search.random_values(CONFIRMED), moved=True)
         distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
@@ -518,8 +518,8 @@ def _with_idle_joints_fixed(
 ) -> KinematicTree:
     """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
 
-    A joint with the multiplier 0 never moves. The joint remains a mimic joint if the other model has a
-    matching joint (as in `_fixed_only_here`) that moves: then `same` compares the two joints.
+    A joint with the multiplier 0 never moves. If a matching joint of the other model moves, the joint remains
+    a mimic joint, so that `same` compares the two joints. Joints match as in `_fixed_only_here`.
     """
     moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
@@ -596,10 +596,9 @@ def parse_map(words: tuple[str, ...]) -> dict[str, str]:
 class JointComparison:
     """Prove joint by joint that single precision is the cause of every difference between two models.
 
-    A bound on the displacement of a frame by rounding is a sum over all joints. An error in one joint can be
-    smaller than this sum, and a comparison with the sum does not detect the error. The proof in this class
-    does not add errors along the chain. Each joint may differ only by the rounding of the numbers in its own
-    definition.
+    Rounding errors of all joints add up in the pose of a frame. If a frame's displacement is compared only
+    with this sum, a smaller error in one joint is not detected. Therefore, the proof compares the models
+    joint by joint. Each joint may differ only by the rounding of the numbers that define this joint.
 
     **Compared quantities.** Two files can describe the same joint by different frames. For example, the
     origin of a joint may be shifted along its axis, and a converter may add links or merge fixed links. The
@@ -634,25 +633,26 @@ class JointComparison:
     position error and the rotation error of this frame. The multiplier and the offset of a mimic rule have a
     relative error of at most 2^-24.
 
-    In B, P may be no ancestor of the link: the paths to P and to the link may branch at a common ancestor.
-    Let W and E be the position error and the rotation error of the link relative to this common ancestor. Let
-    V and F be the position error and the rotation error of P relative to the common ancestor. Let d be the
-    distance between the link and P. Then the position error of the link relative to P is at most W + V + F d,
-    and the rotation error is at most E + F. `same` ignores the rounding errors of double precision, so these
-    errors are added to the bounds. If both models are rounded, the bounds of both models are added.
+    In B, P may not be an ancestor of the compared link: the paths to P and to the link may branch at a common
+    ancestor. Let W and E be the position error and the rotation error of the link relative to this common
+    ancestor. Let V and F be the position error and the rotation error of P relative to the common ancestor.
+    Let d be the distance between the link and P. Then the position error of the link relative to P is at most
+    W + V + F d, and the rotation error is at most E + F. `same` ignores the rounding errors of double
+    precision, so these errors are added to the bounds. If both models are rounded, the bounds of both models
+    are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. This happens if the
     parent of the joint is a link that only B has, or if P is far from the joint in B. Therefore, `same`
-    compares A with B, and also B with A. If the comparison starts with a rounded model, the path from P to
-    the link must have at most one moving joint. In the other model, the path from the common ancestor to P
-    must have no rounded joint. Otherwise, `same` reports the difference as not explained.
+    compares A with B, and also B with A. If the first of the two models is rounded, the path from P to the
+    link must have at most one moving joint. In the second model, the path from the common ancestor to P must
+    then have no rounded joint. If a condition does not hold, `same` reports the difference as not explained.
 
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is
-    smaller than the rounding of its own numbers. No comparison of the two models can detect an error of this
-    size. The proof does not cover planar joints, floating joints, joints in another order, and links on
-    different branches of A and B. These joints and links must agree up to double precision. Otherwise, `same`
-    reports the difference as not explained.
+    smaller than the rounding of the numbers that define it. A comparison of the two models cannot detect this
+    error. The proof does not cover planar joints, floating joints, joints in another order, and links on
+    different branches of A and B. These joints and links must agree up to double precision. If they do not,
+    `same` reports the difference as not explained.
 
     Args:
         alignment: The alignment of the two models; only its pairs of joints and links are used.
@@ -700,9 +700,9 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
-        """Return the link's nearest ancestor in A that both models have, and the joints between the two.
+        """Return the link's nearest ancestor in A that both models have, and the joints between them.
 
-        Without such an ancestor, the result has the link at which all paths begin.
+        If there is no such ancestor, the result contains the link at which all paths begin.
         """
         joints, path = self.trees[0].joints, list[int]()
         while link:
@@ -713,7 +713,7 @@ class JointComparison:
         return self.start[0], path
 
     def _paths(self, which: int, start: int, end: int) -> tuple[list[int], list[int]]:
-        """Return the joints on the paths from the last common ancestor to two links."""
+        """Return the joints from the last common ancestor to `start`, and those to `end`."""
         paths = self.trees[which].path(start), self.trees[which].path(end)
         n = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(*paths, strict=False)))
         return list(paths[0][n:]), list(paths[1][n:])
@@ -721,7 +721,7 @@ class JointComparison:
     def _path_differences(
         self, link: int, paths: Sequence[tuple[list[int], list[int]]]
     ) -> Iterator[JointDifference]:
-        """Yield the differences on the paths of A and of B to the link P and to a common link."""
+        """Yield the differences between A and B on the paths from the link P to a common link."""
         trees = self.trees
         moving = [
             [[i for i in path if tree.joints[i].kind.nv] for path in both]
@@ -764,9 +764,9 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle of two axes, and the distance of one axis' point from the other axis.
+        """Return the angle between two axes, and the distance of a point of one axis from the other axis.
 
-        The point of an axis may lie anywhere on this axis.
+        The two models may define an axis by different points on it.
         """
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
@@ -776,8 +776,8 @@ class JointComparison:
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
         """Return a path's joint screws and the pose at its end, with bounds (m, rad) on their errors.
 
-        Both joint lists begin at the last common link. The list `back` has the fixed joints to the link P, in
-        whose frame the results are. `which` is 0 for A and 1 for B.
+        Both joint lists begin at the last common ancestor: `back` leads to the link P, and `path` to the
+        compared link. The results are expressed in the frame of P. `which` is 0 for A and 1 for B.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)

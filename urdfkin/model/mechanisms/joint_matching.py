@@ -4,9 +4,9 @@ Joints at two matched bodies are paired by the names that the user gives, by equ
 `MechanismMatcher` tries each proposed pose and zero offset.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. The angle of the joint before a subtree does not matter, because the joint's zero offset
-can contain any angle. Whether two subtrees match therefore depends only on the joints before the subtrees.
-The search stores the result for each pair of joints, so it is fast even for long chains.
+the other subtree. The value of the joint before a subtree does not matter, because the joint's zero offset
+can compensate any value. Therefore, the result depends only on the two joints before the subtrees. The search
+stores the result for each pair of joints, so it is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def family(kind: JointKind) -> str:
 
 
 class Pairing:
-    """Find pairs of a joint of mechanism A and a joint of mechanism B, for each pair of bodies.
+    """Pair the joints of mechanism A with joints of mechanism B, for each pair of bodies.
 
     `given` contains names of joints of `a`, each with the name of the corresponding joint of `b`.
     """
@@ -77,8 +77,9 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Pair the joints at two bodies; return the joint pairs, and the unpaired joints of A and of B.
 
-        `via` contains the joints before these bodies; None at the first bodies. The motions G and XC (4, 4)
-        move the zero configurations of A and of B to the current pose of B.
+        `via` contains the joints before these bodies; None at the first bodies. G (4, 4) moves the body of A
+        from its zero configuration to the current pose of B's body. XC (4, 4) moves the body of B from its
+        zero configuration to its current pose.
         """
         named, left_a, left_b = self.by_names(bodies, via)
         pairs = list(named)
@@ -103,7 +104,7 @@ class Pairing:
     def by_names(
         self, bodies: tuple[int, int], via: Via
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Return the joint pairs found by name, and the joints of A and of B that geometry must pair."""
+        """Pair joints by name; return the pairs, and the remaining joints of A and of B."""
         if (known := self._by_names.get((bodies, via))) is None:
             left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not via[0]]
             left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not via[1]]
@@ -117,7 +118,7 @@ class Pairing:
         return known
 
     def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
-        """Return whether the subtrees of two bodies have equal branches with equal kinds of joints."""
+        """Return whether the subtrees of two bodies have the same branching and the same kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -125,11 +126,11 @@ class Pairing:
         return next(shapes) == next(shapes)
 
     def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
-        """Return whether the subtrees after two joints have equal branches with equal kinds of joints."""
+        """Return whether the subtrees after two joints have the same branching and kinds of joints."""
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each joint axis at a body of A coincides with an axis of B that is moved by X."""
+        """Return whether each axis at a body of A coincides with an axis of B's body after the motion X."""
         return all(
             any(
                 family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
@@ -167,7 +168,7 @@ class Pairing:
     def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
-        """Return the index of each joint that the user did not match, and its geometry after the motion T."""
+        """Return index and geometry (after the motion T) of each joint that the user did not match."""
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
             for i, edge in enumerate(edges)
@@ -177,8 +178,8 @@ class Pairing:
     def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
         """Return a sort key that is smaller for more similar joints.
 
-        Three differences decide, in this order: the branches of the subtrees, the distance of the axes, and
-        the directions and origins of the joint frames.
+        The key compares three differences, in this order: the branches of the subtrees, the distance of the
+        axes, and the directions and origins of the joint frames.
         """
         angle, shift = one.mismatch(other)
         axes = 0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, LEAST_SIZE) + shift
@@ -187,7 +188,7 @@ class Pairing:
         return one.shape != other.shape, axes, origins + self.a.size * is_opposite
 
     def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
-        """Return a text with the kind of each joint in the subtree that a joint begins."""
+        """Return a text that contains the kinds of a joint and of all joints after it."""
         key = mechanism is self.a, body, edge.joint
         if (known := self._signatures.get(key)) is None:
             beyond = edge.other_body(body)
@@ -222,7 +223,7 @@ class _JointGeometry:
 
     @classmethod
     def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
-        """Return the geometry of a joint that the motion T moves from the zero configuration."""
+        """Return a joint's geometry in the zero configuration, moved by T."""
         pose = T @ mechanism.homes[edge.joint + 1]
         screw = mechanism.screw(edge).moved(T)
         return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
@@ -265,7 +266,7 @@ class Axis:
         return Axis(self.screw.moved(T), self.turns, self.reference.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the coordinate (m) along u of the point of the reference line nearest to the joint's axis.
+        """Find the reference line's point nearest to the joint's axis; return its coordinate (m) along u.
 
         If the two lines are parallel, or if the joint is prismatic, the result is None.
         """
@@ -302,7 +303,7 @@ def later_axes(
 ) -> Iterator[Both[Axis]]:
     """Yield pairs of joint axes, one at a body of A and one at a body of B.
 
-    If a joint's axis is parallel to the line `reference`, the axes after this joint follow.
+    If a joint's axis is parallel to the line `reference`, the function also yields the axes after this joint.
     """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
@@ -314,10 +315,10 @@ def later_axes(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align a first joint axis of B with one of A, and also some later axes.
+    """Yield poses of B's root that align a first joint axis of B with a first joint axis of A.
 
     After this alignment, B may still rotate about the first axis and translate along the axis. The function
-    chooses the rotation and the translation so that later axes coincide too. If no axes follow the first
+    chooses this rotation and this translation so that later axes coincide too. If no axes follow the first
     axis, other axes of the body are used, for example the rotor axes of a drone.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
@@ -389,9 +390,9 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return the pairs of first revolute axes after two bodies, or of prismatic axes if there are none.
+    """Return pairs of the first revolute axes after two bodies, or else pairs of prismatic axes.
 
-    Each result is a pair of axes with the pairs of axes before it and after it.
+    Each result has three parts: a pair of axes, the pairs before it, and the pairs after it.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -430,7 +431,7 @@ Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 #: Maximum number of joint pairs at two bodies that the search for exact matches tries.
 MOST_ASSIGNMENTS = 5000
 
-#: Name of B's coordinate for each coordinate of A, and B's velocity divided by A's velocity.
+#: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.
 Rates = Mapping[str, tuple[str, float]]
 
 
@@ -467,7 +468,7 @@ class Congruence:
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body after two joints if the subtrees match exactly, else None."""
+        """Return the pose (4, 4) of B's body after joint f if the subtrees match exactly, else None."""
         found = self._behind(e, f, bodies, X)
         return None if found is None else found.X
 
@@ -497,7 +498,7 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Pair each joint of A with a different joint of B, so that all subtrees match exactly; else None."""
+        """Pair all joints of A with joints of B so that all subtrees match exactly; None if impossible."""
         if not left:
             return [], rates
         at = min(range(len(left)), key=lambda i: len(candidates[i]))

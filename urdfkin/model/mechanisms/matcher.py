@@ -1,14 +1,15 @@
 """Align mechanism B with mechanism A: pair their joints, and find the sign and zero offset of each joint.
 
 `MechanismMatcher` starts at a body of A and the corresponding body of B, and goes through both trees, joint
-by joint. At each joint, the matcher chooses a sign (`sense`) and a zero offset, for which most later links
+by joint. At each joint, the matcher chooses the sign (`sense`) and the zero offset for which most later links
 and axes of B coincide with those of A. `align` calls the matcher for several first bodies and joint orders,
 and returns the best result.
 
-In most cases, the axes and link frames after a joint determine its zero offset. If there are none, only a
-mimic rule can determine the offset. Let v = m w + c be a mimic rule of A, and let v' = m' w' + c' be the
-corresponding rule of B. The rules are equivalent if the substitution v' = s v + o, w' = s' w + o' converts
-one rule to the other. For a revolute joint, a multiple of a full turn may always be added to o.
+In most cases, the axes and link frames after a joint determine its zero offset. If no axis and no link frame
+follows a joint, only a mimic rule can determine its zero offset. Let v = m w + c be a mimic rule of A, and
+let v' = m' w' + c' be the corresponding rule of B. The two rules are equivalent if inserting v' = s v + o and
+w' = s' w + o' into the second rule gives the first rule. For a revolute joint, a multiple of a full turn may
+always be added to o.
 """
 
 from __future__ import annotations
@@ -52,14 +53,14 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Maximum number of joints on a path for the search for an exact match, which is recursive.
+#: Longest path, in joints, for which the recursive search for an exact match is used.
 DEEPEST = 200
 #: Number of further joints that the matcher compares if two choices agree equally well.
 AHEAD = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
-#: Of two choices with equally many agreeing links and axes, one is better if its largest difference is less
-#: than this fraction of the largest difference of the other choice.
+#: If two choices have equally many agreeing links and axes, their largest differences are compared.
+#: The first choice is better if its difference is less than this fraction of the second's difference.
 TWICE_AS_WELL = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -70,7 +71,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """The number of joint pairs ahead that several matchers together may still compare."""
+    """The number of joint pairs ahead of the current joint that matchers may still compare in total."""
 
     left: int
 
@@ -82,8 +83,8 @@ class BodyPair:
     Attributes:
         via: The joint of A and the joint of B before these bodies; None at the base.
         previous: Index of the joint pair before these bodies; -1 at the base.
-        G: (4, 4) motion that moves A's zero configuration to the current pose of B.
-        XC: (4, 4) motion that moves B's zero configuration to the current pose of B.
+        G: (4, 4) motion that moves the body of A from its zero configuration to the current pose of B's body.
+        XC: (4, 4) motion that moves the body of B from its zero configuration to its current pose.
     """
 
     bodies: tuple[int, int]
@@ -99,7 +100,7 @@ class MechanismMatcher:
     Args:
         a: One mechanism.
         b: The other mechanism, which is aligned with `a`.
-        pairing: Finds the joints of `a` and `b` that may be matched.
+        pairing: Object that finds the joints of `a` and `b` that may be matched.
         choices: Prescribed choices, for example zero offsets. None: the matcher finds the choices for which
             most joints and links agree.
         ahead: Number of joint pairs that the matcher may compare ahead of the current joint.
@@ -132,7 +133,7 @@ class MechanismMatcher:
     # -- first bodies ------------------------------------------------------------------------------
 
     def best(self) -> Alignment:
-        """Return the best alignment over all first bodies, or the first of several that are equally good."""
+        """Return the best alignment over all first bodies; if several are equally good, the first of them."""
         best: Alignment | None = None
         for bodies, X in self._starts():
             found = self._match_from(bodies, X)
@@ -176,10 +177,11 @@ class MechanismMatcher:
                     yield base, X
 
     def _most_matches(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the joints and links that match if the matcher starts at two bodies.
+        """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
 
-        In two matched branches, at most all joints and links of the smaller branch agree. The sum of these
-        numbers is largest if the branches at the two bodies are matched in the order of their sizes.
+        Two matched branches have at most as many matches as the smaller branch has joints and links. The sum
+        over all branches is largest if the branches at the two bodies are matched in the order of their
+        sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):  # joints, then links
@@ -216,7 +218,7 @@ class MechanismMatcher:
         yield from islice(some, MOST_ROOT_POSES)
 
     def _root_poses_by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield the pose of A's root, then the poses of B's root that align links of equal names."""
+        """Yield poses of B's root: first the identity, then those that align links of equal names."""
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
@@ -225,8 +227,9 @@ class MechanismMatcher:
         """Yield pairs of bodies (one of A and one of B) at which the matcher may start.
 
         A's root body is paired with the body of B that has most link names in common with it. If no body of B
-        has such a name, A's root body is paired with every body of B. In this case, for example if a floating
-        joint follows A's root, B's root body is also paired with the body of A with most common names.
+        has a common link name, A's root body is paired with every body of B. In this case, B's root body is
+        also paired with the body of A that has most link names in common with it. This happens, for example,
+        if a floating joint follows A's root.
         """
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
@@ -312,7 +315,7 @@ class MechanismMatcher:
     def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
         """Return two links of matched bodies that can be different end-effector frames.
 
-        The result is None if links of the bodies match, or if a body has only link names of the other model.
+        The result is None if links of the bodies match, or if the other model has all link names of a body.
         """
         ours, theirs = self._own_links(place)
         if matched or not ours or not theirs:
@@ -423,8 +426,8 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        First comes the identity (or `plane`), then the N of the zero configuration. Then come those N for
-        which a link or an axis of B coincides with one of A.
+        The first candidate is the identity, or `plane` for a planar joint. The second candidate keeps B in
+        its zero configuration. The others make a link or an axis of B coincide with a link or an axis of A.
 
         Args:
             there: The bodies after the joint, with B in its zero configuration.
@@ -432,7 +435,7 @@ class MechanismMatcher:
             home_b: (4, 4) the frame of B's joint in the zero configuration.
             plane: (4, 4) one possible N of a planar joint; every possible N is the product of this N and a
                 planar pose. None for a floating joint.
-            poses_after: (4, 4) poses of B's body after the joint for which axes of A and B coincide.
+            poses_after: (4, 4) poses of B's body after the joint at which its axes coincide with axes of A.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -485,7 +488,7 @@ class MechanismMatcher:
     # -- zero offsets ------------------------------------------------------------------------------
 
     def _prescribed(self, joint: str) -> tuple[int, float | None]:
-        """Return the prescribed sign and zero offset of a joint, or (0, None)."""
+        """Return the prescribed sign and zero offset of a joint; (0, None) if they are not prescribed."""
         return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
@@ -528,7 +531,7 @@ class MechanismMatcher:
         return _best_of(scored_ahead)
 
     def _score_ahead(self, place: BodyPair, own: Score, depth: int) -> Score:
-        """Return the score of two bodies (`own`) together with that of the next `depth` joints."""
+        """Return the sum of the score `own` of two bodies and the scores of the next `depth` joints."""
         pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
         self.ahead.left -= len(pairs)
         scores = [own, *(self._match_joints(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
@@ -563,7 +566,7 @@ class MechanismMatcher:
 
 
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
-    """Return the numbers of bodies and links in each body's subtree, with the body itself."""
+    """For each body, return the numbers of bodies and links in its subtree, including the body itself."""
     sizes = [(1, len(links)) for links in mechanism.bodies]
     for edge in reversed(mechanism.edges):  # from the tips to the root
         bodies, links = sizes[edge.outer]
@@ -586,12 +589,12 @@ def _best_of(scored: Sequence[tuple[_Choice, BodyPair, Score]]) -> tuple[_Choice
 
 
 def better(score: Score, than: Score) -> bool:
-    """Return whether `score` has more matches, or as many and less than half of the largest difference."""
+    """Return whether the first score has more matches, or as many and less than half the difference."""
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
-    """Return a screw whose sign describes the motion of the body farther from the base."""
+    """Return the screw that describes the motion of the body farther from the base."""
     return screw.reversed() if backwards else screw
 
 
@@ -614,7 +617,7 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 
 
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest motion between two planes, its tilt and its shift; normals have no sign."""
+    """Return the smallest motion between two planes, its tilt and its shift; ignore the normals' signs."""
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
     return smallest_motion(
         start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False
@@ -623,7 +626,7 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
 
 #: Maximum number of joint orders that are tried; five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: Maximum number of joint pairs ahead of the current joint that one search compares, in some seconds.
+#: Maximum number of joint pairs ahead of the current joint that one search compares; it takes some seconds.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_AHEAD = 2000
 #: Larger tolerances that are tried if A and B differ: rad, and distances divided by the robot's size.
@@ -663,8 +666,8 @@ def _orders_to_try(
 ) -> Iterator[Sequence[str]]:
     """Yield other orders of consecutive joints of B that give the same motion.
 
-    If A has joints with all these names, the order in A and the reverse order are tried, otherwise the first
-    `MOST_ORDERS` of `orders`. `run` is the present order, from base to tip.
+    If A has joints with all these names, the function yields A's order and its reverse. Otherwise it yields
+    the first `MOST_ORDERS` of `orders`. `run` is the present order, from base to tip.
     """
     called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
@@ -687,7 +690,7 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Try (a, d) and (c, b) instead of the joint pairs (a, b) and (c, d), as for two mirrored arms."""
+    """Replace joint pairs (a, b), (c, d) by (a, d), (c, b) if this is better, as for two mirrored arms."""
     if best.only_a or best.only_b:  # some joints have no partner, so no exchange can make A and B equal
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_AHEAD)
@@ -705,7 +708,7 @@ def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignme
 
 
 def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Return an alignment whose largest difference is less than half as large, or `best`.
+    """Return an alignment whose largest difference is less than half that of `best`, or else `best`.
 
     If all axes differ slightly, the normal search cannot find the right choices, because no axes agree. This
     function repeats the search with larger and larger tolerances, until all axes agree. Finally the function
@@ -743,8 +746,8 @@ def _best_alignment(
 
 #: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.
 TURNS = (0, 1, -1)
-#: Quotient of the tolerance of a zero offset and the angle tolerance.
-#: The quotient is large, because an offset computed from the positions of two close axes is inexact.
+#: Tolerance of a zero offset, divided by the angle tolerance.
+#: It is large, because a zero offset is inexact if it is computed from two axes close to each other.
 LEVER = 1e4
 
 
@@ -764,7 +767,8 @@ class _Rule:
         d: Offset of B's rule.
         offset: Zero offset o of B's joint in the alignment.
         turns: Whether the joint is revolute.
-        free: Whether any o is possible, because no axis and no link with the same name follows the joint.
+        free: Whether any offset o is possible, because no axis and no link with the same name follows the
+            joint.
         meets: Whether links of A and of B coincide on the body after the joint.
     """
 
@@ -823,7 +827,7 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 
 
 def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
-    """Yield groups of joint pairs that depend on one coordinate of A and one coordinate of B."""
+    """Group the joint pairs that depend on the same coordinate of A and the same coordinate of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(alignment.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):
@@ -844,7 +848,7 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether axes or links with equal names determine a joint's zero offset, and `_Rule.meets`."""
+    """Return whether later axes or links of equal names determine a zero offset, and `_Rule.meets`."""
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):

@@ -27,13 +27,13 @@ poses differ, a constant rigid motion L describes the change of G. The link pose
 
 If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree
 everywhere, the two models have the same motion. If A and B differ somewhere, their motions differ, with one
-exception: two revolute joints may have the same line as axis. Only the sum of their two angles matters for
-the links after them.
+exception. If two revolute joints have the same line as axis, only the sum of their angles matters for the
+links after them.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
-is a variable. A coordinate of B is a linear function of a variable, given by the sign and the zero offset of
-the joint. If a joint can move independently only in B, its coordinate is one more variable. In A, such a
-joint is a mimic joint or a fixed joint, for example.
+is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
+determine this function. If a joint can move independently only in B, its coordinate is one more variable. In
+A, such a joint is a mimic joint or a fixed joint, for example.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, WRITTEN
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
-#: Largest perpendicular component of a unit vector that counts as parallel to an axis.
+#: A unit vector counts as parallel to an axis if its perpendicular component is smaller than this.
 ALONG = 1e-12
 
 
@@ -86,7 +86,7 @@ def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArra
 
 
 def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
-    """Return the rotation by the smallest angle from one unit vector to another, and the angle."""
+    """Return the smallest rotation from one unit vector to another, and its angle."""
     cross = np.cross(u, v)
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
@@ -98,7 +98,7 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between two poses."""
-    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # thousands of calls are faster with plain floats
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # in thousands of calls, floats are faster than arrays
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
@@ -111,7 +111,7 @@ def angle_about(u: FloatArray, R: FloatArray) -> float:
 
 
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
-    """Return the angle about u from x to y, projected along u; None if x or y is parallel to u."""
+    """Return the angle about u from x to y (after projection along u); None if x or y is parallel to u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
     if min(np.linalg.norm(x), np.linalg.norm(y)) < ALONG:
         return None
@@ -120,7 +120,7 @@ def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
 
 #: Relative tolerance for the entries of a computed pose.
 _POSE_TOLERANCE = 1e-9
-#: Coordinates (m, m, rad) of a planar joint, none of which is 0.
+#: Test coordinates (m, m, rad) of a planar joint; none of them is 0.
 _AWAY = np.array([1.0, 2.0, 3.0])
 _Z = np.array([0.0, 0.0, 1.0])
 
@@ -196,8 +196,8 @@ def planar_counterpart(M: FloatArray) -> FloatArray:
     """Return a rigid motion N (4, 4) for which M P N is a planar pose for every planar pose P.
 
     M must keep or reverse the plane's normal. M then consists of a translation along the normal and a motion
-    in the plane, and of half a turn about x if M reverses the normal. N contains the opposite translation,
-    and the same half turn.
+    in the plane. If M reverses the normal, M also contains half a turn about x. N contains the opposite
+    translation and the same half turn.
     """
     over = np.diag([1.0, -1.0, -1.0, 1.0]) if M[2, 2] < 0.0 else np.eye(4)
     return over @ pose(p=(0.0, 0.0, -M[2, 3]))
@@ -236,8 +236,8 @@ class Mechanism:
         tree: The robot.
         separating: Indices of joints that are fixed in this model and move in the other model. The links
             before and after such a joint belong to different bodies.
-        labels: A name for each link, by which links of the two models are paired; by default its name in the
-            tree.
+        labels: A label for each link; links of two models with equal labels are paired. The default labels
+            are the link names.
 
     Attributes:
         homes: (4, 4) pose of each link in the zero configuration.
@@ -319,7 +319,7 @@ class Mechanism:
         return inner.outer == outer.inner and len(self.edges_of[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """Yield, for each sequence of joints without a branch, all joint orders that give the same motion."""
+        """For each sequence of joints without a branch, yield all joint orders that give the same motion."""
         run: list[Edge] = []
         for edge in self.edges:
             if run and self._follows(run[-1], edge):
@@ -401,7 +401,7 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
-    ux, uy, uz = s.direction.tolist()  # thousands of calls are faster with plain floats
+    ux, uy, uz = s.direction.tolist()  # in thousands of calls, floats are faster than arrays
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
@@ -428,9 +428,10 @@ class MatchedJoints:
         sense: +1 or -1, the factor in the formula of `offset`.
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) rigid motion L before B's joint (module docstring), in A's zero configuration.
-        axis: Screw of A's joint in the zero configuration. The sign of the screw describes the motion of the
-            body that is farther from the base.
-        other: Screw of B's joint, with the sign convention of `axis`. If the screws agree, `other is axis`.
+        axis: Screw of A's joint in the zero configuration. The screw describes the motion of the body that is
+            farther from the base.
+        other: Screw of B's joint, with the sign convention of `axis`. If the screws agree, `other` is the
+            same object as `axis`.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes of the two joints; for planar or floating joints, between the
             origins of their frames.
@@ -485,7 +486,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return the pair as two end-effector frames that do not count as a difference; set `tool`."""
+        """Return a copy that treats the links as different end-effector frames, not as a difference."""
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -541,7 +542,7 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) of matched axes, and of matched links that have child joints.
+        """Smallest and largest difference (m) among matched axes and matched links with child joints.
 
         Differences of 0 do not count.
         """
@@ -554,7 +555,7 @@ class Alignment:
 
     @property
     def names(self) -> dict[str, str]:
-        """The name of each joint of A, with the name of the matched joint of B."""
+        """The name of each matched joint in A, mapped to its name in B."""
         joints = self.a.tree.joints, self.b.tree.joints
         return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
 
@@ -572,9 +573,9 @@ class Alignment:
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield two matched joint pairs (a, b) and (c, d) for which (a, d) and (c, b) are possible too.
 
-        Four conditions hold. The joints are attached to the same body of A or B. The user did not match the
-        joints. The names of A's two joints do not occur in B. At each pair or below it, a joint or a link
-        differs.
+        The two pairs have the same kind of motion and the same previous pair. The user did not match the
+        joints. The names of A's two joints do not occur in B. Each of the two pairs differs, or a joint or
+        link after it differs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -670,7 +671,7 @@ class MatchedValues:
     b: LinearFunction
     #: The value of B's joint as B's URDF defines it: sense * b + offset.
     written: LinearFunction
-    #: Difference of the constants (rad or m), as far as it exceeds the rounding error of one joint.
+    #: Part of the constants' difference (rad or m) that exceeds the rounding error of one joint.
     rounding: float = 0.0
 
     @property
@@ -819,7 +820,7 @@ class _VariablesBuilder:
         for step, pair in zip(self.alignment.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
-                if pair is None:  # each of two joints of different kinds has its own coordinate
+                if pair is None:  # joints of different kinds have separate coordinates
                     if step.unlike and joint.nq == 1:
                         own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
                     continue

@@ -2,15 +2,15 @@
 
 **Support functions.** The support function of a set W of points is h(u) = max over p in W of u . p. The
 largest distance of a point of W from the origin is the maximum of h(u) over all unit vectors u. If a rotation
-R moves W, the new support function is h'(u) = h(R^T u). If a joint may rotate W by any angle of a range,
-h'(u) is the largest h(R^T u) over all these angles. If a joint translates W by a vector p, h'(u) is h(u) +
-u . p, with the p of the joint's range for which u . p is largest. urdfkin computes h joint by joint along the
+R moves W, the new support function is h'(u) = h(R^T u). If a joint may rotate W by any angle in a range,
+h'(u) is the largest h(R^T u) over all these angles. If a joint translates W by a vector p, h'(u) is h(u) + u
+. p, with the p of the joint's range for which u . p is largest. urdfkin computes h joint by joint along the
 chain, without a search over joint values.
 
 urdfkin stores the values of h at grid points on the surface of a cube. The function h is convex, and h(s u) =
 s h(u) for s >= 0, so interpolation between grid points gives an upper bound. If a joint rotates W by any
 angle of a range, the vectors R^T u form an arc. A polygon contains this arc, and the largest h in the polygon
-is at one of its corners. At each joint, the interpolation makes the bound larger. This relative error is
+is at one of its corners. At each joint, the interpolation increases the bound. The relative increase is
 proportional to the square of the distance between grid points.
 
 **Recursion.** Let y be the position of B's frame if only the joints after joint i move. Let d be y minus the
@@ -28,14 +28,14 @@ motions L, urdfkin also computes a second bound without interpolation. The secon
 distances by which each L can move the frame.
 
 **Second derivatives.** `curvature` bounds the second derivatives of D = p_B - p_A joint by joint. The
-derivative of a rotated vector by the angle is the cross product of the axis u with the rotated vector. With d
-and y as above, the derivatives by a joint value are
+derivative of a rotated vector with respect to the angle is the cross product of the axis u with the rotated
+vector. With d and y as above, the derivatives with respect to a joint value are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
-with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A, and S', u', o'
-and t' are the screw, axis, point and value of the matched joint in B. A derivative is a free vector: a joint
-between the base and this joint rotates the derivative and does not translate it.
+with Y = e(S' t') y. Here S, u, o and t are the screw, axis, point and value of the joint in A. The symbols
+S', u', o' and t' belong to the matched joint in B. A derivative is a free vector: a joint between the base
+and this joint rotates the derivative and does not translate it.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def _points(cells: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """The support function (m) of a set of points, or an upper bound; `values` are at the grid points."""
+    """The support function (m) of a set of points, or an upper bound on it, with values at grid points."""
 
     grid: Grid
     values: FloatArray
@@ -137,7 +137,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the support function of all rotations of the set about a screw, by low to high (rad)."""
+        """Return the support function after rotations about a screw by all angles from low to high (rad)."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -148,8 +148,8 @@ class Support:
         """Return the support function's values (angles, n) at the n grid points after rotations of the set.
 
         The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
-        the grid points by the opposite angle. The component of a grid point perpendicular to the axis is
-        multiplied by the angle's factor in `factors`.
+        the grid points by the opposite angle. For each angle, `factors` contains a factor for the grid
+        points' components perpendicular to the axis.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -158,7 +158,7 @@ class Support:
         return self.at(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support function of all translations of the set, by low to high (m)."""
+        """Return the support function after translations by all distances from low to high (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
@@ -243,7 +243,7 @@ def upper_bounds(
 def from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the steps and joint values on the path to a frame, starting with the first step that differs."""
+    """Return the joint pairs and their values on the path to a frame, from the first pair that differs."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -260,7 +260,7 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Return the sum of the largest angles (rad) that each difference causes between A and B."""
+    """Bound the angle (rad) between A and B by a sum: the largest angle that each difference can cause."""
     total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.before)[0]
@@ -398,7 +398,8 @@ def _common_difference(
     Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
     second derivative. If t' = t + c, the second derivative is R' P' x' - R P x, up to its sign. Here x is the
     vector from A's axis to y, P is the projection perpendicular to A's axis, and R is the rotation about A's
-    axis. The symbols x', P' and R' belong to B's axis. With the axes' directions u and u', |R' - R| <= 2 |u'
+    axis. The corresponding symbols for B's axis are x', P' and R'. With the axes' directions u and u', |R' -
+    R| <= 2 |u'
     - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes. If t and
     t' have different slopes, the second derivative is at most the sum of two terms, one for each joint. Each
     term is the square of the slope of t or t', times the largest distance of y from the joint's axis.
@@ -456,7 +457,7 @@ _Vectors = tuple[Support, Support]
 def curvature(
     steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables, frame: FramePair
 ) -> tuple[list[str], FloatArray]:
-    """Return the variables' names, and bounds (m) on the second derivatives of D by each pair of variables.
+    """Return the variables' names, and bounds (m) on D's second derivatives with respect to these variables.
 
     The bounds hold for matched joints that one variable moves by the same factor in A and B. If any other
     pair of joints has an effect on D, all bounds are inf.
@@ -518,7 +519,7 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return the derivatives of d and y (module docstring) by a joint's value, before its motion L."""
+    """Return the derivatives of d and y (module docstring) with respect to a joint's value, without L."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -543,7 +544,7 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a pair of matched joints without its translations, which do not affect free vectors."""
+    """Return a joint pair without translations, because translations do not affect free vectors."""
     axis = Screw(step.axis.direction, np.zeros(3))
     other = axis if step.other is step.axis else Screw(step.other.direction, np.zeros(3))
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
@@ -557,7 +558,7 @@ def relevant_joints(
 
     Most joints before the first difference of the models only rotate D. But an earlier joint changes the
     length of D if a joint after the first difference mimics it. So the result begins with the first joint
-    that differs, or whose variable also moves a joint after the first difference.
+    that differs, or with an earlier joint whose variable also moves a joint after the first difference.
     """
     steps, pairs = (
         alignment.path(frame.previous),
@@ -566,7 +567,7 @@ def relevant_joints(
     first = len(steps) - len(from_first_difference(alignment, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # all joints from joint i to the first difference are included
+            first = i  # the result contains all joints from joint i on
     return steps[first:], pairs[first:]
 
 
