@@ -111,8 +111,8 @@ def chain_command(
 
 
 def _kind_of_joint(joint: Any) -> str:
-    follows = f", follows {joint.mimic.leader}" if joint.mimic else ""
-    return f"{joint.kind.value}{', backwards' if joint.backwards else ''}{follows}"
+    mimics = f", mimics {joint.mimic.leader}" if joint.mimic else ""
+    return f"{joint.kind.value}{', backwards' if joint.backwards else ''}{mimics}"
 
 
 def _vector(numbers: FloatArray) -> str:
@@ -199,19 +199,19 @@ def structure_command(
 
 def _structure_document(found: Structure) -> TextDocument:
     spare = len(found.joints) - found.freedoms
+    degrees = f"{found.freedoms} degree{'s' * (found.freedoms != 1)} of freedom"
     title = (
         f"{found.robot}: {found.base_frame} to {found.tip_frame}, {found.joints or 'no joints'},"
-        f" {found.freedoms} freedoms{f', redundant by {spare}' if spare > 0 else ''}"
+        f" {degrees}{f', redundant by {spare}' if spare > 0 else ''}"
     )
     parts: list[str | Table] = []
     if found.pairs:
         rows = []
         for pair in found.pairs:
-            degrees = math.degrees(pair.angle)
-            angle = f"{degrees:.6g}" if degrees > 1e-9 else "0"
-            apart = f"{pair.distance * 1e3:.6g}" if pair.distance > 1e-12 else "0"
-            rows.append((f"{pair.first}, {pair.second}", angle, apart))
-        parts += ["", Table(("axes", "angle [deg]", "apart [mm]"), rows)]
+            angle = six_digits(math.degrees(pair.angle), 1e-9)
+            distance = six_digits(pair.distance * 1e3, 1e-9)
+            rows.append((f"{pair.first}, {pair.second}", angle, distance))
+        parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
     start = "from the point of the first axis nearest to the second axis"
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
@@ -228,4 +228,4 @@ def _kind_line(kind: StructureKind) -> str:
     line = f"{kind.name}: {', '.join(kind.joints)}, {'exactly' if kind.is_exact else deviation}"
     if kind.at is None:
         return line
-    return f"{line}, centre ({', '.join(f'{round(x, 12):.6g}' for x in kind.at)}) m at zero"
+    return f"{line}, centre ({', '.join(six_digits(x, 1e-12) for x in kind.at)}) m at zero"

@@ -551,7 +551,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     def parts(k: int) -> Iterator[str | Table]:
         lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _bounded(names, found, k)]
-        yield Table(("", "value", "no less than", "no more than"), lines)
+        yield Table(("", "value", "lower bound", "upper bound"), lines)
         if singularity := found.singularity(k):
             yield from str(singularity).splitlines()  # the manipulability has no derivative
         else:
