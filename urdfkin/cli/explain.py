@@ -32,7 +32,7 @@ def answer_to(topic: str) -> str | None:
 
 
 def as_text(answer: str) -> str:
-    """Format a section for a terminal; the code that each example needs first is printed last."""
+    """Format a section for a terminal; the code that must run before its examples is printed at the end."""
     pieces = _BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
@@ -50,7 +50,7 @@ def anchor(heading: str) -> str:
 
 
 def _sections() -> list[str]:
-    """Split docs/questions.md at its headings; the first section has the code that each example needs."""
+    """Split docs/questions.md at its headings; the code in the first section runs before each example."""
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 
@@ -74,7 +74,7 @@ def command(topic: str | None) -> None:
       urdfkin explain rounded-pi
       urdfkin explain 7.130
       urdfkin explain reference-frames
-    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
+    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     rules = (*RULES.values(), *OF_OTHERS.values())
     if topic is None:
         for rule in rules:

@@ -128,7 +128,7 @@ _LOAD_OPTIONS = "urdfkin.load_options"
 
 
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
-    """Return a callback that stores an option for `load_options`, always or only if the option is given."""
+    """Return a callback that stores an option for `load_options`; without `always`, only if it is given."""
 
     def store(context: click.Context, _: click.Parameter, value: Any) -> None:
         if always or value not in (None, ()):
@@ -244,7 +244,7 @@ path_options = combine(
 
 
 class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # the class is generic from click 8.2 on
-    """The name of a reference frame; the error for an unknown name refers to the explanation."""
+    """A reference frame; the error for an unknown name states where reference frames are explained."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
@@ -337,7 +337,7 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 
 
 def warn_of_motion(motion: Trajectory) -> None:
-    """Write warnings about a trajectory to stderr, and how v and a were computed."""
+    """Write the warnings about a trajectory, and the way v and a were computed, to stderr."""
     for note in motion.notes:
         say(f"warning: {note}", err=True)
     if motion.rates != "as given":
@@ -427,7 +427,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that remove the options for the file formats of the other robots."""
+        """Return arguments of `load` that remove options which apply only to another robot's file format."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -469,7 +469,7 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat arrays of one sample, so that all arrays have as many rows; else raise InputError."""
+    """Repeat single rows until all arrays have equally many rows; raise InputError for other lengths."""
     import numpy as np
 
     n = max(map(len, batches))
@@ -571,7 +571,7 @@ _BASE_OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options for the motion of the root link that a quantity of the inputs q, v and a needs."""
+    """Make the options for the root link's pose (q), velocity (v) and acceleration (a), as in "qv"."""
     return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
 
 

@@ -139,7 +139,10 @@ def _verified_answer(
 def _samples(
     x: Inputs, most: int, others: str, of: Callable[[int], Iterable[str | Table]]
 ) -> Iterator[str | Table]:
-    """Yield a heading and the tables `of(k)` for each of the first `most` samples, and mention the others."""
+    """Yield a heading and the tables `of(k)` for each of the first `most` samples.
+
+    If there are more samples, also yield their number and the option that writes all of them.
+    """
     n = len(x.q)
     for k in range(min(n, most)):
         if n > 1:
@@ -279,7 +282,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of the Jacobian.
 
-    For a Hessian, the table has one row for each pair of joint velocities with a derivative that is not zero.
+    For a Hessian, the table has one row for each pair of joint velocities; rows of zeros are left out.
     """
     import numpy as np
 
@@ -393,7 +396,7 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
 
 
 def _short_poses(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
-    """Return each pose as six or seven numbers; if Pinocchio has checked T, it also checks the rotation."""
+    """Return each pose as six or seven numbers; if T is verified, Pinocchio also checks the orientations."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of
@@ -449,7 +452,7 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    Each row of the table belongs to one joint velocity, or to another entry of v. The row lists the time
+    Each row of the table belongs to one entry of v, for example a joint velocity. The row lists the time
     derivatives of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity.
     `urdfkin jacobian` prints angular velocities instead.
     """

@@ -30,7 +30,7 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return the code for the language `to`: with exact constants for sympy-exact, otherwise unchanged.
+    """Return code with exact constants for the language sympy-exact, and the same code for other languages.
 
     Raise VerificationError if Pinocchio computes another result than the exact expressions.
     """

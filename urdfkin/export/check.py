@@ -88,7 +88,7 @@ def _doubts(text: str) -> Iterator[str]:
     sealed = is_sealed(text)
     if sealed is None:
         yield (
-            "the file has no seal (checksum), so its header may belong to other numbers; export the"
+            "the file has no seal (checksum), so its header may not describe these numbers; export the"
             " file again"
         )
     elif not sealed:

@@ -44,7 +44,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: Options for the whole width of vector registers; by default, GCC uses only half of it on many processors
+#: Options to use the full width of vector registers; by default, GCC uses half of it on many processors
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
@@ -138,7 +138,7 @@ def _load(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its path, so each path has another number of "./".
+        # The loader identifies a library by its path. A different number of "./" makes each path unique.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
 
 
@@ -384,8 +384,8 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        Such arrays need no conversion of arguments (`Call`), which would take a tenth of the time of 100,000
-        accelerations, because each large batch removes the conversion's code from the processor's caches.
+        Such arrays need no conversion of arguments (`Call`). The conversion would take a tenth of the time of
+        100,000 accelerations, because each large batch removes its code from the processor's caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(

@@ -187,7 +187,7 @@ def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
 
 
 def needed(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
-    """Return the expressions that results need; the operands of operations in `leaves` are not needed."""
+    """Return all expressions that the results depend on; operations in `leaves` count as inputs."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

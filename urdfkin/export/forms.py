@@ -63,7 +63,7 @@ def code_of_chain(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)  # warnings about a URDF that the user does not know
+        warnings.simplefilter("ignore", UrdfWarning)  # the user did not write this URDF
         robot = hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))

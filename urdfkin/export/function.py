@@ -93,7 +93,7 @@ class Function:
         return found
 
     def needed_without(self, leaves: Collection[str]) -> set[Node]:
-        """Return the expressions that the results need if operations in `leaves` are inputs."""
+        """Return all expressions that the results depend on; operations in `leaves` count as inputs."""
         return set(needed(self.results, leaves))
 
     def values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
@@ -129,7 +129,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return x for an expression -x, which is not assigned to a variable; return others unchanged."""
+    """Return x for an expression -x, because a negation has no variable; return others unchanged."""
     return node.of[0] if node.op == "neg" else node
 
 

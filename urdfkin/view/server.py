@@ -166,7 +166,7 @@ LOOPBACK = "127.0.0.1"
 
 #: The only message that the server accepts from a page: a control has changed
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements in viser's page that give the nonce to its script, and to the script that this script creates
+#: Replacements that add the nonce to viser's script, and to the script element that this script creates
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
