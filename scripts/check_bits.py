@@ -140,7 +140,7 @@ def differing_interpreted(subject: Subject) -> Iterator[str]:
 
 
 def to_keep(subject: Subject) -> dict[str, Any]:
-    """Return the inputs, the frames, and each result with its bound, under the names of a file."""
+    """Return the inputs, the frames, and each result with its bound, as named arrays for an .npz file."""
     stored: dict[str, Any] = {f"{subject.name}/{x}": y for x, y in zip("qva", subject.inputs, strict=True)}
     stored[f"{subject.name}/frames"] = np.array(subject.frames)
     for what, quantity, reference, inputs in subject.results():

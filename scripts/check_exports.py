@@ -184,7 +184,7 @@ def store(keep: Path | None, line: str) -> None:
 
 
 def tell(lines: Sequence[dict[str, Any]]) -> None:
-    """Print the largest error of each way."""
+    """Print the largest error of each way to run the code."""
     ways = sorted({way for line in lines for way, share in line.items() if isinstance(share, float)})
     worst = ", ".join(f"{way} {max(line.get(way, 0.0) for line in lines):.2g}" for way in ways)
     print(f"worst error as a share of the bound: {worst}")

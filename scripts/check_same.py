@@ -47,7 +47,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     said = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
-    # Rounding to four digits may not change a file, so both verdicts are correct.
+    # The change "rounded" rounds to four digits; it may leave a file unchanged, so either verdict is correct.
     said["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
     # The frame with the largest distance, without frames that moved on their bodies
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]

@@ -151,7 +151,7 @@ def on_post_page(output: str, **_: Any) -> str:
 
 
 def notebook(page: str) -> dict[str, Any]:
-    """Convert a page to a notebook with the outputs of the page, which a test compares."""
+    """Convert a page to a notebook. The outputs are copied from the page; a test checks them."""
     cells: list[dict[str, Any]] = []
     at = 0
     for block in _FENCE.finditer(page):

@@ -191,7 +191,7 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
 
 
 def _floor(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
-    """Compare urdfkin's time with the time to write the output once and with the number of operations."""
+    """Compare urdfkin's time with two lower limits: to write the output, and to do the arithmetic."""
     who = {row["who"].partition(",")[0]: row for row in reversed(group)}
     fill, ns = who[FLOOR], who["urdfkin"]["median_ns"]
     size = 8 * fill["numbers"]
@@ -207,7 +207,7 @@ def _floor(title: str, group: list[Entry], operations: Mapping[str, int]) -> dic
 
 
 def _where(title: str, entries: Sequence[Entry]) -> Words:
-    """Return a column for each robot and quantity, with nanoseconds and the fraction of the total time."""
+    """Return a column for each robot and quantity: nanoseconds, and their share of the total time."""
 
     def cell(entry: Entry, part: str) -> str:
         ns = entry["parts"].get(part)

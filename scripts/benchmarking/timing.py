@@ -77,7 +77,7 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
 def times(
     works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
-    """Return the nanoseconds for one configuration; each work runs once in each round, in varying order."""
+    """Return the nanoseconds for one configuration; each task runs once in each round, in varying order."""
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
     gc.disable()

@@ -108,7 +108,7 @@ def odd_axis(rng: random.Random) -> list[float]:
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
-    """Return a quaternion of any length, possibly zero, of the identity, a tiny or a random rotation."""
+    """Return a quaternion of any norm, possibly zero, whose rotation may be the identity, tiny or random."""
     numbers = rng.choice(
         (
             [0.0, 0.0, 0.0, 1.0],
