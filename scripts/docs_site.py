@@ -21,7 +21,7 @@ LESSONS = "lessons/"
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
 #: Title, introduction and names of each page of the library.
-#: Only a name outside the package `urdfkin` and the class `Robot` has its full path.
+#: Names of the package `urdfkin` and of the class `Robot` are short; all other names have their full path.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",

@@ -42,7 +42,7 @@ def results(
 ) -> list[Any]:
     """Return the rows of a frame's Jacobian (7.85) or acceleration (7.127 to 7.130), in world axes.
 
-    The joints have one coordinate each. The numbers and the equations `eq` may be of any kind.
+    Each joint has one coordinate. The arguments may be any numbers that the functions of `eq` accept.
     """
     recursion, state, columns = Recursion(eq, own=quantity == "acceleration"), State(), []
     for i, (kind, _, place) in enumerate(plan.steps.tolist()):

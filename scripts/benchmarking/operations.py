@@ -17,8 +17,7 @@ from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, pr
 from urdfkin.kinematics.arithmetic import bound
 
 #: Number of operations of a sine and a cosine (`compiled.python_numbers`).
-#: 10 operations reduce the angle, 8 compute the terms z and 1 - z/2 with their errors, 20 evaluate
-#: polynomials, and 13 are the last steps.
+#: Reduction of the angle: 10; z and 1 - z/2 with their errors: 8; polynomials: 20; last steps: 13.
 _SINE_COSINE = 51
 
 

@@ -104,7 +104,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
         yield Words("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            # The rows are sorted by quantity and contender, both in the order of their first rows.
+            # Rows are grouped by quantity, then by contender; groups are in the order of their first rows.
             keys = [(row["quantity"], row["who"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
             rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["who"])))

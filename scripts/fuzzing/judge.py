@@ -183,7 +183,7 @@ def _together(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield results of calls for several frames and configurations; calls for one must give the same."""
+    """Yield results for several frames and configurations; raise MismatchError if single calls differ."""
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:

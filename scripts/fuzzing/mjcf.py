@@ -16,7 +16,7 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference from MuJoCo's placements, and of the two sides of an equality constraint.
+#: Allowed relative difference from MuJoCo's placements, and between the sides of an equality constraint.
 _APART = 1e-12
 
 # Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 #: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
-#: A module's only command is the function `command`; several commands are the functions `NAME_command`.
-#: `groups` adds the quantities of `verify/quantities.py`, such as `jacobian`, to the heading `_COMPUTE`.
+#: A command is the function `command` of its module, or `NAME_command` if the module has several commands.
+#: The function `groups` adds a command for each quantity, such as `jacobian`, below the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {

@@ -158,7 +158,7 @@ def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS = "urdfkin.settings"
-#: Settings in pyproject.toml that are the defaults of the options with the same names
+#: Settings in pyproject.toml; each is the default of the option with the same name
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 
 
@@ -432,9 +432,9 @@ class CheckRun:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
-        """Load a USD or MJCF file, and add the findings of the robot or of the error.
+        """Load a USD or MJCF file, and add the findings about the robot, or about the error of loading.
 
-        With --changed-since, an unchanged file is skipped; of a changed file, all findings are reported.
+        With --changed-since, unchanged files are skipped; all findings about a changed file are reported.
         """
         suffixes = USD if is_usd(file) else _MJCF
         if self.version is not None and self._is_unchanged(file, suffixes, self.version):

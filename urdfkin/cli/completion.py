@@ -40,7 +40,7 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    # While the user types the value of an option, click does not yet know the command's arguments.
+    # While the user types an option's value, click has not parsed ROBOT yet, so the first argument is used.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 

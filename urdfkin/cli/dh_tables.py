@@ -163,7 +163,7 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
 
 
 def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
-    """Yield the lines below a table: the check, the error of the printed digits, and hints."""
+    """Yield the lines below a table: the check, the rounding error of the printed numbers, and hints."""
     yield check_of_path(check)[0]
     if request.format_ in _ROUNDED:
         yield from str(printed(table, request.units, _ROUNDED[request.format_])).split("\n")

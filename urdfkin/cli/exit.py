@@ -40,7 +40,7 @@ class Stop:
 def stoppable() -> Iterator[Stop]:
     """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
     stop = Stop()
-    # After `nohup urdfkin ...`, the handler of SIGHUP is not the default one, and SIGHUP is ignored.
+    # `nohup` makes a process ignore SIGHUP, so only signals with the default handler get a new handler.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 
     def handle(handler: Any) -> None:

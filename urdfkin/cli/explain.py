@@ -25,7 +25,7 @@ def answers() -> dict[str, str]:
 
 
 def answer_to(topic: str) -> str | None:
-    """Return the section with the anchor `topic`, or the only section whose anchor contains all its words."""
+    """Return the section with the anchor `topic`, or the only one whose anchor has all words of `topic`."""
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)

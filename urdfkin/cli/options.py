@@ -571,7 +571,7 @@ _BASE_OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options for the root link's pose (q), velocity (v) and acceleration (a), as in "qv"."""
+    """Make the options for the root link's motion; "qv" means its pose and velocity, for example."""
     return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
 
 
@@ -595,7 +595,7 @@ def with_base(
 
 
 def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """Return numbers, with one row for each sample, and the layout that fits them (see `read_batch`)."""
+    """Return two things: numbers with one row per sample, and their layout (see `read_batch`)."""
     import numpy as np
 
     from urdfkin.robot.trajectory import numbers

@@ -119,7 +119,7 @@ _CONVERTERS: dict[str, Callable[[Any], bytes | str]] = {
 def writes_answer(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
     """Return a decorator that makes a command from a function that returns an `Answer`.
 
-    The command has the options --format and --output. It writes the answer, and ends with the answer's exit
+    The command has the options --format and --output. The command writes the `Answer`, and ends with its exit
     code. `names` are the formats of --format; by default the formats in `TEXTS`, JSON and CSV. `suffixes`
     lists the formats of each suffix; by default those of `_SUFFIXES`.
     """

@@ -74,7 +74,7 @@ def _stop_command(error: OSError) -> BaseException:
 
 
 def _with_errors(stream: Any, descriptor: int) -> Any:
-    """Return a standard stream that reports errors of writing; another stream is returned unchanged."""
+    """Return a standard stream that reports write errors; return any other stream unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -178,8 +178,8 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, only the last 16 characters are stored. "x" marks that they do not begin the line,
-        # because some CI commands are recognised only at the beginning.
+        # Of a long line, only an "x" and the last 16 characters are stored.
+        # Without the "x", these characters could look like a CI command at the beginning of a line.
         is_long = len(whole) > _MOST_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece

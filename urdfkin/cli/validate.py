@@ -105,7 +105,7 @@ def _study(
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
     """Return two things: the accuracy result of a robot, and whether to store it.
 
-    A failure is stored only if it is an error of urdfkin about an unchanged robot file.
+    A failure is stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
     """
     import numpy as np
 

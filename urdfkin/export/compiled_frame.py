@@ -4,8 +4,9 @@ The first call of a quantity exports C code, compiles the code with the system's
 results of the machine code with Pinocchio. Without a C compiler, the forward recursion that Numba compiles is
 used.
 
-The machine code is stored in a cache with checksums. The key consists of the C code, the compiler and the
-processor. The code is loaded from memory, because a file could be changed after its checksum was tested.
+The machine code is stored in a cache with checksums. The key in the cache consists of the C code, the
+compiler and the processor. The code is loaded from memory, because a file could be changed after its checksum
+was tested.
 """
 
 from __future__ import annotations
@@ -384,8 +385,8 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        Such arrays need no conversion of arguments (`Call`). The conversion would take a tenth of the time of
-        100,000 accelerations, because each large batch removes its code from the processor's caches.
+        Such arrays need no conversion of arguments (`Call`). For 100,000 accelerations, the
+        conversion would take a tenth of the time: each batch removes its code from the processor's caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(

@@ -147,7 +147,7 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function that computes an equation, and stores its number in each new expression.
+        """Return a function that computes an equation, and stores the equation's number in new expressions.
 
         If an equation calls another one, the new expressions store the number of the calling equation.
         """

@@ -82,7 +82,7 @@ def code_of_chain(
 
 
 def _with_safe_names(table: DHTable) -> DHTable:
-    """Replace the names of joints and frames that a URDF cannot contain."""
+    """Replace each name of a joint or frame that is not allowed in a URDF."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )

@@ -129,7 +129,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return x for an expression -x, because a negation has no variable; return others unchanged."""
+    """Return x for an expression -x, because no variable stores a negation; return others unchanged."""
     return node.of[0] if node.op == "neg" else node
 
 

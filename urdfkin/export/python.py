@@ -62,7 +62,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that assigns each number to an element of an array."""
+    """Return a `Dialect.result` whose code assigns each number to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -75,7 +75,7 @@ def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
 
 
 def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that returns a matrix of rows; a Hessian (6, nv, nv) becomes one matrix."""
+    """Return a `Dialect.result` whose code returns a matrix; a Hessian (6, nv, nv) becomes one matrix."""
 
     def result(writer: Writer) -> Iterator[str]:
         values, shape = writer.results(), writer.function.shape
@@ -120,7 +120,7 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
 
 
 def _lengths(text: str) -> Callable[[Writer], list[str]]:
-    """Return a `Dialect.first_lines` that checks the lengths of the inputs of one configuration.
+    """Return a `Dialect.first_lines` whose code checks the input lengths of one configuration.
 
     `text` is a format string of the error message, with the fields `x` (name of an input) and `width` (its
     length).
@@ -142,7 +142,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that stacks all numbers, for libraries with immutable arrays."""
+    """Return a `Dialect.result` whose code stacks all numbers, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function

@@ -11,8 +11,8 @@ Four independent measures keep them out:
 | security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
 Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
-server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that answers
-the requests. Before a robot is shown, the module tests the running server with requests that it must refuse,
+server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that checks
+each request. Before a robot is shown, the module tests the running server with requests that it must refuse,
 and stops a server that accepts one of them. A new version of viser can therefore make the viewer fail, but it
 cannot make it insecure.
 
