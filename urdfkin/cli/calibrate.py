@@ -114,10 +114,10 @@ def command(
     measured configurations. ROBOT may also be the file of a Denavit-Hartenberg table, whose numbers are then
     fitted. Without --poses and --ur, the command lists which parameters are identifiable in principle.
 
-    The command refuses a calibration that is not plausible, and prints the likeliest cause. Examples are
-    joint angles in degrees, a joint with the wrong sign, or poses in the lines of other configurations. With
-    --force, the command writes the calibration nevertheless. If the joint values look like degrees, --radians
-    is also needed.
+    The command refuses a calibration that is not plausible, and prints the likeliest cause. Possible causes
+    are joint angles in degrees, a joint with the wrong sign, or poses in wrong lines. With --force, the
+    command writes the calibration nevertheless. If the joint values look like degrees, --radians is also
+    needed.
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """

@@ -31,7 +31,7 @@ _LINES, _JSON = 10.0, 0.5
 class Pace:
     """Estimates the speed of a validation, in chunks of samples per second, and the remaining time.
 
-    The time before the first chunk is finished does not count, because urdfkin may compile kernels then.
+    The time until the first chunk is finished is not counted, because urdfkin may compile kernels meanwhile.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:

@@ -432,7 +432,7 @@ class CheckRun:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
-        """Load a USD or MJCF file, and add the findings about the robot, or about the error of loading.
+        """Load a USD or MJCF file; add the findings about the robot or, if loading fails, about the error.
 
         With --changed-since, unchanged files are skipped; all findings about a changed file are reported.
         """

@@ -1,8 +1,8 @@
 """Complete commands, options, robots, files, frames, tables, codes and equations in a shell.
 
-Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
-Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name in a
-malicious file could make the shell run a command.
+Completion runs at each press of the Tab key, so it imports no large package and reads only the names in a
+file. Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name
+in a malicious file could make the shell run a command.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return each section of docs/questions.md, without links, by the anchor of its heading."""
+    """Return the sections of docs/questions.md, without links; the keys are the anchors of their headings."""
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
@@ -64,9 +64,9 @@ def command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
     CODE is a finding's code or its short name. Its page has the reason, a bad and a good example, and the
-    behaviour of other programs. EQUATION is a number in the textbook's chapter. Its page has the equation,
-    the function that computes it, and the check of this function. QUESTION is the name of a question, or a
-    word of the name. Without an argument, the command lists all codes and questions.
+    behaviour of other programs. EQUATION is the number of an equation in the textbook, such as 7.130. Its
+    page has the equation, the function that computes it, and the check of this function. QUESTION is the name
+    of a question, or a word of the name. Without an argument, the command lists all codes and questions.
 
     \b
     Example:

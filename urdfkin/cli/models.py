@@ -112,8 +112,8 @@ def same_command(
     rounding of the numbers in its definition.
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
-    --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A is
-    compared with B as given. Exit 0: all frames are within the given distance. 1: a frame is not.
+    --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A is compared
+    with B as given. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
     from urdfkin.comparison.bounds import MOST_BOXES
     from urdfkin.comparison.certificate import certificate
