@@ -243,7 +243,7 @@ path_options = combine(
 )
 
 
-class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # the class is generic from click 8.2 on
+class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
     """A reference frame; the error for an unknown name states where reference frames are explained."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -351,7 +351,7 @@ def warn_of_limits(robot: Robot, q: FloatArray) -> None:
 
 
 def locked_joints(robot: Robot) -> dict[str, Any]:
-    """Return the locked joints as an entry of the JSON output; empty if no joint is locked."""
+    """Return a mapping with the locked joints for JSON output; it is empty if no joint is locked."""
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -369,7 +369,7 @@ class Inputs:
         settings: Other settings that affect the result, for example `{"relative_to": "base"}`. The titles of
             tables and the JSON output list them.
         conversion: Conversion to the convention of --convention; None for urdfkin's own convention.
-        is_trajectory: Whether the samples come from --trajectory; CSV output then has one row for each.
+        is_trajectory: Whether the samples come from --trajectory. If so, CSV output has one row per sample.
     """
 
     robot: Robot

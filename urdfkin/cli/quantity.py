@@ -310,7 +310,10 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
         yield Table(heads, cells, left=2)
 
     def parts() -> Iterator[str | Table]:
-        yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
+        yield (
+            "in m/s^2 and rad/s^2; terms of equation 7.125: transverse (a z x d), centripetal,"
+            " Coriolis (2 w x u), sliding (a z)"
+        )
         yield from _samples(x, 2, "csv, json or npy", table)
 
     def rows() -> Iterator[list[object]]:
