@@ -49,7 +49,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
         return said | {"right": bool(found) and _places_agree(found, a, b)}
     # The change "rounded" rounds to four digits; it may leave a file unchanged, so either verdict is correct.
     said["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
-    # The frame with the largest distance, without frames that moved on their bodies
+    # The frame with the largest distance, without frames that moved relative to their bodies
     frames = [frame for frame in found.frames if frame.frame_b not in _tools(found) and frame.q_a]
     worst = max(frames, key=lambda frame: (frame.upper, frame.lower), default=None)
     if worst is None or not math.isfinite(worst.upper) or not np.array_equal(found.base, np.eye(4)):
@@ -61,7 +61,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
 
 
 def _tools(found: Sameness) -> set[str]:
-    """Return the frames of B that `same` reports as moved on their bodies."""
+    """Return the frames of B that `same` reports as moved relative to their bodies."""
     return {line.split()[1] for line in found.after if line.startswith("frame ")}
 
 

@@ -120,7 +120,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put displayed formulas on separate lines, let pictures follow the chosen theme, link the notebook."""
+    """Put formulas on separate lines, let pictures follow the chosen theme, and link the notebook."""
     markdown = _DISPLAYED.sub(r"\n$`\1`$\n", markdown)
     markdown = _PICTURE.sub(r'<img src="\2#only-light"\3><img src="\1#only-dark"\3>', markdown)
     if not page.file.src_uri.startswith(LESSONS):

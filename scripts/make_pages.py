@@ -235,7 +235,7 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
             )
-            # Exact results have intervals of width 0 and do not count.
+            # Exact results have intervals of width 0 and are not counted.
             inside = [
                 np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
                 for side in ("urdfkin", "pinocchio")

@@ -81,7 +81,7 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
-    """Return a function of the number of configurations and the addresses of q, v, a and the results."""
+    """Return a function; its arguments are the batch size and the addresses of q, v, a and the results."""
     plan, folder = subject.plan, subject.folder
     turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
     tables = {

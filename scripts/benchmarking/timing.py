@@ -149,7 +149,7 @@ class Calls:
         return Work(self.who, subject.loop, run, result, remark=self.remark)
 
     def loop(self) -> Callable[..., None]:
-        """Return a loop as a function of `out` and the batch of q, or the batches of q, v and a."""
+        """Return a function that loops over a batch; its arguments are `out`, and q or q, v and a."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
 
@@ -178,7 +178,7 @@ def _rows(inputs: Any) -> Any:
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Make a function of the line `head` and the lines `body` below it; `names` are its local variables."""
+    """Compile a function: the line `head`, the lines `body` below it, and the variables `names`."""
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

@@ -205,7 +205,7 @@ def _together(
 
 
 def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name. urdfkin and Pinocchio each search for the name by themselves."""
+    """Yield placements of frames by name. urdfkin and Pinocchio find each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]

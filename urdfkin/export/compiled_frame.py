@@ -414,7 +414,7 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             arguments = _Arguments()
             arguments[_N], arguments[_OUT] = len(part), address(part)
-            # If the last row is shorter than a vector register, the code writes past the end of the row.
+            # The code may write past the last row by less than a vector register, so `stage` has extra space.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):

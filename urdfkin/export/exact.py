@@ -196,9 +196,9 @@ def exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Return functions with exact constants, and the result of their comparison with Pinocchio.
 
-    The functions are evaluated at fifty digits. The test vectors are those of `proof`, the proof of the same
-    functions with constants in double precision. Raise VerificationError if Pinocchio computes another
-    result.
+    The functions are evaluated at fifty digits. The test vectors are copied from `proof`, which
+    belongs to the same functions with constants in double precision. Raise VerificationError if Pinocchio
+    computes another result.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):

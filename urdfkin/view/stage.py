@@ -191,7 +191,7 @@ class Stage:
         server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
-        """Let the camera see the robot in n configurations; Ts (n, links, 4, 4) are the links' placements."""
+        """Set the camera to show the robot in n configurations; Ts (n, links, 4, 4) are link placements."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]

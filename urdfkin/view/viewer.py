@@ -313,7 +313,7 @@ class Viewer:
             self.player.show(0)
 
     def _fill(self) -> None:
-        """Let the robot fill the view in the configuration q, and along the whole trajectory."""
+        """Set the camera to show the robot in the configuration q and along the whole trajectory."""
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
@@ -482,7 +482,7 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Apply a new frame, reference or convention; derive and check the DH table only here."""
+        """Apply a new frame, reference or convention; derive and check the DH table for them."""
         with self._lock:
             self._table, words = None, ""
             if self.dh.value != "none":
