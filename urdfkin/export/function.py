@@ -1,8 +1,8 @@
 """Define a function of the exported code, which computes one quantity of one frame.
 
-The exported code assigns an expression to a variable if the expression is used more than once, is a number of
-a link's state (pose, velocity, acceleration), or is a sine, cosine, root or quotient. A long expression is
-split into several assignments. All other expressions are written where they are used.
+The exported code assigns an expression to a variable in three cases: it is used more than once, it is a
+number of a link's state (pose, velocity, acceleration), or it is a sine, cosine, root or quotient. A long
+expression is split into several assignments. All other expressions are written where they are used.
 """
 
 from __future__ import annotations
