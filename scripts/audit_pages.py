@@ -85,7 +85,7 @@ const ringed = (s) => (parseFloat(s.outlineWidth) > 0 && s.outlineStyle !== "non
 const shown = ringed(style) || [...(e.labels ?? [])].some((l) => ringed(getComputedStyle(l)));
 return [e.tagName.toLowerCase() + " " + name.slice(0, 40), shown, box.width * box.height > 0, !!name];
 """
-#: JavaScript that returns whether the element with the focus changes its border without the focus.
+#: JavaScript that returns whether the border of the focused element changes when it loses the focus.
 _BORDER = """
 const done = arguments[0], e = document.activeElement, border = () => getComputedStyle(e).borderColor;
 setTimeout(() => { const focused = border(); e.blur(); setTimeout(() => {
@@ -127,7 +127,7 @@ def reports(folder: Path) -> dict[str, Callable[[], str]]:
         return as_html(validate(robots, samples=samples).as_dict())
 
     def disagreement() -> str:
-        """Return a report with disagreements: the oracle's velocities have a relative error of 1e-6."""
+        """Return a report with disagreements: Pinocchio's velocities are changed by a factor of 1 + 1e-6."""
         with patch.object(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-6)):
             return page(["panda", "ur5"], 6)
 
@@ -347,7 +347,7 @@ def main() -> None:
         return name.startswith(tuple(given.only))
 
     def visit(browser: Browser, page: Page) -> None:
-        # The site keeps the theme of the first visit.
+        # The site stores the theme of the first visit, so the stored theme is removed before each page.
         script = {"source": "try { localStorage.clear(); } catch {}"}
         browser.chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
         found = audit(browser, page, given.output, axe, jar)

@@ -44,7 +44,7 @@ class Plan:
     joints: tuple[int, ...] = (6, 12, 25, 50, 100)  # numbers of joints of the chains
     numbers: int = 4_000_000  # number of values in a chain's batch of Jacobians
     frames: tuple[int, ...] = (1, 4, 16, 1000)  # numbers of frames whose placements are computed in one pass
-    frame_configurations: int = 4_000  # number of configurations of a batch for the measurement of `frames`
+    frame_configurations: int = 4_000  # number of configurations of a batch in the section `frames`
     sizes: tuple[int, ...] = (1_000, 10_000, 100_000, 1_000_000)  # sizes of batches
     memory: int = 1_000_000  # number of configurations for the measurement of memory
 
@@ -56,7 +56,7 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
     """Measure everything; raise DifferenceError if two contenders have different results."""
     name, frame = SUBJECTS[0]
     n, rounds = plan.configurations, plan.rounds
-    ways: dict[str, Iterator[Row]] = {  # each generator measures when it is read
+    ways: dict[str, Iterator[Row]] = {  # a generator measures only when its rows are read
         **{name: measured.contest_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
         "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
         "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),

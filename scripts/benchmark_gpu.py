@@ -46,7 +46,7 @@ from urdfkin.robot import Robot
 SIZES = (1, 64, 1024, 4096, 65_536, 1_048_576)
 LAUNCHES = 21
 _BYTES = {"double": 8, "float": 4}
-#: Largest difference of a Jacobian of PyTorch Kinematics, which reads a URDF's angles in single precision.
+#: Largest allowed error of PyTorch Kinematics' Jacobian; this library reads angles in single precision.
 _MOST = {"double": 1e-6, "float": 1e-4}
 
 _PROGRAM = Path(__file__).parent / "benchmarking" / "gpu.cu"
@@ -137,7 +137,10 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
 
 
 def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
-    """Yield JSON lines of PyTorch's export and of PyTorch Kinematics; raise ValueError for a wrong number."""
+    """Yield a JSON line for each measurement of the export to PyTorch and of PyTorch Kinematics.
+
+    Raise ValueError if a result is wrong.
+    """
     try:
         import torch
         from torch.utils.benchmark import Timer

@@ -39,7 +39,7 @@ from urdfkin.verify.call import Call
 from urdfkin.verify.quantities import Quantity, recursive_quantities
 from urdfkin.verify.verifier import bound_of
 
-#: Sizes of batches: less than a block of eight, one block, one block and a rest, many blocks and a rest.
+#: Sizes of batches: less than one block of eight, exactly one block, and one or many blocks plus a remainder.
 LENGTHS = (1, 2, 7, 8, 9, 100)
 #: Numbers of threads of a batch; None: urdfkin's default.
 THREADS = (None, 1, 2, 3)
@@ -140,7 +140,7 @@ def differing_interpreted(subject: Subject) -> Iterator[str]:
 
 
 def to_keep(subject: Subject) -> dict[str, Any]:
-    """Return the inputs, the frames, and each result with its bound, under the names of a file."""
+    """Return the inputs, the frames, and each result with its bound, as named arrays for an .npz file."""
     stored: dict[str, Any] = {f"{subject.name}/{x}": y for x, y in zip("qva", subject.inputs, strict=True)}
     stored[f"{subject.name}/frames"] = np.array(subject.frames)
     for what, quantity, reference, inputs in subject.results():
@@ -170,7 +170,7 @@ def share(what: str, now: Arrays, stored: Arrays) -> float:
     apart = np.abs(now[what] - stored[what])
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(apart == 0.0, 0.0, apart / stored[f"{what}/bound"])
-    # 0 and -0 have different bits, and their difference is 0.
+    # 0 and -0 have different bits, but their difference is 0.
     return float(np.nan_to_num(shares, nan=np.inf, posinf=np.inf).max()) or sys.float_info.min
 
 

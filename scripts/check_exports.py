@@ -50,7 +50,7 @@ _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
 #: Files for robots with more joint velocities contain no Hessian, because its check in PyTorch is slow.
-#: JAX does not check the Hessian of a file for any array library, because its compilation takes minutes.
+#: JAX does not check the Hessian of a file in the format `array`, because the compilation takes minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -184,7 +184,7 @@ def store(keep: Path | None, line: str) -> None:
 
 
 def tell(lines: Sequence[dict[str, Any]]) -> None:
-    """Print the largest error of each way."""
+    """Print the largest error of each way to run the code."""
     ways = sorted({way for line in lines for way, share in line.items() if isinstance(share, float)})
     worst = ", ".join(f"{way} {max(line.get(way, 0.0) for line in lines):.2g}" for way in ways)
     print(f"worst error as a share of the bound: {worst}")

@@ -58,7 +58,7 @@ _DOCUMENT = r"""\documentclass{article}
 """
 
 
-class Missing(Exception):  # noqa: N818  the run continues, so this is no error
+class Missing(Exception):  # noqa: N818  only this format is skipped
     """Error if an interpreter or library of a format is not installed."""
 
 
@@ -70,7 +70,7 @@ class Job:
     q: FloatArray
 
     def given(self, form: str) -> list[list[float]]:
-        """Return the configurations in the order of the coordinates of the exported code."""
+        """Return the configurations with their coordinates in the order that the exported code uses."""
         if form not in LANGUAGES or form == "sympy":
             return list(self.q.tolist())
         names = coordinate_names(to_tree(self.table))
@@ -78,7 +78,7 @@ class Job:
 
 
 Poses = list[FloatArray]
-#: The poses of all jobs; the folder is for files.
+#: Function that returns the poses of all jobs; it may write files into the folder.
 Run = Callable[[Sequence[Job], Path], Poses]
 
 
@@ -214,7 +214,7 @@ class Subject:
 
 
 def subjects(leaves: bool) -> Iterator[Subject]:
-    """Yield tables that agree with Pinocchio; `robot.dh` raises an error otherwise."""
+    """Yield tables; `robot.dh` has compared each of them with Pinocchio."""
     for name in examples():
         robot = urdfkin.load(name)
         tips = [robot.tree.frame_name(leaf) for leaf in robot.tree.leaves()] if leaves else [robot.tip_frame]

@@ -46,7 +46,7 @@ def pair(name: str, what: str) -> dict[str, Any] | None:
     result = {"robot": name, "change": what, "verdict": found.verdict.value, "seconds": seconds}
     if what in ALIKE:
         return result | {"right": bool(found) and moves_alike(found, a, b, ROUNDING)}
-    # Rounding to four digits may not change a file, so both verdicts are correct.
+    # The change "rounded" rounds to four digits; it may leave a file unchanged, so either verdict is correct.
     result["right"] = found.verdict is Verdict.DIFFERS or what == "rounded"
     tools = {tool.b for tool in found.tools}
     frames = [frame for frame in found.frames if frame.frame_b not in tools and frame.q_a]

@@ -1,7 +1,7 @@
 """Extend mkdocs so that doctests in docstrings are shown as blocks of code; mkdocs.yml refers to this module.
 
-`help(Robot.jacobian)` also lists the arguments that several methods share. The pages show the same text. The
-heading `Example:` is removed, because the site would draw a box around such a section.
+The pages show the same text as `help(Robot.jacobian)`, which also lists arguments that several methods share.
+The heading `Example:` is removed, because the site would draw a box around such a section.
 """
 
 import inspect

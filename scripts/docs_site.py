@@ -21,7 +21,7 @@ LESSONS = "lessons/"
 _EQUATIONS = re.compile(r" \(eq\. [^)]*\)")
 _ROBOT = "urdfkin.robot.Robot"
 #: Title, introduction and names of each page of the library.
-#: Only a name outside the package `urdfkin` and the class `Robot` has its full path.
+#: Names of the package `urdfkin` and of the class `Robot` are short; all other names have their full path.
 LIBRARY: dict[str, tuple[str, str, str]] = {
     "api/robot.md": (
         "Load a robot",
@@ -120,7 +120,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put displayed formulas on separate lines, let pictures follow the chosen theme, link the notebook."""
+    """Put formulas on separate lines, let pictures follow the chosen theme, and link the notebook."""
     markdown = _DISPLAYED.sub(r"\n$`\1`$\n", markdown)
     markdown = _PICTURE.sub(r'<img src="\2#only-light"\3><img src="\1#only-dark"\3>', markdown)
     if not page.file.src_uri.startswith(LESSONS):
@@ -151,7 +151,7 @@ def on_post_page(output: str, **_: Any) -> str:
 
 
 def notebook(page: str) -> dict[str, Any]:
-    """Convert a page to a notebook with the outputs of the page, which a test compares."""
+    """Convert a page to a notebook. The outputs are copied from the page; a test checks them."""
     cells: list[dict[str, Any]] = []
     at = 0
     for block in _FENCE.finditer(page):

@@ -64,7 +64,7 @@ class Worker:
         self.process: BaseProcess | None = None
 
     def evaluate(self, family: str, number: int) -> tuple[str, str]:
-        """Test a document; return the outcome and its details; a crash and a hang are possible outcomes."""
+        """Test a document; return the outcome and its details; a crash or a timeout is also an outcome."""
         if self.process is None:
             self.start()
         try:
@@ -138,7 +138,7 @@ def fuzz(
 
 
 def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
-    """Return (family, number) of all mutants and of all random robots, which alternate between families."""
+    """Return the family and the number of each mutant and each random robot; the families alternate."""
     chosen = [family for family in families if family != MUTANTS]
     asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
     return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]

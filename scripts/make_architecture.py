@@ -86,7 +86,7 @@ def imports() -> Mapping[str, frozenset[str]]:
     found: dict[str, frozenset[str]] = {}
     for module, names in all_named().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
-        # A name is a submodule, or a name in a module.
+        # An imported name is a module, or a name that is defined in a module.
         ours = [
             name if name in modules() and last not in _reexported(head) else head
             for name, (head, last) in heads.items()

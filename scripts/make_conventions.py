@@ -287,7 +287,7 @@ def _layout() -> Iterator[Row]:
 
 
 def _readers(text: str) -> tuple[str, str, str]:
-    """Return whether urdfkin, Pinocchio and MuJoCo read a text."""
+    """Return for urdfkin, Pinocchio and MuJoCo whether each accepts a URDF text."""
 
     def reads(load: Callable[..., object], **how: bool) -> bool:
         try:

@@ -145,7 +145,7 @@ def page(text: str, figures: Mapping[str, Any]) -> str:
     """Return the page with the cells, the stated differences, the features and the reasons."""
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
-    notes: dict[str, Any] = {}  # the documented differences of these libraries, by their letters
+    notes: dict[str, Any] = {}  # the documented differences; a key is the letter of a footnote
     for note in DATA.get("documented", ()):
         verdicts = [cells.get(note["library"], {}).get(name, {}).get("verdict") for name in note["features"]]
         if "documented" in verdicts:

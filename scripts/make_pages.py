@@ -60,7 +60,7 @@ REMARKS = {
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
     "URDF508": "The limits are missing or zero, so samples within them do not move the joint.",
     "URDF510": "The value has no effect, as expected.",
-    "URDF527": "A mirrored finger has the limits of the mimicked one; kinematics applies the rule.",
+    "URDF527": "A mirrored finger has the limits of the mimicked finger; kinematics applies the mimic rule.",
     "URDF702": "No body has these moments of inertia; kinematics does not use them.",
     "URDF706": "The address of the mesh is wrong, or is a path on another machine; kinematics needs no mesh.",
     "URDF708": "Only a colour is missing.",
@@ -235,7 +235,7 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)
             )
-            # Exact results have intervals of width 0 and do not count.
+            # Exact results have intervals of width 0 and are not counted.
             inside = [
                 np.concatenate([p.contains(getattr(p, side))[p.width > 0.0] for p in parts]).mean()
                 for side in ("urdfkin", "pinocchio")

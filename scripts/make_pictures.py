@@ -79,7 +79,7 @@ def photograph_report(folder: Path) -> None:
 
 
 def photograph_viewer(folder: Path) -> None:
-    """Make screenshots of the viewer with its controls, and on a phone, in light and dark themes."""
+    """Make screenshots of the viewer on a wide screen and on a phone, in light and dark themes."""
     server = new_server(port=8099)
     try:
         viewer = Viewer(server, urdfkin.load("panda"), POSE)

@@ -23,10 +23,12 @@ _ROBOTS = ("ur5", "panda", "z1", "kinova", "planar_two_link")
 _PAINTED = "return performance.getEntriesByName('first-contentful-paint')[0].startTime"
 _READY = "return performance.getEntriesByType('navigation')[0].domComplete"
 _FIND = (
+    "/* Type into the search field, and return the milliseconds until the layout is done. */"
     "const t = performance.now(), find = document.querySelector('#find'); find.value = arguments[0];"
     "find.dispatchEvent(new Event('input')); document.body.offsetHeight; return performance.now() - t"
 )
 _UNFOLD = """
+    // Open the section of a robot, and return the milliseconds until its table exists.
     const done = arguments[1], row = document.querySelector(`#robot-${arguments[0]}`), t = performance.now();
     const look = () => row.querySelector('table.checks') ? done(performance.now() - t) : setTimeout(look, 5);
     row.open = true; look();

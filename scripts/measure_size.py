@@ -20,7 +20,10 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
-    """Return the sizes (bytes) of a package and its dependencies, except those that only `without` needs."""
+    """Return the sizes (bytes) of a package and its dependencies.
+
+    The package named `without` is left out, and so are packages that only this package needs.
+    """
     found: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()
     waiting = [(name, frozenset(extras))]

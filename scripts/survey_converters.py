@@ -151,7 +151,8 @@ def _without_shapes(urdf: str, folder: Path) -> Path:
 def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
     """Return the verdict, and the largest distance and angle between the models as written.
 
-    For USD of a URDF, the second size is the largest distance that single precision can cause.
+    For a converter from URDF to USD, the angle is replaced by the largest distance that single precision can
+    cause.
     """
     try:
         found = _compared(tool, pythons, robot)

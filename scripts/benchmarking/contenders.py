@@ -39,7 +39,7 @@ class Contender:
     library: str  # name of the distribution
     module: str  # name of the module
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
-    #: Returns the library's computations of a batch; None: the calls run in a loop.
+    #: Returns the library's timed tasks for a batch. None: a batch is a loop of calls.
     batches: Callable[[Subject, str], Iterator[Work]] | None = None
     program: str | None = None  # another program that the library needs
 
@@ -72,7 +72,10 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the timed tasks for a batch, which differ in threads and memory; one writes only the output."""
+    """Yield the timed tasks for a batch.
+
+    They differ in threads and memory. One task computes nothing and only writes the output array.
+    """
     method, n = getattr(subject.robot, quantity), subject.n
     inputs = subject.inputs(quantity, n)
     out, own, floor = np.empty((3, n, *subject.width(quantity)))
@@ -91,7 +94,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the calls of the robot's method and of prepared frames, all of them checked or none."""
+    """Yield the calls of the robot's method and of prepared frames; with `verify`, all are checked."""
     robot, frame = subject.robot, subject.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)
@@ -138,7 +141,7 @@ _here: dict[str, Any] = {}
 
 
 def pinocchio_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield a loop, and a batch by several running processes with shared memory."""
+    """Yield two ways to compute a batch with Pinocchio: a loop, and processes with shared memory."""
     yield pinocchio_calls(subject.urdf, subject.frame, quantity).batch(subject, quantity)
     spawn: Any = multiprocessing.get_context("spawn")
     buffers, arrays = [], []

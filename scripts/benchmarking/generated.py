@@ -42,7 +42,7 @@ def results(
 ) -> list[Any]:
     """Return the rows of a frame's Jacobian (7.85) or acceleration (7.127 to 7.130), in world axes.
 
-    The joints have one coordinate each. The numbers and the equations `eq` may be of any kind.
+    Each joint has one coordinate. The arguments may be any numbers that the functions of `eq` accept.
     """
     recursion, state, columns = Recursion(eq, own=quantity == "acceleration"), State(), []
     for i, (kind, _, place) in enumerate(plan.steps.tolist()):
@@ -81,7 +81,7 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
-    """Return a function of the number of configurations and the addresses of q, v, a and the results."""
+    """Return a function; its arguments are the batch size and the addresses of q, v, a and the results."""
     plan, folder = subject.plan, subject.folder
     turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
     tables = {

@@ -17,7 +17,7 @@ from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, pr
 from urdfkin.kinematics.arithmetic import bound
 
 #: Number of operations of a sine and a cosine (`compiled.python_numbers`).
-#: Reduction of the angle: 10. The terms z and 1 - z/2 with their errors: 8. Polynomials: 20. Last steps: 13.
+#: Reduction of the angle: 10; z and 1 - z/2 with their errors: 8; polynomials: 20; last steps: 13.
 _SINE_COSINE = 51
 
 

@@ -94,7 +94,10 @@ def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Row:
 
 
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
-    """Measure the tip's time against the joints of a chain; each batch of Jacobians has `numbers` numbers."""
+    """Measure how the time for the tip grows with the number of joints of a chain.
+
+    The batches are so large that the Jacobians of a batch contain about `numbers` numbers.
+    """
     for size in joints:
         n = max(numbers // (6 * size), 16)
         with Subject(chain_urdf(size), TIP, n, name=f"chain of {size}") as subject:
@@ -237,9 +240,9 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         "out": np.empty(subject.width(quantity)),
     }
     for line in (
-        "q",  # an expression without a call measures the cost of the loop
+        "q",  # a line without a call measures the cost of the loop
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # a tuple is rejected after the check of the arrays
+        f"compute({q_v_a}, shape)",  # ends at the check of the arrays, which rejects a tuple
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",
@@ -251,7 +254,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 def _entry(
     kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Return the medians over all rounds. Times of the same round were subtracted, so other load cancels."""
+    """Return the medians over all rounds. Each part is a difference of times from the same round."""
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}

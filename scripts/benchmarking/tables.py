@@ -104,7 +104,7 @@ def tables(figures: Mapping[str, Any]) -> Iterator[Words]:
         yield Words("first", f"{entries[0]['robot']}: processor time of a first use, s", times)
     for section, (title, cells) in _GROWTH.items():
         if rows := sections.get(section, []):
-            # The rows are sorted by quantity and contender, both in the order of their first rows.
+            # Rows are grouped by quantity, then by contender; groups are in the order of their first rows.
             keys = [(row["quantity"], row["who"]) for row in rows]
             quantities = [quantity for quantity, _ in keys]
             rows = sorted(rows, key=lambda row: keys.index((row["quantity"], row["who"])))
@@ -191,7 +191,7 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
 
 
 def _floor(title: str, group: list[Entry], operations: Mapping[str, int]) -> dict[str, str]:
-    """Compare urdfkin's time with the time to write the output once and with the number of operations."""
+    """Compare urdfkin's time with two lower limits: to write the output, and to do the arithmetic."""
     who = {row["who"].partition(",")[0]: row for row in reversed(group)}
     fill, ns = who[FLOOR], who["urdfkin"]["median_ns"]
     size = 8 * fill["numbers"]
@@ -207,7 +207,7 @@ def _floor(title: str, group: list[Entry], operations: Mapping[str, int]) -> dic
 
 
 def _where(title: str, entries: Sequence[Entry]) -> Words:
-    """Return a column for each robot and quantity, with nanoseconds and the fraction of the total time."""
+    """Return a column for each robot and quantity: nanoseconds, and their share of the total time."""
 
     def cell(entry: Entry, part: str) -> str:
         ns = entry["parts"].get(part)

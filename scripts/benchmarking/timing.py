@@ -77,7 +77,7 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
 def times(
     works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
-    """Return the nanoseconds for one configuration; each work runs once in each round, in varying order."""
+    """Return the nanoseconds for one configuration; each task runs once in each round, in varying order."""
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
     gc.disable()
@@ -149,7 +149,7 @@ class Calls:
         return Work(self.who, subject.loop, run, result, remark=self.remark)
 
     def loop(self) -> Callable[..., None]:
-        """Return a loop as a function of `out` and the batch of q, or the batches of q, v and a."""
+        """Return a function that loops over a batch; its arguments are `out`, and q or q, v and a."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
 
@@ -178,7 +178,7 @@ def _rows(inputs: Any) -> Any:
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Make a function of the line `head` and the lines `body` below it; `names` are its local variables."""
+    """Compile a function: the line `head`, the lines `body` below it, and the variables `names`."""
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

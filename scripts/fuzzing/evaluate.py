@@ -28,7 +28,7 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 
 #: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
-#: Maximum number of frames in one call, and of frames with a call each.
+#: Maximum number of frames in one call, and of frames that also have calls of their own.
 TOGETHER, ALONE = 12, 2
 NAMES = 6
 #: Distance of the far base from the world's origin, in metres.
@@ -183,7 +183,7 @@ def _together(
     base: BaseMotion | None,
     inputs: tuple[FloatArray, ...],
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield each quantity for several frames and configurations, compared with calls for a single one."""
+    """Yield results for several frames and configurations; raise MismatchError if single calls differ."""
     q, v, a = inputs
     single = [x[1] for x in inputs]
     for name in QUANTITIES:
@@ -205,7 +205,7 @@ def _together(
 
 
 def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name. urdfkin and Pinocchio each search for the name by themselves."""
+    """Yield placements of frames by name. urdfkin and Pinocchio find each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]

@@ -16,10 +16,10 @@ from urdfkin.robot import Robot
 
 FAMILIES = ("mjcf-free", "mjcf-equalities", "mjcf-classes")
 _CLASSES = ("outer", "inner", "other")
-#: Allowed relative difference from MuJoCo's placements, and of the two sides of an equality constraint.
+#: Allowed relative difference from MuJoCo's placements, and between the sides of an equality constraint.
 _APART = 1e-12
 
-# Otherwise MuJoCo writes a log of dynamics warnings into the current folder.
+# Without this handler, MuJoCo writes a log of dynamics warnings into the current folder.
 mujoco.set_mju_user_warning(lambda said: None)
 
 
@@ -73,7 +73,7 @@ class _File:
             parts = [f'<{kind} name="free{self.bodies}" {align}/>']
         else:
             parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        for _ in range(rng.randint(1, 2)):  # oblique boxes: the axes of the body's inertia are oblique
+        for _ in range(rng.randint(1, 2)):  # rotated boxes give the body oblique axes of inertia
             sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
             parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
         if rng.random() < 0.2:

@@ -108,7 +108,7 @@ def odd_axis(rng: random.Random) -> list[float]:
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
-    """Return a quaternion of any length, possibly zero, of the identity, a tiny or a random rotation."""
+    """Return a quaternion of any norm, possibly zero, whose rotation may be the identity, tiny or random."""
     numbers = rng.choice(
         (
             [0.0, 0.0, 0.0, 1.0],
@@ -123,7 +123,7 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 
 
 def odd_size(rng: random.Random) -> float:
-    """Return the length of a direction: mostly about 1, sometimes near the smallest or largest double."""
+    """Return a norm for an axis or quaternion: mostly about 1, sometimes extremely small or large."""
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 
@@ -243,7 +243,7 @@ class _Robot:
 
     def limit(self, kind: str) -> str:
         rng = self.rng
-        # From version 1.2 on, limits apply to all kinds of joints.
+        # From URDF version 1.2 on, limits apply to all kinds of joints.
         least = 0.8 if "versions" in self.strange else 1.0
         idle = kind not in _ONE_COORDINATE and rng.random() < least
         if idle or (kind == "continuous" and rng.random() < 0.7):

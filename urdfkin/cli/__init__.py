@@ -1,6 +1,7 @@
 """The command line: one module for each subject, imported only when one of its commands runs.
 
-`urdfkin --help` imports neither NumPy nor Pinocchio: the summaries are in this module.
+This module also contains the summaries of all commands, so that `urdfkin --help` needs neither NumPy nor
+Pinocchio.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 #: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
-#: A module's only command is the function `command`; several commands are the functions `NAME_command`.
-#: `groups` adds the quantities of `verify/quantities.py`, such as `jacobian`, to the heading `_COMPUTE`.
+#: A command is the function `command` of its module, or `NAME_command` if the module has several commands.
+#: The function `groups` adds a command for each quantity, such as `jacobian`, below the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -103,7 +104,7 @@ def commands() -> dict[str, tuple[str, str]]:
 
 
 def _by_word(table: dict[str, str]) -> dict[str, str]:
-    """Return the key of a table for each word in its values."""
+    """Return the key of each word: `{"info": "show tree"}` gives `{"show": "info", "tree": "info"}`."""
     return {word: key for key, words in table.items() for word in words.split()}
 
 
@@ -138,7 +139,8 @@ _SYNONYMS = _by_word(
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"
-        " and `jacobian` compute the terms of an iterative solver": "ik inverse inverse-kinematics solve",
+        " and `jacobian` compute the pose and the Jacobian that an iterative solver needs":
+            "ik inverse inverse-kinematics solve",
         "urdfkin has no dynamics; use Pinocchio's (`robot.pinocchio_model()` in Python)":
             "dynamics rnea inertia torque mass-matrix",
         "urdfkin has no collision checks; use Pinocchio's": "collision",
@@ -236,10 +238,10 @@ def cli() -> None:
 def main() -> None:
     streams.prepare()
     guard()
-    # OpenBLAS is fastest with one thread for small matrices; NumPy's import reads this number.
+    # OpenBLAS is fastest with one thread for small matrices; NumPy reads the variable when it is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if os.environ.get("_URDFKIN_COMPLETE"):  # an error message would disturb shell completion
         sys.stderr = io.StringIO()
-    # This warning repeats the last line of the output.
+    # The last line of the output already states what is not verified, so this warning is hidden.
     warnings.filterwarnings("ignore", message="not verified")
     sys.exit(run(cli, "urdfkin"))

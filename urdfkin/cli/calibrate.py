@@ -67,7 +67,7 @@ _FORMS = (*TEXTS, "json")
 @click.option(
     "--positions",
     is_flag=True,
-    help="Without --poses: assume measurements of positions, without orientations.",
+    help="Without --poses: assume that only positions are measured, not orientations.",
 )
 @click.option(
     "--noise",
@@ -114,10 +114,10 @@ def command(
     measured configurations. ROBOT may also be the file of a Denavit-Hartenberg table, whose numbers are then
     fitted. Without --poses and --ur, the command lists which parameters are identifiable in principle.
 
-    The command refuses a calibration that is not plausible, and prints the likeliest cause. For example,
-    joint angles are in degrees, the sign of a joint is wrong, or each pose is in the line of another
-    configuration. With --force, the command writes the calibration nevertheless. If the joint values look
-    like degrees, --radians is also needed.
+    The command refuses a calibration that is not plausible, and prints the likeliest cause. Possible causes
+    are joint angles in degrees, a joint with the wrong sign, or poses in wrong lines. With --force, the
+    command writes the calibration nevertheless. If the joint values look like degrees, --radians is also
+    needed.
 
     Exit 0: verified. 1: Pinocchio disagrees. 2: bad input. 3: not checked, or refused.
     """
@@ -144,7 +144,7 @@ def command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # JSON that is already text is written without the line `check`.
+        # The JSON is passed as text, so that the line `check` is not added to it.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 
@@ -217,7 +217,7 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     if conversion is not None and q is not None:
         q = conversion.from_(q)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the table was loaded before, with the same warnings
+        warnings.simplefilter("ignore")  # these warnings were shown when the table was loaded before
         return fitted_model(
             source,
             q,
@@ -243,7 +243,7 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
-    """Apply a factory calibration; print the difference between the two values of --order."""
+    """Apply a factory calibration; print how far the tool would move with the other value of --order."""
     from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots
     from urdfkin.comparison.result import angle, length
 

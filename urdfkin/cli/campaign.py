@@ -31,7 +31,7 @@ _LINES, _JSON = 10.0, 0.5
 class Pace:
     """Estimates the speed of a validation, in chunks of samples per second, and the remaining time.
 
-    The time before the first chunk is finished does not count, because urdfkin may compile kernels then.
+    The time until the first chunk is finished is not counted, because urdfkin may compile kernels meanwhile.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
@@ -97,7 +97,7 @@ def _failures(state: CampaignProgress) -> str:
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the progress every `seconds` seconds; as JSON, also show the first and the last state."""
+    """Show the progress every `seconds` seconds; JSON output also contains the first and the last state."""
     as_json = seconds == _JSON
     last_time = -math.inf if as_json else time.monotonic()
     hidden: CampaignProgress | None = None
@@ -159,8 +159,9 @@ _MOST_CHUNKS = 200
 def status(context: click.Context, folder: Path) -> None:
     """Show the finished and failed robots, and an estimate of the remaining time.
 
-    DIR is the folder of `urdfkin validate --store DIR`. The command reads only few of its files, so it is
-    fast and does not disturb a running validation. `urdfkin report DIR` reads and checks all files.
+    DIR is the folder of `urdfkin validate --store DIR`. The command reads only a few files of the
+    folder, so it is fast and does not disturb a running validation. `urdfkin report DIR` reads and checks all
+    files.
 
     Exit 0: complete. 3: a robot is missing or failed.
     """

@@ -158,12 +158,12 @@ def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS = "urdfkin.settings"
-#: Settings in pyproject.toml that are the defaults of the options with the same names
+#: Settings in pyproject.toml; each is the default of the option with the same name
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 
 
 def _read_settings(context: click.Context, _: click.Parameter, file: Path | None) -> None:
-    """Make the settings of the repository, or those of `file`, the defaults of the options."""
+    """Use the settings in `file`, or else the settings of the repository, as defaults of the options."""
     isolated = "--isolated" in context.meta
     settings = Settings() if isolated else find_settings(Path()) if file is None else read_settings(file)
     values = dict(settings.values)
@@ -269,10 +269,12 @@ limit_options = combine(
 @click.option(
     "--each",
     is_flag=True,
-    help="Print each finding on its own line, instead of one line for many findings of one kind.",
+    help="Print each finding on its own line; by default, many findings of one kind share a line.",
 )
 @mimic_option("Check mimic joints as coupled joints, or as free joints.", "mimic")
-@root_joint_option("Also check that this root joint can be added: no joint or link has its name.")
+@root_joint_option(
+    "Also check that this root joint can be added, that is, that no joint or link has its name."
+)
 @source_options
 @settings_options
 @limit_options
@@ -295,7 +297,7 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
       urdfkin check --statistics
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
-    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
+    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     if options["fix"] and options["diff"]:
         reject_unused_options(context, ("fix",), "with --diff")
     if not (options["fix"] or options["diff"]):
@@ -378,7 +380,7 @@ class CheckRun:
         diff: Whether to collect the changes of --fix as patches, without applying them.
         unsafe: Whether to apply unsafe fixes too.
         version: The version that --changed-since names, or None.
-        accepts_all: Whether no finding is a failure, because --write-baseline accepts all findings.
+        accepts_all: Whether --write-baseline accepts all findings, so that none of them is a failure.
     """
 
     look: partial[Examined]
@@ -406,7 +408,7 @@ class CheckRun:
             if file not in self._seen:
                 self._seen.add(file)
                 try:
-                    if file not in (word, f"./{word}"):  # the file was found in a folder
+                    if file not in (word, f"./{word}"):  # the user named a folder or a pattern
                         demand_regular(Path(file))
                     self._check(file)
                 except UrdfkinError as error:
@@ -430,9 +432,9 @@ class CheckRun:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
-        """Load a USD or MJCF file, and add the findings of the robot or of the error.
+        """Load a USD or MJCF file; add the findings about the robot or, if loading fails, about the error.
 
-        With --changed-since, an unchanged file is skipped; of a changed file, all findings are reported.
+        With --changed-since, unchanged files are skipped; all findings about a changed file are reported.
         """
         suffixes = USD if is_usd(file) else _MJCF
         if self.version is not None and self._is_unchanged(file, suffixes, self.version):
@@ -459,8 +461,8 @@ class CheckRun:
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
         """Return whether a file, and all files that it may refer to, are the same as in an older version.
 
-        A file may refer to each file of the repository with a suffix in `suffixes`, and to a deleted file
-        that it mentions.
+        The function assumes that a file may refer to every file of the repository with a suffix in
+        `suffixes`, and to every deleted file whose name occurs in its text.
         """
         if suffixes not in self._changed:
             self._changed[suffixes] = version.changed(suffixes)
@@ -491,7 +493,7 @@ class CheckRun:
         return mended.text
 
     def _safe(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
-        """Return a filter that also rejects findings with an unsafe fix, unless --unsafe-fixes is given."""
+        """Return a filter for chosen findings; without --unsafe-fixes, it also rejects unsafe fixes."""
         return lambda finding: (
             is_chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
         )
@@ -521,7 +523,7 @@ def _is_usd_or_mjcf(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # avoids the next import, which loads NumPy
+            return False  # the import below loads NumPy, so it is avoided here
     from urdfkin.urdf.mjcf import is_mjcf
 
     return is_mjcf(file)

@@ -1,8 +1,8 @@
 """Complete commands, options, robots, files, frames, tables, codes and equations in a shell.
 
-Completion runs at each press of the Tab key, so it imports nothing heavy and reads only the names in a file.
-Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name in a
-malicious file could make the shell run a command.
+Completion runs at each press of the Tab key, so it imports no large package and reads only the names in a
+file. Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name
+in a malicious file could make the shell run a command.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def complete_file(_context: click.Context, _parameter: click.Parameter, incomple
 
 
 def complete_frame(context: click.Context, _parameter: click.Parameter, incomplete: str) -> Items:
-    # While the user types the value of an option, click does not yet know the command's arguments.
+    # While the user types an option's value, click has not parsed ROBOT yet, so the first argument is used.
     robot = context.params.get("robot") or next(iter(context.args), "")
     return _items(_frames(robot), incomplete)
 
@@ -110,7 +110,7 @@ def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> No
     \b
     Example:
       urdfkin completion bash
-    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
+    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     script = get_completion_class(shell)
     # The script sets this environment variable, so that click prints completions.
     say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())

@@ -1,4 +1,7 @@
-"""Define the command `urdfkin dh`, without NumPy, which would slow --help down (see `dh_tables`)."""
+"""Define the command `urdfkin dh`.
+
+This module does not import NumPy, which would slow --help down. `dh_tables` makes the tables with NumPy.
+"""
 
 from __future__ import annotations
 

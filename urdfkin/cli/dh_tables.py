@@ -45,7 +45,7 @@ _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
 _PRINTED = ("terminal", "markdown")
 #: Formats of a printed table
 _TEXTS = (*_PRINTED, "html", "latex")
-#: Number of digits of base and tool in formats that round numbers; None: the number of --digits
+#: Number of digits of the base and tool transforms in formats with rounded numbers; None: as in --digits
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
@@ -54,7 +54,7 @@ class DHRequest:
     """The options of `urdfkin dh`.
 
     Attributes:
-        unchanged: File of the table ROBOT, if the command writes the same table; None: derive a table.
+        unchanged: The file of a given table that the command writes again; None if it derives a new table.
         choices: Options that are arguments of `Robot.dh`.
     """
 
@@ -135,7 +135,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged is not None:
         table = read_table_or_screws(at_home(request.unchanged))
-        # `Robot.dh` derives a table from screws in the same way as from a URDF.
+        # For screws, the code below derives a table with `Robot.dh`, as for a URDF.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None
@@ -163,7 +163,7 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
 
 
 def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
-    """Yield the lines below a table: the check, the error of the printed digits, and hints."""
+    """Yield the lines below a table: the check, the rounding error of the printed numbers, and hints."""
     yield check_of_path(check)[0]
     if request.format_ in _ROUNDED:
         yield from str(printed(table, request.units, _ROUNDED[request.format_])).split("\n")

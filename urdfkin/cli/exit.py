@@ -40,7 +40,7 @@ class Stop:
 def stoppable() -> Iterator[Stop]:
     """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
     stop = Stop()
-    # After `nohup urdfkin ...`, the handler of SIGHUP is not the default one, and SIGHUP is ignored.
+    # `nohup` makes a process ignore SIGHUP, so only signals with the default handler get a new handler.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 
     def handle(handler: Any) -> None:
@@ -103,7 +103,7 @@ def _report_usage_error(error: click.ClickException) -> int:
 
 def report_crash(error: Exception) -> int:
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("urdfkin"):
-        # For example, pre-commit installs urdfkin with --no-deps.
+        # A dependency can be missing, for example if pre-commit installed urdfkin with --no-deps.
         remedy = "install urdfkin with its dependencies: pip install PATH_OF_THE_CLONE"
         click.echo(f"urdfkin: error: {error.name} is not installed; {remedy}", err=True)
         return 2

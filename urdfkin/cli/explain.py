@@ -20,19 +20,19 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return each section of docs/questions.md, without links, by the anchor of its heading."""
+    """Return the sections of docs/questions.md, without links; the keys are the anchors of their headings."""
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
 def answer_to(topic: str) -> str | None:
-    """Return the section with the anchor `topic`, or the only section whose anchor contains all its words."""
+    """Return the section with the anchor `topic`, or the only one whose anchor has all words of `topic`."""
     known, words = answers(), set(topic.lower().replace("-", " ").split())
     found = [name for name in known if words and words <= set(name.split("-"))]
     return known.get("-".join(topic.lower().split())) or (known[found[0]] if len(found) == 1 else None)
 
 
 def as_text(answer: str) -> str:
-    """Format a section for a terminal; the code that each example needs first is printed last."""
+    """Format a section for a terminal; the code that must run before its examples is printed at the end."""
     pieces = _BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
@@ -50,7 +50,7 @@ def anchor(heading: str) -> str:
 
 
 def _sections() -> list[str]:
-    """Split docs/questions.md at its headings; the first section has the code that each example needs."""
+    """Split docs/questions.md at its headings; the code in the first section runs before each example."""
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 
@@ -64,9 +64,9 @@ def command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
     CODE is a finding's code or its short name. Its page has the reason, a bad and a good example, and the
-    behaviour of other programs. EQUATION is a number in the textbook's chapter. Its page has the equation,
-    the function that computes it, and the check of this function. QUESTION is the name of a question, or a
-    word of the name. Without an argument, the command lists all codes and questions.
+    behaviour of other programs. EQUATION is the number of an equation in the textbook, such as 7.130. Its
+    page has the equation, the function that computes it, and the check of this function. QUESTION is the name
+    of a question, or a word of the name. Without an argument, the command lists all codes and questions.
 
     \b
     Example:
@@ -74,7 +74,7 @@ def command(topic: str | None) -> None:
       urdfkin explain rounded-pi
       urdfkin explain 7.130
       urdfkin explain reference-frames
-    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
+    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     rules = (*RULES.values(), *OF_OTHERS.values())
     if topic is None:
         for rule in rules:

@@ -59,7 +59,7 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes in joint space for the computation of bounds; 0: no bounds.",
+    help="Maximum number of boxes into which joint space is divided to compute bounds; 0: no bounds.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
@@ -112,8 +112,8 @@ def same_command(
     rounding of the numbers in its definition.
 
     Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
-    --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A and B are
-    compared without a change of B. Exit 0: all frames are within the given distance. 1: a frame is not.
+    --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A is compared
+    with B as given. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
     from urdfkin.comparison.bounds import MOST_BOXES
     from urdfkin.comparison.certificate import certificate
@@ -200,8 +200,9 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
 
     For each changed joint, the command prints how far this joint's changes move the frame that moves most.
     This distance is the maximum over all configurations within limits, with the same joint coordinates in OLD
-    and NEW. The last line of the output states how far all changes together move the frames. Between URDF,
-    MJCF and USD, the changes are the differences that `urdfkin same` finds. With C, all pairs are compared.
+    and NEW. The last line of the output states how far all changes together move the frames. If OLD and
+    NEW have different formats (URDF, MJCF or USD), the changes are the differences that `urdfkin same` finds.
+    With C, all pairs are compared.
 
     Exit 0: no changes. 1: changes. 2: bad input.
     """

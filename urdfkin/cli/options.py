@@ -128,7 +128,7 @@ _LOAD_OPTIONS = "urdfkin.load_options"
 
 
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
-    """Return a callback that stores an option for `load_options`, always or only if the option is given."""
+    """Return a callback that stores an option for `load_options`; without `always`, only if it is given."""
 
     def store(context: click.Context, _: click.Parameter, value: Any) -> None:
         if always or value not in (None, ()):
@@ -243,8 +243,8 @@ path_options = combine(
 )
 
 
-class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # the class is generic from click 8.2 on
-    """The name of a reference frame; the error for an unknown name refers to the explanation."""
+class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
+    """A reference frame; the error for an unknown name states where reference frames are explained."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
@@ -337,7 +337,7 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 
 
 def warn_of_motion(motion: Trajectory) -> None:
-    """Write warnings about a trajectory to stderr, and how v and a were computed."""
+    """Write the warnings about a trajectory, and the way v and a were computed, to stderr."""
     for note in motion.notes:
         say(f"warning: {note}", err=True)
     if motion.rates != "as given":
@@ -351,7 +351,7 @@ def warn_of_limits(robot: Robot, q: FloatArray) -> None:
 
 
 def locked_joints(robot: Robot) -> dict[str, Any]:
-    """Return the locked joints as an entry of the JSON output; empty if no joint is locked."""
+    """Return a mapping with the locked joints for JSON output; it is empty if no joint is locked."""
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -369,7 +369,7 @@ class Inputs:
         settings: Other settings that affect the result, for example `{"relative_to": "base"}`. The titles of
             tables and the JSON output list them.
         conversion: Conversion to the convention of --convention; None for urdfkin's own convention.
-        is_trajectory: Whether the samples come from --trajectory; CSV output then has one row for each.
+        is_trajectory: Whether the samples come from --trajectory. If so, CSV output has one row per sample.
     """
 
     robot: Robot
@@ -427,7 +427,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that remove the options for the file formats of the other robots."""
+        """Return arguments of `load` that remove options which apply only to another robot's file format."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -469,7 +469,7 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat arrays of one sample, so that all arrays have as many rows; else raise InputError."""
+    """Repeat single rows until all arrays have equally many rows; raise InputError for other lengths."""
     import numpy as np
 
     n = max(map(len, batches))
@@ -571,7 +571,7 @@ _BASE_OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options for the motion of the root link that a quantity of the inputs q, v and a needs."""
+    """Make the options for the root link's motion; "qv" means its pose and velocity, for example."""
     return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
 
 
@@ -595,7 +595,7 @@ def with_base(
 
 
 def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """Return numbers, with one row for each sample, and the layout that fits them (see `read_batch`)."""
+    """Return two things: numbers with one row per sample, and their layout (see `read_batch`)."""
     import numpy as np
 
     from urdfkin.robot.trajectory import numbers

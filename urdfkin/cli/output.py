@@ -1,4 +1,7 @@
-"""Print the result of a command as a table, or write it in another format, completely or not at all."""
+"""Print the result of a command as a table, or write it in another format.
+
+A file is written completely or not at all.
+"""
 
 from __future__ import annotations
 
@@ -56,8 +59,8 @@ class Answer:
     Attributes:
         document: Function that returns the result as text and tables, for the formats in `TEXTS`.
         data: For each other format, a function that returns the result: a mapping for JSON, rows for CSV, an
-            array for npy, text for any other format. A format in `TEXTS` may also have a function here, which
-            then replaces `document`.
+            array for npy, text for any other format. If there is also a function for a
+            format in `TEXTS`, it is used instead of `document`.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
         code: Exit code of the command.
         fitted: Function that returns text and tables that fit the width of a terminal. None: use `document`.
@@ -77,7 +80,7 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def convert(self, form: str) -> tuple[bytes | str, bool]:
-        """Return two things: the result in the format `form`, and whether this text contains `check`."""
+        """Return two things: the result in the format `form`, and whether it contains the line `check`."""
         if form in self.data:
             data = self.data[form]()
             has_check = form == "json" and isinstance(data, Mapping)
@@ -116,7 +119,7 @@ _CONVERTERS: dict[str, Callable[[Any], bytes | str]] = {
 def writes_answer(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
     """Return a decorator that makes a command from a function that returns an `Answer`.
 
-    The command has the options --format and --output. It writes the answer, and ends with the answer's exit
+    The command has the options --format and --output. The command writes the `Answer`, and ends with its exit
     code. `names` are the formats of --format; by default the formats in `TEXTS`, JSON and CSV. `suffixes`
     lists the formats of each suffix; by default those of `_SUFFIXES`.
     """
@@ -187,7 +190,7 @@ def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if an output file cannot be written."""
     for path in filter(None, paths):
         try:
-            if path.exists() and not path.is_file():  # a device is written without a temporary file
+            if path.exists() and not path.is_file():  # a device needs no temporary file
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass

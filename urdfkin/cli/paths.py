@@ -48,10 +48,10 @@ def chain_command(
     """List the joints on the path between two frames (section 7.5), with their axes in one configuration.
 
     For each joint, the table has the axis z, the origin O, and the vector d to the origin of the next joint.
-    All vectors are in the axes of the base; O and d are in metres. The last vector d leads to the tip. If the
-    path passes a joint from its child link to its parent link, the joint is marked "backwards", and its axis
-    is reversed, so that its coordinate has the same sign as in the URDF. Fixed joints are not listed: their
-    offsets are added to d. --q is the configuration of the whole robot.
+    All vectors are in the axes of the base; O and d are in metres. The last vector d leads to the tip. A
+    joint is marked "backwards" if the path passes it from its child link to its parent link. The axis of a
+    backwards joint is reversed, so that its coordinate has the same sign as in the URDF. Fixed joints are not
+    listed: their offsets are added to d. --q is the configuration of the whole robot.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -111,8 +111,8 @@ def chain_command(
 
 
 def _kind_of_joint(joint: Any) -> str:
-    follows = f", follows {joint.mimic.leader}" if joint.mimic else ""
-    return f"{joint.kind.value}{', backwards' if joint.backwards else ''}{follows}"
+    mimics = f", mimics {joint.mimic.leader}" if joint.mimic else ""
+    return f"{joint.kind.value}{', backwards' if joint.backwards else ''}{mimics}"
 
 
 def _vector(numbers: FloatArray) -> str:
@@ -199,19 +199,19 @@ def structure_command(
 
 def _structure_document(found: Structure) -> TextDocument:
     spare = len(found.joints) - found.freedoms
+    degrees = f"{found.freedoms} degree{'s' * (found.freedoms != 1)} of freedom"
     title = (
         f"{found.robot}: {found.base_frame} to {found.tip_frame}, {found.joints or 'no joints'},"
-        f" {found.freedoms} freedoms{f', redundant by {spare}' if spare > 0 else ''}"
+        f" {degrees}{f', redundant by {spare}' if spare > 0 else ''}"
     )
     parts: list[str | Table] = []
     if found.pairs:
         rows = []
         for pair in found.pairs:
-            degrees = math.degrees(pair.angle)
-            angle = f"{degrees:.6g}" if degrees > 1e-9 else "0"
-            apart = f"{pair.distance * 1e3:.6g}" if pair.distance > 1e-12 else "0"
-            rows.append((f"{pair.first}, {pair.second}", angle, apart))
-        parts += ["", Table(("axes", "angle [deg]", "apart [mm]"), rows)]
+            angle = six_digits(math.degrees(pair.angle), 1e-9)
+            distance = six_digits(pair.distance * 1e3, 1e-9)
+            rows.append((f"{pair.first}, {pair.second}", angle, distance))
+        parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
     start = "from the point of the first axis nearest to the second axis"
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
@@ -228,4 +228,4 @@ def _kind_line(kind: StructureKind) -> str:
     line = f"{kind.name}: {', '.join(kind.joints)}, {'exactly' if kind.is_exact else deviation}"
     if kind.at is None:
         return line
-    return f"{line}, centre ({', '.join(f'{round(x, 12):.6g}' for x in kind.at)}) m at zero"
+    return f"{line}, centre ({', '.join(six_digits(x, 1e-12) for x in kind.at)}) m at zero"

@@ -139,7 +139,10 @@ def _verified_answer(
 def _samples(
     x: Inputs, most: int, others: str, of: Callable[[int], Iterable[str | Table]]
 ) -> Iterator[str | Table]:
-    """Yield a heading and the tables `of(k)` for each of the first `most` samples, and mention the others."""
+    """Yield a heading and the tables `of(k)` for each of the first `most` samples.
+
+    If there are more samples, also yield their number and the option that writes all of them.
+    """
     n = len(x.q)
     for k in range(min(n, most)):
         if n > 1:
@@ -279,7 +282,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of the Jacobian.
 
-    For a Hessian, the table has one row for each pair of joint velocities with a derivative that is not zero.
+    For a Hessian, the table has one row for each pair of joint velocities; rows of zeros are left out.
     """
     import numpy as np
 
@@ -307,7 +310,10 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
         yield Table(heads, cells, left=2)
 
     def parts() -> Iterator[str | Table]:
-        yield "m/s^2, rad/s^2; terms (7.125): transverse a z x d, centripetal, Coriolis 2 w x u, sliding a z"
+        yield (
+            "in m/s^2 and rad/s^2; terms of equation 7.125: transverse (a z x d), centripetal,"
+            " Coriolis (2 w x u), sliding (a z)"
+        )
         yield from _samples(x, 2, "csv, json or npy", table)
 
     def rows() -> Iterator[list[object]]:
@@ -393,7 +399,7 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
 
 
 def _short_poses(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
-    """Return each pose as six or seven numbers; if Pinocchio has checked T, it also checks the rotation."""
+    """Return each pose as six or seven numbers; if T is verified, Pinocchio also checks the orientations."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of
@@ -449,7 +455,7 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
 def analytical_jacobian_command(representation: str, nearest: float | None, **_: Any) -> Answer:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
-    Each row of the table belongs to one joint velocity, or to another entry of v. The row lists the time
+    Each row of the table belongs to one entry of v, for example a joint velocity. The row lists the time
     derivatives of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity.
     `urdfkin jacobian` prints angular velocities instead.
     """
@@ -551,7 +557,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
     def parts(k: int) -> Iterator[str | Table]:
         lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _bounded(names, found, k)]
-        yield Table(("", "value", "no less than", "no more than"), lines)
+        yield Table(("", "value", "lower bound", "upper bound"), lines)
         if singularity := found.singularity(k):
             yield from str(singularity).splitlines()  # the manipulability has no derivative
         else:

@@ -152,7 +152,7 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     "--factor",
     type=NumberInRange(1.0),
     default=2.0,
-    help="Count a worst disagreement that grows by more than this factor as a regression.",
+    help="If a worst disagreement grows by more than this factor, report a regression.",
 )
 @markdown_option
 @writes_answer(*TEXTS, "json")
@@ -173,7 +173,7 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
 
     Exit 0: no regression. 1: a regression. 2: a file cannot be used, for example because its numbers of
     samples contradict each other.
-    """  # noqa: D301 - a backspace tells click not to wrap the paragraph
+    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     from urdfkin.report.compare import compare, document, markdown_of
     from urdfkin.report.reading import read_document
 

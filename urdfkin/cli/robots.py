@@ -61,7 +61,7 @@ def _as_dict(entry: Entry) -> dict[str, object]:
     }
 
 
-#: Function that only JSON needs, and whose import is slow
+#: Only JSON output needs this function; it is imported at its first use, because its import is slow
 _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 
 
@@ -82,7 +82,7 @@ def info_command(robot: str) -> Answer:
 
 
 def _fitted(out: Console, document: TextDocument) -> TextDocument:
-    """Return the document; in a table wider than the terminal, each link and its joint share a column."""
+    """Return the document; if a table is wider than the terminal, links and joints share one column."""
     from urdfkin.report.listing import fits
 
     parts = list(document.parts)
@@ -95,7 +95,7 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of the table; the links are named without the lines of the drawn tree."""
+    """Yield the rows of the table, with plain link names instead of a drawn tree."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

@@ -26,7 +26,7 @@ import click
 from urdfkin.errors import DegreesWarning, SourceError
 from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
 
-#: Exit code if the reader of a pipe has exited, as in shells
+#: Exit code if the program that reads the pipe has exited; shells use the same code
 READER_GONE = 128 + signal.SIGPIPE
 
 
@@ -36,7 +36,7 @@ def prepare() -> None:
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Each command prints its own line about joint values that look like degrees.
+    # Commands print their own line about joint values that look like degrees, so the warning is hidden.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
@@ -74,7 +74,7 @@ def _stop_command(error: OSError) -> BaseException:
 
 
 def _with_errors(stream: Any, descriptor: int) -> Any:
-    """Return a standard stream that reports errors of writing; another stream is returned unchanged."""
+    """Return a standard stream that reports write errors; return any other stream unchanged."""
     try:
         if stream.fileno() != descriptor:
             return stream
@@ -126,8 +126,8 @@ _MOST_STORED = 64
 class SafeStream:
     """A text stream that escapes control characters and CI commands.
 
-    `styled` keeps escape sequences for colours; set it only if nothing but the package rich writes to the
-    stream. `encoding` is the encoding that this stream reports. The bytes of a NumPy file are written to the
+    With `styled`, escape sequences for colours are kept; use it only if all text comes from the package rich.
+    `encoding` is the encoding that this stream reports. The bytes of a NumPy file are written to the
     attribute `buffer`, without escapes.
     """
 
@@ -139,7 +139,7 @@ class SafeStream:
 
     def write(self, text: str) -> int:
         pieces = _STYLE.split(text) if self.styled else [text]
-        # Every second piece is an escape sequence.
+        # Text and escape sequences alternate; only the text is escaped.
         pieces[::2] = [self._without_commands(_plain(piece)) for piece in pieces[::2]]
         self._write_raw("".join(pieces))
         return len(text)
@@ -178,7 +178,8 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Only the last 16 characters of a long line are stored; "x" stands for text before them.
+        # Of a long line, only an "x" and the last 16 characters are stored.
+        # Without the "x", these characters could look like a CI command at the beginning of a line.
         is_long = len(whole) > _MOST_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
         return "".join(escape(c) if before + k in at else c for k, c in enumerate(piece)) if at else piece
@@ -199,7 +200,7 @@ def guard() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
-            # Click would bypass a stream with another encoding.
+            # If the encoding is not UTF-8, click would write to the wrapped stream directly, without escapes.
             setattr(sys, name, SafeStream(stream, encoding="utf-8"))
 
 

@@ -51,11 +51,11 @@ def study_all(
 ) -> ValidationReport:
     """Run the accuracy study of every compared robot, and return the report with the results of the study.
 
-    `report` is the report of `validate` for the robots `given`, or for the part I of them if `shard` is I/N.
-    Then only robots whose first samples belong to part I are studied. The results are also written to the
-    folder `store`. With `retry`, a study that failed in an earlier run is repeated. `how` are arguments of
-    `load`. If the study of a robot fails, a line on stderr states the reason. An interrupt skips the
-    remaining robots.
+    `report` is the report of `validate` for the robots `given`. If `shard` is I/N, `report` covers only part
+    I of N, and only robots whose first samples belong to this part are studied. The results are also written
+    to the folder `store`. With `retry`, a study that failed in an earlier run is repeated. `how` are
+    arguments of `load`. If the study of a robot fails, a line on stderr states the reason. An interrupt skips
+    the remaining robots.
     """
     from urdfkin.validation.accuracy_store import FailedStudy
     from urdfkin.validation.campaign import chunks_of_shard
@@ -87,7 +87,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyResult | None]:
-    """Open the accuracy results of a store, or of a shard; until they are closed, no other process writes."""
+    """Yield the accuracy results of a store or of a shard; meanwhile, no other process can write to it."""
     if folder is None:
         yield None
         return
@@ -103,7 +103,10 @@ def _open_results(
 def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
-    """Return the accuracy result of a robot, and whether to store it. After a crash it is not stored."""
+    """Return two things: the accuracy result of a robot, and whether to store it.
+
+    A failure is stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
+    """
     import numpy as np
 
     from urdfkin.model.configuration import draw_base
@@ -145,7 +148,7 @@ def _with_quantities(command: _T) -> _T:
 @seed_option
 @click.option("--jobs", type=WholeNumber(1), default=1, help="Number of local processes.")
 @robot_options
-@oracle_option("Compare only with Pinocchio; or with Pinocchio and MuJoCo (mujoco).")
+@oracle_option("Compare with Pinocchio only, or with Pinocchio and MuJoCo (mujoco).")
 @click.option(
     "--isolate",
     is_flag=True,

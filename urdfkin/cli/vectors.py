@@ -37,7 +37,7 @@ def vectors_command() -> None:
 @click.option(
     "--catalogue/--no-catalogue",
     default=True,
-    help="Without ROBOT: also write the robots of the catalogue, which refer to files of example-robot-data.",
+    help="Without ROBOT: also write the robots of the catalogue; they refer to files of example-robot-data.",
 )
 @samples_option(3, "Number of configurations of each robot; the first one is zero.", least=1, most=1000)
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")
@@ -45,10 +45,10 @@ def vectors_command() -> None:
 def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool, samples: int) -> Answer:
     """Write test vectors into the folder DIR: results at 50 digits, with a tolerance for every number.
 
-    With ROBOT, the command writes the test vectors of these robots only. Without ROBOT, it writes those of
-    the robots of the catalogue, and of some 70 small robots, each of which tests one feature of URDF. Each
-    robot has a JSON file, and a text file with the same numbers, separated by tabs. The file SHA256SUMS has
-    the digests of all files.
+    With ROBOT, the command writes the test vectors of these robots only. Without ROBOT, it writes test
+    vectors of the robots of the catalogue and of some 70 small robots. Each small robot tests one feature of
+    URDF. Each robot has a JSON file, and a text file with the same numbers, separated by tabs. The file
+    SHA256SUMS has the digests of all files.
 
     The results are the placement, velocity, Jacobian, Jacobian rate, Hessian, classical acceleration and
     spatial acceleration. The files contain the placement once, and each other quantity in the reference
@@ -62,7 +62,7 @@ def write_command(folder: Path | None, robots: tuple[str, ...], catalogue: bool,
     names = [vectors.name_of(robot) for robot in loaded]
     if len({vectors.stem(name).casefold() for name in names}) < len(names):
         raise InputError(
-            "two robots have the same name, so they need the same file",
+            "two robots have the same name, so their files would have the same name",
             found=", ".join(names),
             remedy="write them into two folders",
         )

@@ -106,7 +106,7 @@ def verify_command(
     configurations. If a common mistake explains wrong results, the command names the mistake: a wrong frame,
     reference frame, joint order, sign or unit, or a missing term.
 
-    Exit 0: all results agree. 1: a result disagrees. 2: bad input. 3: no oracle can check the robot.
+    Exit 0: all results agree. 1: a result disagrees. 2: bad input. 3: the robot cannot be checked.
     """
     from urdfkin.validation.functions import verify_function
     from urdfkin.validation.programs import Program
@@ -185,7 +185,7 @@ def _quantity_in_name(function: str) -> str | None:
 
 
 def _functions(target: str) -> dict[str, Callable[..., object]]:
-    """Return the function of FILE.py:FUNCTION, or each function of FILE.py that names a quantity."""
+    """Return the function FILE.py:FUNCTION, or all functions of FILE.py with a quantity in their names."""
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(
@@ -214,13 +214,13 @@ def _import_file(path: str) -> ModuleType:
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
-    name = f"_urdfkin_checks_{file.stem}"  # an installed module could have the name `file.stem`
+    name = f"_urdfkin_checks_{file.stem}"  # the prefix prevents clashes with installed modules
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    # At the end of sys.path, files of the folder hide no installed module.
+    # The folder is at the end of sys.path, so that its files cannot replace installed modules.
     sys.path.append(str(file.parent))
     try:
         spec.loader.exec_module(module)

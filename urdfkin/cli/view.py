@@ -95,7 +95,7 @@ def command(
         Viewer(server, loaded, None if start is None else start[0], motion, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # a pipe would get the address too late
+        sys.stdout.flush()  # a pipe is buffered: without flush, its reader would get the address late
         opens = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if opens else nullcontext():
             server.sleep_forever()

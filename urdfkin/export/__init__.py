@@ -30,7 +30,7 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return the code for the language `to`: with exact constants for sympy-exact, otherwise unchanged.
+    """Return the code with exact constants for the language sympy-exact; otherwise return it unchanged.
 
     Raise VerificationError if Pinocchio computes another result than the exact expressions.
     """

@@ -1,9 +1,10 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
 The exported code allocates no memory and has no global variables. Each function is straight-line code. A call
-computes one configuration, or `LANES` configurations together. In its arrays, the numbers of one
-configuration are `L` elements apart, where `L` is 1 or `LANES`. A compiler then turns each line of code into
-one vector instruction. Code that does not depend on the robot is in the templates of the folder `frames/`.
+computes one configuration, or `LANES` configurations together. In the arrays of a call, the numbers of one
+configuration are `L` elements apart, where `L` is 1 or `LANES`. With `LANES`, a compiler turns each line of
+code into one vector instruction. Code that does not depend on the robot is in the templates of the folder
+`frames/`.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def _doubts(text: str) -> Iterator[str]:
     sealed = is_sealed(text)
     if sealed is None:
         yield (
-            "the file has no seal (checksum), so its header may belong to other numbers; export the"
+            "the file has no seal (checksum), so its header may not describe these numbers; export the"
             " file again"
         )
     elif not sealed:
@@ -102,7 +102,7 @@ def _has_gpu() -> bool:
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
     """Compile and run a file of C, C++ or CUDA, in double and in single precision, with warnings as errors.
 
-    Without a GPU, only the functions of a CUDA file for the processor are checked.
+    Without a GPU, only the CPU functions of a CUDA file are checked.
     """
     name = _name_of_program(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")

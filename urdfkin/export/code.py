@@ -82,7 +82,7 @@ class FrameCode:
 
     @property
     def head(self) -> list[str]:
-        """Lines of a file's header, without comment marks; the first line states that code is unverified."""
+        """Lines of a file's header, without comment marks; unverified code is announced in the first line."""
         verdict, *rest = self.proof.lines
         subject = f"{self.robot}, frame {self.frame}"
         about = f"Kinematics of {subject}: straight-line code for this robot and frame."

@@ -4,8 +4,9 @@ The first call of a quantity exports C code, compiles the code with the system's
 results of the machine code with Pinocchio. Without a C compiler, the forward recursion that Numba compiles is
 used.
 
-The machine code is stored in a cache with checksums. The key consists of the C code, the compiler and the
-processor. The code is loaded from memory, because a file could be changed after its checksum was tested.
+The machine code is stored in a cache with checksums. The key in the cache consists of the C code, the
+compiler and the processor. The code is loaded from memory, because a file could be changed after its checksum
+was tested.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: Options for the whole width of vector registers; by default, GCC uses only half of it on many processors
+#: Options to use the full width of vector registers; by default, GCC uses half of it on many processors
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
@@ -138,7 +139,7 @@ def _load(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its path, so each path has another number of "./".
+        # The loader identifies a library by its path. A different number of "./" makes each path unique.
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
 
 
@@ -384,8 +385,8 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        Such arrays need no conversion of arguments (`Call`), which would take a tenth of the time of 100,000
-        accelerations, because each large batch removes the conversion's code from the processor's caches.
+        Such arrays need no conversion of arguments (`Call`). For 100,000 accelerations, the
+        conversion would take a tenth of the time: each batch removes its code from the processor's caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
@@ -413,7 +414,7 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             arguments = _Arguments()
             arguments[_N], arguments[_OUT] = len(part), address(part)
-            # If the last row is shorter than a vector register, the code writes past the end of the row.
+            # The code may write past the last row by less than a vector register, so `stage` has extra space.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):

@@ -53,7 +53,7 @@ class PiMultiple:
 class ExactGraph(Graph):
     """The expressions of a function whose constants are exact numbers, not doubles.
 
-    `recognised` maps the URDF's angles that were replaced to multiples of pi.
+    `recognised` contains each angle of the URDF that was replaced, with its multiple of pi.
     """
 
     zero = 0
@@ -69,7 +69,7 @@ class ExactGraph(Graph):
         return super().made(op, *of)
 
     def angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Return a constant angle, as a multiple of pi if it is one."""
+        """Return a constant angle; if it is a multiple of pi/12, return it as `PiMultiple`."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _LARGEST else None
         return x if factor is None else self.recognised.setdefault(x, PiMultiple(factor))
 
@@ -196,9 +196,9 @@ def exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Return functions with exact constants, and the result of their comparison with Pinocchio.
 
-    The functions are evaluated at fifty digits. The test vectors are those of `proof`, the proof of the same
-    functions with constants in double precision. Raise VerificationError if Pinocchio computes another
-    result.
+    The functions are evaluated at fifty digits. The test vectors are copied from `proof`, which
+    belongs to the same functions with constants in double precision. Raise VerificationError if Pinocchio
+    computes another result.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):

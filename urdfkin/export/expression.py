@@ -147,7 +147,7 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function that computes an equation, and stores its number in each new expression.
+        """Return a function that computes an equation, and stores the equation's number in new expressions.
 
         If an equation calls another one, the new expressions store the number of the calling equation.
         """
@@ -187,7 +187,7 @@ def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
 
 
 def needed(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
-    """Return the expressions that results need; the operands of operations in `leaves` are not needed."""
+    """Return all expressions that the results depend on; operations in `leaves` count as inputs."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

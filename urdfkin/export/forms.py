@@ -63,7 +63,7 @@ def code_of_chain(
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)  # warnings about a URDF that the user does not know
+        warnings.simplefilter("ignore", UrdfWarning)  # the user did not write this URDF
         robot = hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))
@@ -82,7 +82,7 @@ def code_of_chain(
 
 
 def _with_safe_names(table: DHTable) -> DHTable:
-    """Replace the names of joints and frames that a URDF cannot contain."""
+    """Replace each name of a joint or frame that is not allowed in a URDF."""
     names = dict.fromkeys(
         [table.base_frame, *(row.joint for row in table.rows), *table.joint_names, table.tip_frame]
     )

@@ -1,8 +1,8 @@
 """Define a function of the exported code, which computes one quantity of one frame.
 
-The exported code assigns an expression to a variable if the expression is used more than once, is a number of
-a link's state (pose, velocity, acceleration), or is a sine, cosine, root or quotient. A long expression is
-split into several assignments. All other expressions are written where they are used.
+The exported code assigns an expression to a variable in three cases: it is used more than once, it is a
+number of a link's state (pose, velocity, acceleration), or it is a sine, cosine, root or quotient. A long
+expression is split into several assignments. All other expressions are written where they are used.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class Function:
         return found
 
     def needed_without(self, leaves: Collection[str]) -> set[Node]:
-        """Return the expressions that the results need if operations in `leaves` are inputs."""
+        """Return all expressions that the results depend on; operations in `leaves` count as inputs."""
         return set(needed(self.results, leaves))
 
     def values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
@@ -129,7 +129,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return x for an expression -x, which is not assigned to a variable; return others unchanged."""
+    """Return x for an expression -x, because no variable stores a negation; return others unchanged."""
     return node.of[0] if node.op == "neg" else node
 
 

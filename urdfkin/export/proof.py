@@ -158,7 +158,7 @@ def compare(
     verify: bool | None,
 ) -> Certificate:
     """Compare the results of `evaluate` with Pinocchio, or raise VerificationError."""
-    checker = copy(verifier)  # the copy has its own record of checks
+    checker = copy(verifier)  # these checks are recorded only in the copy
     drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
@@ -241,6 +241,6 @@ def _rounded_up(x: float) -> str:
 
 def _rounded(x: float, digits: int, rounding: str) -> str:
     if not np.isfinite(x):
-        return "0.0"  # with this bound, only equal numbers are accepted
+        return "0.0"  # a bound of 0 accepts only equal numbers
     with localcontext(prec=digits, rounding=rounding):
         return f"{float(+Decimal(x)):.{digits}g}"

@@ -26,8 +26,8 @@ class Dialect:
 
     Attributes:
         about: Description of a function's inputs and results.
-        imports: Import lines. In place of `{}`, the code imports those of the functions `cos`, `sin` and
-            `sqrt` that it uses; if it uses none of them, the line is left out.
+        imports: Import lines. `{}` is replaced by the names of the used functions among `cos`, `sin` and
+            `sqrt`. If none of them is used, the line is left out.
         result: Function that yields the last lines of an exported function, which return the result.
         values: Body of the exported file's function `_values(function, inputs)`, which returns the results
             of an exported function for a list of configurations.
@@ -62,7 +62,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that assigns each number to an element of an array."""
+    """Return a `Dialect.result` whose code assigns each number to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -75,7 +75,7 @@ def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
 
 
 def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that returns a matrix of rows; a Hessian (6, nv, nv) becomes one matrix."""
+    """Return a `Dialect.result` whose code returns a matrix; a Hessian (6, nv, nv) becomes one matrix."""
 
     def result(writer: Writer) -> Iterator[str]:
         values, shape = writer.results(), writer.function.shape
@@ -120,9 +120,10 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
 
 
 def _lengths(text: str) -> Callable[[Writer], list[str]]:
-    """Return a `Dialect.first_lines` that checks the lengths of the inputs of one configuration.
+    """Return a `Dialect.first_lines` whose code checks the input lengths of one configuration.
 
-    `text` is a format of ValueError's argument, for an input `x` that needs `width` numbers.
+    `text` is a format string of the error message, with the fields `x` (name of an input) and `width` (its
+    length).
     """
 
     def first_lines(writer: Writer) -> list[str]:
@@ -141,7 +142,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that stacks all numbers, for libraries with immutable arrays."""
+    """Return a `Dialect.result` whose code stacks all numbers, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -189,9 +190,9 @@ def _demand(
 ) -> str:
     """Return the code of the function `_demand`, which checks an input.
 
-    `wrong` is code that is true for numbers of a wrong type; `numbers` describes the accepted numbers.
-    `is_array` is code that is true for an accepted container ("" for no test), which `array` describes.
-    `given` are further parameters of `_demand`.
+    The arguments `wrong` and `is_array` are code: `wrong` is true for numbers of a wrong type, `is_array` is
+    true for an accepted container ("" for no test). The error message describes accepted numbers as `numbers`
+    and accepted containers as `array`. `given` are further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -533,7 +534,7 @@ def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
 
 
 def torch_module(text: str) -> Any:
-    """Return the module of the exported text of the language "torch"; raise InputError without PyTorch."""
+    """Return the `torch.nn.Module` of a text exported to "torch"; raise InputError without PyTorch."""
     need_torch()
     scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
     exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)

@@ -28,10 +28,10 @@ class NumberKind:
 
     Attributes:
         chapter: A module with the textbook's equations as functions that accept numbers of this kind.
-        begin_step: Function that is called before each joint, before the final frame and before the results,
-            with the number of earlier calls.
-        end_step: Function that is called after each joint and after the final frame, with the number of
-            earlier calls and the new state.
+        begin_step: Function that is called before each joint, before the final frame and before the results.
+            Its argument is the number of earlier calls.
+        end_step: Function that is called after each joint and after the final frame. Its arguments are the
+            number of earlier calls and the new state.
     """
 
     chapter: Any

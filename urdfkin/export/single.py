@@ -1,9 +1,10 @@
 """Bound the rounding errors of an exported function in single precision, for each number of its result.
 
 Each operation and each constant of the code has a rounding error, which `urdfkin.kinematics.roundings`
-derives. To first order in eps, the error of a result is the sum of the rounding errors, each multiplied by
-the derivative of the result with respect to the operation or constant. The bound is the sum of the absolute
-values of these products. One backward pass over the operations computes the derivatives of all results.
+derives. To first order in eps, the error of a result is a sum of products. Each product is a rounding error,
+times the derivative of the result with respect to the operation or constant. The bound is the sum of the
+absolute values of these products. One backward pass over the operations computes the derivatives of all
+results.
 """
 
 from __future__ import annotations

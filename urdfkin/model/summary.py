@@ -10,7 +10,7 @@ from urdfkin.model.configuration import narrowed_ranges
 from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
-COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "follows")
+COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
 #: Indices of the text columns after link and joint (0 and 1), and after joint, parent and child (0, 1 and 2).
 WORDS = (0, 1, 2, 3, 4, 5, 9)
 _WORDS_OF_JOINTS = (0, 1, 2, *(i + 1 for i in WORDS[2:]))
@@ -87,8 +87,8 @@ def cells_of(tree: KinematicTree, i: int) -> tuple[str, ...]:
     limits = ("", "", "") if limit is None else map(_bound, (limit.lower, limit.upper, limit.velocity))
     axis = axis_words(joint.axis.tolist()) if joint.kind.has_axis else ""
     rule = joint.mimic
-    follows = rule_words(rule.leader, rule.multiplier, rule.offset) if rule else ""
-    return (joint.kind.value, axis, q, v, *limits, follows)
+    mimics = rule_words(rule.leader, rule.multiplier, rule.offset) if rule else ""
+    return (joint.kind.value, axis, q, v, *limits, mimics)
 
 
 def _place(letter: str, at: int, count: int) -> str:

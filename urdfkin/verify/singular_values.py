@@ -99,7 +99,7 @@ class SingularValues(Displayable):
         lines = [[name, *(f"{side[i]:.15g}" for side in self.values)] for i, name in enumerate(names)]
         for name, between in (("condition", self.condition), ("manipulability", self.manipulability)):
             lines.append([name, *(f"{side:.15g}" for side in between)])
-        table = Table(["", "value", "no less than", "no more than"], lines)
+        table = Table(["", "value", "lower bound", "upper bound"], lines)
         found = self.singularity() if self.columns is not None else None
         return TextDocument(title, [table, *(str(found).splitlines() if found else [])])
 

@@ -65,7 +65,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """Return a context in which matplotlib writes text as text, and equal drawings as equal files."""
+    """Return a context in which matplotlib stores text as characters, and equal drawings as equal files."""
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 
@@ -114,7 +114,7 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
     with style():
         figure.savefig(stream, format="svg", metadata=no_metadata, transparent=True)
     text = stream.getvalue()
-    # A style element would affect the whole page.
+    # A style element would affect the whole page, so it is removed.
     text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = _with_ids(text, prefix)
     for placeholder, colour in PAGE_COLOURS.items():

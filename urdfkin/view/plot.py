@@ -75,7 +75,7 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw the singular values of the linear or the angular rows of the Jacobian, which differ in units."""
+    """Draw the singular values of the linear or of the angular rows of a Jacobian; their units differ."""
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
@@ -83,7 +83,7 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # too narrow for ticks at powers of ten
+    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # the axis may contain no power of ten
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylabel(f"singular values\n[{unit}] at |v| = 1")

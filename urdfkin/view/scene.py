@@ -123,7 +123,7 @@ def shapes(robot: Robot) -> list[Shape]:
 
 
 def _file_of(robot: Robot) -> Path | None:
-    """Return the file of a robot, beside which meshes are searched; None for a robot without a file."""
+    """Return a robot's file, in whose folder meshes are searched; None if the robot has no file."""
     entry = catalogue().get(robot.source)
     path = entry.path if entry is not None else Path(robot.source)
     try:

@@ -11,8 +11,8 @@ Four independent measures keep them out:
 | security **headers** of the page | embedding in a frame, foreign scripts, connections to other servers |
 
 Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
-server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that answers
-the requests. Before a robot is shown, the module tests the running server with requests that it must refuse,
+server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that checks
+each request. Before a robot is shown, the module tests the running server with requests that it must refuse,
 and stops a server that accepts one of them. A new version of viser can therefore make the viewer fail, but it
 cannot make it insecure.
 
@@ -166,7 +166,7 @@ LOOPBACK = "127.0.0.1"
 
 #: The only message that the server accepts from a page: a control has changed
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements in viser's page that give the nonce to its script, and to the script that this script creates
+#: Replacements that add the nonce to viser's script, and to the script element that this script creates
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),

@@ -59,7 +59,8 @@ class Ellipsoid:
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
     """Return arrows for the columns of the Jacobian, in world axes, starting at the frame's origin.
 
-    The motion x has one sample in LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the arrows.
+    The motion `x` has one sample, with reference frame LOCAL_WORLD_ALIGNED. The robot's size `reach` (m)
+    scales the arrows.
     """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
@@ -94,8 +95,9 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length 1.
 
-    The ellipsoid is visible even in directions without motion. The motion x has one sample in
-    LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the ellipsoid.
+    The ellipsoid has a small thickness even in directions without motion, so that it is visible. The motion
+    `x` has one sample, with reference frame LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the
+    ellipsoid.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -189,7 +191,7 @@ class Stage:
         server.on_client_connect(self._welcome)
 
     def fill(self, Ts: FloatArray) -> None:
-        """Let the camera see the robot in n configurations; Ts (n, links, 4, 4) are the links' placements."""
+        """Set the camera to show the robot in n configurations; Ts (n, links, 4, 4) are link placements."""
         points = [Ts[:, :, :3, 3].reshape(-1, 3)]
         for link, box in self._corners:
             R, p = Ts[:, link, :3, :3], Ts[:, link, np.newaxis, :3, 3]

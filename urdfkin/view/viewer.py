@@ -38,14 +38,14 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Range (rad or m) from which a joint counts as unlimited, like a wheel
+#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited
 _UNLIMITED = 100.0
 #: Change of an angle by an arrow key, in degrees or in radians
 _DEGREES, _RADIANS = 1.0, 0.01
 #: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten
 _STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) of a slider without a limit
+#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) on sliders of joints without limits
 _VELOCITY, _ACCELERATION = 3.0, 5.0
 #: Maximum number of missing meshes that a message names
 _MOST_MISSING = 5
@@ -126,7 +126,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # A slider that the user moves keeps its exact value.
+                # An equal value is not set again, so a slider that the user moves keeps its exact value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -313,7 +313,7 @@ class Viewer:
             self.player.show(0)
 
     def _fill(self) -> None:
-        """Let the robot fill the view in the configuration q, and along the whole trajectory."""
+        """Set the camera to show the robot in the configuration q and along the whole trajectory."""
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
@@ -450,7 +450,7 @@ class Viewer:
         self.wrong.content = ""
 
     def _read_q(self, event: Any) -> None:
-        """Read a configuration that the user typed, without a change of the typed text."""
+        """Read the configuration that the user typed; the text in the field is not changed."""
         if event.client is None:
             return
         with self._lock:
@@ -482,7 +482,7 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Apply a new frame, reference or convention; derive and check the DH table only here."""
+        """Apply a new frame, reference or convention; derive and check the DH table for them."""
         with self._lock:
             self._table, words = None, ""
             if self.dh.value != "none":

@@ -1,4 +1,4 @@
-"""Import one module of the package with a mutant.
+"""Replace one module of the package by a mutant when the module is imported.
 
 This file is in a folder on PYTHONPATH, so that each Python process of a test run loads it at its start.
 
