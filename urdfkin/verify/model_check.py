@@ -1,6 +1,7 @@
 """Check the URDF text that urdfkin writes for a `pinocchio.Model` or for a Denavit-Hartenberg table.
 
-Pinocchio checks a robot's results with the URDF text, so an error in the text would remain unnoticed.
+Pinocchio reads the same URDF text to check a robot's results, so the usual checks do not find an error in the
+text.
 
 | Source of the text | Comparison |
 |---|---|

@@ -83,7 +83,7 @@ def oracle_library(name: object) -> OracleLibrary:
 
 
 def version(package: str) -> str:
-    """Return the version of a package, or "not installed"; for urdfkin, "a checkout"."""
+    """Return the version of a package, or "not installed"; "a checkout" if urdfkin is not installed."""
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 

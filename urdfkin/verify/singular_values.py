@@ -1,8 +1,8 @@
 """Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
 *Error of J and residual.* Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <=
-|E| in the spectral norm, and also in the larger Frobenius norm, which this module uses. The matrix E is the
-sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
+|E| in the spectral norm, and therefore also in the larger Frobenius norm, which this module uses. The matrix
+E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
 
 *Orthogonality.* The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b.
 By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor between (1 -
@@ -56,7 +56,8 @@ class SingularValues(Displayable):
             columns.
         U: (..., rows, k) left singular vectors, directions of the frame's velocity.
         V: (..., nv, k) right singular vectors, directions of v; 0 for a joint that does not move the frame.
-        columns: The Jacobian with the names of the frame and of the joints; None for another matrix.
+        columns: The Jacobian with the names of the frame and of the joints; None if the matrix is not a
+            robot's Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -148,7 +149,8 @@ class SingularValues(Displayable):
     def condition(self) -> Between:
         """Condition number (...): the largest singular value divided by the smallest.
 
-        If the smallest singular value may be 0, the upper bound is inf.
+        If the lower bound on the smallest singular value is 0, the upper bound on the condition number is
+        inf.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -175,8 +177,9 @@ class SingularValues(Displayable):
         """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
 
         The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
-        product rule gives the derivative of the product without a division. The gradient is NaN if the
-        smallest singular value may be 0, because the manipulability may not be differentiable there.
+        manipulability is the product of all singular values; the product rule gives its derivative without a
+        division. The gradient is NaN if the smallest singular value may be 0, because the manipulability may
+        not be differentiable there.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -210,8 +213,8 @@ def singular_values(
 ) -> SingularValues:
     """Return the singular values of some rows of finite matrices J (..., m, nv), with guaranteed bounds.
 
-    `error` bounds the error of each number of J. `moving` (nv,) is False for columns that are 0 in every
-    configuration.
+    `error` contains an upper bound on the error of each number of J. `moving` (nv,) is False for columns that
+    are 0 in every configuration.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
