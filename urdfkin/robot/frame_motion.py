@@ -83,7 +83,7 @@ class FrameMotion:
 
     @property
     def agrees(self) -> bool:
-        """Whether all differences from Pinocchio are within the bounds; True without a comparison.
+        """Whether all differences from Pinocchio are within the bounds; also True if nothing was compared.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").agrees
@@ -95,7 +95,8 @@ class FrameMotion:
     def singular_values(self) -> FloatArray:
         """(n, min(6, nv)) singular values of the Jacobian, largest first.
 
-        The rows of the Jacobian have different units: metres and radians.
+        The rows of the Jacobian have different units (metres and radians), so the values depend on the unit
+        of length.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").singular_values.shape

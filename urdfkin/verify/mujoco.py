@@ -365,7 +365,10 @@ class MujocoOracle(Oracle):
 
 
 def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return a floating or planar joint's rotation, (n, 3, 3) or (n, 2, 2), and its number of slide joints."""
+    """Return a floating or planar joint's rotation, and the number of slide joints that replace the joint.
+
+    The rotation has the shape (n, 3, 3) for a floating joint, and (n, 2, 2) for a planar joint.
+    """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _rotation(_unit_quaternion(coordinates)), 3

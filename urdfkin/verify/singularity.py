@@ -142,7 +142,7 @@ class _Explanation:
         self._names = [columns.joints[i] for i in self._moving]
 
     def result(self, full: int, least: float) -> Singularity:
-        """Return the rank with lost directions and reasons; the smallest singular value is at most `least`."""
+        """Return the rank, lost directions and reasons; the smallest singular value is at most `least`."""
         U, s, Vt = np.linalg.svd(self._A)
         self._noise = 8.0 * self._matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
         motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
@@ -283,7 +283,7 @@ class _Explanation:
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return a sentence about the line that all joint axes intersect; None if there is no such line."""
+        """Return a sentence about a line that all joint axes intersect; None if there is no such line."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -294,8 +294,8 @@ class _Explanation:
             return None
         point = np.cross(f, m) / (f @ f)
         return (
-            f"Each axis intersects or is parallel to the line along {_vector(f / np.linalg.norm(f))} through the"
-            f" point at {_vector(point)} m from the origin of {self._columns.frame}."
+            f"Each axis intersects or is parallel to the line along {_vector(f / np.linalg.norm(f))} through"
+            f" the point at {_vector(point)} m from the origin of {self._columns.frame}."
         )
 
     def _null_motion(self, motion: FloatArray) -> str:
