@@ -263,7 +263,7 @@ def _load_usd(
 
 
 def _plain(robot: Robot, text: Text, **options: Any) -> Robot:
-    """Return the robot of a text with a fixed root, with no locked joints and with all mimic rules."""
+    """Load a text as a robot with a fixed root, without locked joints and with all mimic rules."""
     origin = robot.origin
     plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
     return robot if plain else robot_of(text, **options)

@@ -150,8 +150,8 @@ class Trajectory:
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
         rates: How v and a were obtained, such as "by central differences".
-        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a can have
-            any error, and `errors` contains an estimate, if possible.
+        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a are
+            approximate, or come from a file; see `errors`.
         notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or

@@ -366,8 +366,9 @@ def true_value_magnitudes(
     *Chains of mimic rules.* If a mimic joint mimics another mimic joint, r rules form a chain. Let X be the
     value of the joint with all terms replaced by their absolute values: |q| for an independent joint, and |m|
     X' + |c| for a joint that mimics a joint with X'. A program may combine the r rules to one rule M q + C.
-    This takes r - 1 additions for C, and one addition of M q and C. No sum exceeds X, so the combined rule
-    adds an error of at most (r - 1) / 2 X eps; all other rounding errors are those of the separate rules.
+    The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum exceeds X, so the
+    combined rule adds an error of at most (r - 1) / 2 X eps; all other rounding errors are those of the
+    separate rules.
 
     *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
     error of 1 eps rad changes a vector by at most eps times the length of the vector.
@@ -616,7 +617,7 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return four times the error of R (rad); nearer to a singularity than this, no digit is correct."""
+    """Return four times the error of R (rad); within this distance of a singularity, no digit is correct."""
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 

@@ -151,7 +151,7 @@ class Call:
         return out.reshape(self.n, len(self.links), *shape)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Reshape a result (n, frames, ...) to the caller's batch shape; a single frame has no axis."""
+        """Reshape a result (n, frames, ...) to the caller's batch shape; a single frame adds no axis."""
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:

@@ -100,7 +100,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes the poses of base and tip from the root; the product leads from base to tip.
+    # Pinocchio computes base and tip relative to the root; the product computes the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + size) + left_out(path)

@@ -7,8 +7,8 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `check_imu` subtracts gravity from
-the oracle's result, in the sensor's axes. The two computations differ, so an error in the sign of gravity or
-in the order of the steps causes a disagreement.
+the oracle's result, in the sensor's axes. The two computations use different steps, so an error in the sign
+of gravity or in the order of the steps causes a disagreement.
 """
 
 from __future__ import annotations

@@ -178,8 +178,8 @@ class SingularValues(Displayable):
 
         The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
         manipulability is the product of all singular values; the product rule gives its derivative without a
-        division. The gradient is NaN if the smallest singular value may be 0, because the manipulability may
-        not be differentiable there.
+        division by a singular value. The gradient is NaN if the smallest singular value may be 0, because the
+        manipulability may not be differentiable there.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.

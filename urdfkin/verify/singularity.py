@@ -47,8 +47,8 @@ class FrameColumns:
             for a column that does not belong to a single joint axis.
         active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the base moves. If it moves, lost directions cannot be compared with `samples`,
-            which have a fixed base.
+        moving_base: Whether the base moves. If the base moves, lost directions cannot be compared with
+            `samples`, which have a fixed base.
     """
 
     J: FloatArray
@@ -320,7 +320,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return a basis, with many zeros, of the space that the rows span, by Gaussian elimination."""
+    """Return a basis of the space that the rows span; Gaussian elimination gives the basis many zeros."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -334,7 +334,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the span of `rows`; they are projections of orthonormal vectors."""
+    """Return an orthonormal basis of the span of `rows`, which are projections of orthonormal vectors."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
 

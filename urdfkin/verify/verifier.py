@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table, besides zero and the joint limits.
+#: Number of random configurations in the check of a table, besides the zero configuration and the limits.
 TABLE_SAMPLES = 40
 
 #: True: check all results of a call. "sample": check `SAMPLE` configurations of a call. False: check none.
@@ -109,7 +109,7 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot, built at the first call; with `base`, on a free-flyer.
+        """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer.
 
         Raises:
             OracleError: the oracle does not accept the text, or reads other joints from it.

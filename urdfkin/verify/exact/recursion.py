@@ -37,7 +37,7 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Convert the motion of the base to the state of the root link; the rotation is made exact."""
+    """Convert the base's motion to the root link's state, with the rotation nearest to the given matrix."""
 
     def vector(x: FloatArray) -> Vector:
         return exact(x[0]), exact(x[1]), exact(x[2])
