@@ -210,7 +210,7 @@ class Robot(Displayable):
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
-        >>> cell = arm.view("joint_1=30deg, joint_2=0", height=300)  # as the last line of a cell: shown
+        >>> cell = arm.view("joint_1=30deg, joint_2=0", height=300)  # shown by a notebook
         """
         q_0 = configuration.checked(self.tree, q, "q")
         if q_0.ndim != 1:
@@ -669,7 +669,7 @@ class Robot(Displayable):
     def with_convention(
         self, name: str | Path | Convention, joints: Sequence[str] | None = None
     ) -> ConventionRobot:
-        """Return this robot with methods whose arguments and results are in the convention of another tool.
+        """Return this robot with methods whose arguments and results are in the convention of a program.
 
         The arguments are those of `convention`.
 

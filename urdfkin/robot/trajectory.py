@@ -186,7 +186,7 @@ class Trajectory:
             return self.rates
         v, a = self.errors
         return (
-            f"{self.rates}; largest errors about {v:.1e} (v) and {a:.1e} (a), in rad or m per s and s^2,"
+            f"{self.rates}; largest errors about {v:.1e} rad/s or m/s (v) and {a:.1e} rad/s^2 or m/s^2 (a),"
             " estimated with half of the samples"
         )
 
@@ -449,8 +449,8 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first other line may contain the names of the
-    columns, in any order. Without names, the columns are those in `required`, in this order.
+    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
+    names of the columns, in any order. Without names, the columns are those in `required`, in this order.
 
     Args:
         text: The content of the file.
@@ -496,7 +496,7 @@ def read_columns(
 
 #: Allowed names of the time column.
 _TIMES = ("t", "time", "timestamp")
-#: Number of units of time in one second, by the name of the unit.
+#: Number of time units in one second, by the name of the unit.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
@@ -567,7 +567,7 @@ def _in_si(column: FloatArray, unit: str) -> FloatArray:
 
 
 def width_of(text: str, where: str) -> int:
-    """Return the number of cells in the first line that is not skipped; 0: no such line."""
+    """Return the number of cells in the first line that is not skipped; 0 if there is no such line."""
     return len(next(_rows(text, where), (0, []))[1])
 
 

@@ -102,7 +102,7 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Convert link poses from the world to the root link; if the root's pose is missing, it is the identity."""
+    """Convert link poses from the world to the root link; a missing pose of the root is the identity."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 

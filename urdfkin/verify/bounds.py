@@ -507,7 +507,7 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
 
 
 #: Pinocchio's derivative of Jacobian column i by joint j is a sum of products (linear rows).
-#: The first pair applies if joint j is joint i or is nearer to the root than joint i, the second otherwise.
+#: The first pair applies if joint j is joint i or is nearer to the root than joint i; else the second.
 #: First number of a pair: how many products z x (z x d) the sum has for two revolute joints.
 #: Second number: how many products z x z the sum has for a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {

@@ -193,7 +193,7 @@ def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
     if isinstance(frame, str):
         return False, (frame,)
     try:
-        return True, tuple(frame)[: len(frame)]  # an iterator has no length and raises TypeError
+        return True, tuple(frame)[: len(frame)]  # `len` raises TypeError for an iterator
     except TypeError:
         raise InputError(
             "a frame must be the name of a link or joint, or a list of such names",

@@ -99,7 +99,7 @@ def _divide_threes(ours, theirs, unit, width, units):
 
 @helper()
 def _most(x, count):
-    """Return the bit pattern of the largest of several non-negative numbers, which may be inf or NaN.
+    """Return the bit pattern of the largest of several numbers, which are non-negative, inf or NaN.
 
     Bit patterns of non-negative doubles, compared as integers, have the same order as the doubles. The sign
     bit, which some processors set for NaN, is removed.

@@ -189,7 +189,7 @@ def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
 
 def _error(where: str, found: str) -> OracleError:
     return OracleError(
-        "the robot made of an MJCF file differs from the file",
+        "the robot made from an MJCF file differs from the file",
         where=where,
         found=found,
         remedy="please report this as an error of urdfkin, with the file",

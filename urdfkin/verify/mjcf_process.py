@@ -214,7 +214,7 @@ def _pinocchio_placements(
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # a revolute joint without limits has the coordinates cosine and sine
+            else:  # a revolute joint without limits has two coordinates, the cosine and sine of its angle
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]

@@ -40,7 +40,7 @@ from urdfkin.verify.oracle import (
     mimic_rules,
 )
 
-#: Tests compare the definitions of accelerations and J-dot with these versions of Pinocchio.
+#: Tests confirm urdfkin's definitions of accelerations and J-dot only for these versions of Pinocchio.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -113,7 +113,7 @@ def _project_of(file: Path) -> tuple[str, str] | None:
 _STACK_FOR_A_LINK = 16_384
 #: Chains with fewer links than this number fit into any stack.
 _SHALLOW = 100
-#: Maximum nv of a robot; Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), at most 2 GB.
+#: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MOST_RATES = 315
 
 #: Number of floating-point values in a block of results; such a block fits into the processor's cache.
@@ -314,7 +314,7 @@ class PinocchioOracle(Oracle):
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians; those of one frame are in blocks of configurations that fit into the cache."""
+        """Yield the Jacobians; for a single frame, in blocks of configurations that fit into the cache."""
         if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return

@@ -232,7 +232,7 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # A lower bound that is not finite becomes 0, and an upper bound becomes inf.
+    # A lower bound that is not finite becomes 0; an upper bound that is not finite becomes inf.
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
@@ -247,7 +247,7 @@ def _skew(U: FloatArray) -> FloatArray:
 def _norm(E: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # The norm of a matrix that contains inf is inf.
+    # A matrix that contains inf is not scaled; its norm is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

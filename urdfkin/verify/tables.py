@@ -285,7 +285,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # `Joint.tilt` is the angle between the axis of a joint in urdfkin and in Pinocchio.
+    # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))

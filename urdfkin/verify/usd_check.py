@@ -184,7 +184,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers about rounding to single precision, by the joint's name (`urdfkin.urdf.usd.Usd.single`).
+#: For each joint, by name: five numbers about rounding to single precision (`urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -264,8 +264,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
     - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
       quaternion changes the rotation by at most 2 u. The parallel component changes the length of the
-      quaternion, which UsdGeom does not normalize, and so changes a rotation by the angle t by at most 2 u
-      sin t. The sum is at most 4 u.
+      quaternion. UsdGeom does not normalize the quaternion, so a rotation by the angle t changes by at most 2
+      u sin t. The sum is at most 4 u.
     - Matrix: the vector of the nine errors is at most sqrt(3) u long, also after the rows are normalized. A
       rotation by a small angle t changes the matrix by a vector of length sqrt(2) t: sqrt(3/2) u.
     """
