@@ -376,7 +376,7 @@ class Robot(Displayable):
 
     @property
     def all_frames(self) -> tuple[str, ...]:
-        """Names `link:NAME` and `joint:NAME` of the frames of all links and joints, each once.
+        """Frame names: `link:NAME` for each link, and `joint:NAME` for each joint.
 
         Each name is a `FrameName`, which always means the link or joint NAME, even if another link or joint
         has the literal name `link:NAME`.
@@ -579,7 +579,7 @@ class Robot(Displayable):
 
         Args:
             q: (..., nq) rad, m.
-            mimic: The argument `mimic` of `pinocchio_model` for this Pinocchio model.
+            mimic: The value of `mimic` that was passed to `pinocchio_model`.
 
         Returns:
             (..., model.nq).
@@ -629,7 +629,7 @@ class Robot(Displayable):
 
         Args:
             q: (..., model.nq), a configuration of `pinocchio_model(mimic=mimic)`.
-            mimic: The argument `mimic` of `pinocchio_model` for this Pinocchio model.
+            mimic: The value of `mimic` that was passed to `pinocchio_model`.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -1362,9 +1362,9 @@ class Robot(Displayable):
         """Return a `torch.nn.Module` with the kinematics of a frame, for PyTorch.
 
         The module is an object of the class `Kinematics` in `export("torch", ...)`. By default, `module(q)`
-        returns the placement (..., 4, 4). Each quantity is a method of the module. Tensors may have any
-        leading shape, any floating type and any device. PyTorch, which must be installed, can compute
-        derivatives of the results.
+        returns the placement (..., 4, 4). Each quantity is a method of the module. Tensors may have any batch
+        axes, any floating type and any device. PyTorch, which must be installed, can compute derivatives of
+        the results.
 
         Args:
             frame: As in `export`.

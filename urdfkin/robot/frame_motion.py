@@ -151,8 +151,8 @@ def frame_motion(
 
     Args:
         robot: The robot.
-        motion: A trajectory, such as from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n, nv) in
-            rad, m and s.
+        motion: A trajectory, for example from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n,
+            nv) in rad, m and s.
         frame: Name of a link or joint.
         reference: Reference frame of velocity, acceleration and Jacobian.
 

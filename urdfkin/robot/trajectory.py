@@ -8,9 +8,9 @@ configurations, with an error proportional to the square of the time step. If jo
 from configurations, the errors at the start and the end of the trajectory are larger: they are proportional
 to the time step. To estimate the errors, the differences are also computed from every second sample.
 
-*Unwrapping.* A log often wraps the angle of a wheel or of a planar joint to [-pi, pi] or [0, 2 pi], so the
-angle jumps at the end of the range. The quaternion of a floating joint may change its sign without a change
-of orientation. A velocity from such a jump would be huge and wrong, so the jumps are removed first.
+*Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
+The angle then jumps at the end of the range. The quaternion of a floating joint may change its sign without a
+change of orientation. A velocity from such a jump would be huge and wrong, so the jumps are removed first.
 """
 
 from __future__ import annotations
@@ -383,7 +383,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the unit of each number of "q", "v" or "a" by its name, such as "m/s"; "" for quaternions."""
+    """Map the name of each number of q, v or a to its unit, such as "m/s"; quaternions have the unit ""."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {

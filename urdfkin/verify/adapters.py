@@ -141,7 +141,7 @@ def read_pinocchio(text: str) -> Reading:
 
 
 def read_mujoco(text: str) -> Reading:
-    """Read a URDF with MuJoCo, without merging links at fixed joints, and with a minimum for each mass."""
+    """Read a URDF with MuJoCo; links at fixed joints are not merged, and each mass has a minimum."""
     import mujoco
 
     root = "world"

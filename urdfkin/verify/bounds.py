@@ -100,7 +100,8 @@ def magnitudes(
     Args:
         plan: The compiled tree.
         q: (n, nq) rad, m.
-        v: (n, nv) or None. Without v, only `p` and `roundings` are valid, for placements and Jacobians.
+        v: (n, nv) or None. Without v, only `p` and `roundings` are valid; placements and Jacobians need no
+            other bounds.
         a: (n, nv) or None.
         base: (1 or n, 24) state of the moving base.
     """
@@ -313,10 +314,10 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass, which
     `urdfkin.verify.mujoco` places at the root. At the end, MuJoCo converts the results to the frame's origin.
-    The distance from the centre of mass to a joint or to the frame is at most the length p of the path, so
-    lever arms are at most 2 p. The conversion to the centre of mass and back is a cross product with a lever
-    arm, which at most doubles the number of factors. In MuJoCo, each joint adds `MUJOCO` rounding errors
-    instead of `ROUNDINGS`.
+    A joint or the frame is at most the length p of the path away from the centre of mass. Lever arms are
+    therefore at most 2 p. The conversion to the centre of mass and back is a cross product with a lever arm,
+    which at most doubles the number of factors. In MuJoCo, each joint adds `MUJOCO` rounding errors instead
+    of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -412,9 +413,9 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 
     *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref; urdfkin rotates the hinge by ref and by q
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
-    all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error, and a
-    coordinate of a position by at most the angle error times the length of the path. The scale is multiplied
-    by 1 + `angles` / k, which allows twice these changes and so covers terms of second order.
+    all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
+    of a position changes by at most the angle error times the length of the path. The scale is multiplied by
+    1 + `angles` / k, which allows twice these changes and so covers terms of second order.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
@@ -492,8 +493,8 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
     The linear rows of a revolute joint's column are z x d. The vector d is at most as long as the path to the
-    frame, and the derivative of d is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot
-    is the derivative of components along the frame's axes, which rotate.
+    frame. The derivative of d is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot is
+    the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]

@@ -1,4 +1,4 @@
-"""Certificates, which record the checked and the unchecked results of a robot, and `VerificationError`."""
+"""Certificates (records of a robot's checked and unchecked results), and `VerificationError`."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ class Certificate(Displayable):
         return cast("CertificateDocument", plain(document))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the certificate as JSON; after an error no partial file remains.
+        """Write the certificate as JSON; if an error occurs, no partial file remains.
 
         Raises:
             SourceError: the folder does not exist, or the file cannot be written (permission, disk full).

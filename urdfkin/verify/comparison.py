@@ -39,7 +39,7 @@ class BatchComparison:
     index: tuple[int, ...] = ()
 
     def __add__(self, other: BatchComparison) -> BatchComparison:
-        """Combine the comparisons of two batches, with the `index` of the batch with the larger `share`.
+        """Combine the comparisons of two batches; `index` comes from the batch with the larger `share`.
 
         A `share` of NaN counts as larger than any number.
         """

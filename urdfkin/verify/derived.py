@@ -61,9 +61,10 @@ def check_relative_placement(
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's relative placements (n, frames, 4, 4), and the bound on urdfkin's error.
 
-    `bound_of` computes the bound of placements in the world. The relative placement is the pose of frame b in
-    frame a, the last frame of `x.plan`. The path to frame a has the length s_a and k_a rounding errors; the
-    path to frame b has the length s_b and k_b rounding errors. Errors in multiples of eps:
+    `bound_of` computes the bound of placements in the world. The relative placement is the pose of frame b
+    relative to frame a; frame a is the last frame of `x.plan`. The path to frame a has the length s_a and k_a
+    rounding errors; the path to frame b has the length s_b and k_b rounding errors. Errors in multiples of
+    eps:
 
     | Number | Source | Error at most |
     |---|---|---|

@@ -188,7 +188,7 @@ def _pinocchio_placements(
 ) -> FloatArray:
     """Return the placements (n, bodies, 4, 4) that Pinocchio computes from an MJCF file at MuJoCo's `qpos`.
 
-    `coordinates` is the index of each joint's first number in `qpos`, by the joint's name.
+    `coordinates` maps each joint's name to the index of the joint's first number in `qpos`.
 
     Raises:
         OracleError: Pinocchio does not accept the file, or reads other joints or bodies from it.

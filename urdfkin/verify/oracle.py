@@ -587,8 +587,8 @@ class Oracle:
             joints in its own model.
         mimic: True: couple mimic joints. False: every mimic joint moves freely.
         moving_base: Whether a free-flyer with the base's motion connects the world and the root.
-        root_joint: Kind of the root joint that urdfkin has added to the tree, "floating" or "planar", and
-            that the text does not contain; None: urdfkin has added no joint.
+        root_joint: Kind ("floating" or "planar") of the root joint that urdfkin has added to the tree; the
+            text does not contain this joint. None: urdfkin has added no joint.
         lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
 
     Attributes:

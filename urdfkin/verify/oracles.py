@@ -73,7 +73,7 @@ def _library(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle with a name; raise UnknownNameError, or InputError for a missing library."""
+    """Return the oracle with the given name; raise UnknownNameError, or InputError for a missing library."""
     wanted = as_str(name, "oracle")
     if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)

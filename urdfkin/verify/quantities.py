@@ -135,7 +135,7 @@ class Quantity:
     def ours(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        """Return urdfkin's results (n, frames, ...) for the first of `inputs` (q, v, a)."""
+        """Return urdfkin's results (n, frames, ...) for the inputs q, v and a that the quantity needs."""
         results: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
         return results
 

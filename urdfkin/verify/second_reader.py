@@ -189,7 +189,7 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield a line for each name that the two readers find a different number of times."""
+    """Yield a line for each name whose number of occurrences differs between the two readers."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:

@@ -5,8 +5,8 @@
 E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
 
 *Orthogonality.* The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b.
-By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor between (1 -
-a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
+By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor. The factor is
+between (1 - a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
 
 *Rounding.* The computed residuals have rounding errors too. The error of a sum of m products is at most m eps
 times the sum of the absolute values of the products.

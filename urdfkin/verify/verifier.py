@@ -131,7 +131,7 @@ class Verifier:
         """Return a new `pinocchio.Model` of the robot, for the user.
 
         Raises:
-            OracleError: Pinocchio does not accept the text, or reads another robot from it.
+            OracleError: Pinocchio does not accept the text, or reads a different robot from it.
         """
         if self.unverifiable is not None:
             raise OracleError(self.unverifiable, where=self.tree.name)

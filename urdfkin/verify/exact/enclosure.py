@@ -69,7 +69,7 @@ class Enclosure:
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is between `lower` and `upper`; other shapes raise InputError."""
+        """Return whether each number of `x` is between `lower` and `upper`; check the shape of `x`."""
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 

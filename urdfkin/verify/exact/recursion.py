@@ -65,7 +65,7 @@ def move(
     *,
     base: State | None = None,
 ) -> ExactMotion:
-    """Return the motion of the links of `joints` in one sample; without `base`, the root link is fixed.
+    """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
     `joints` is a result of `read_exact`, in which each joint comes after the joints between it and the root.
     """
