@@ -191,7 +191,7 @@ def test_a_urdf_that_differs_from_the_table_is_refused(monkeypatch: pytest.Monke
     table = read_table(UR5)
     other = replace(table, rows=(replace(table.rows[0], d=table.rows[0].d + 1e-9), *table.rows[1:]))
     monkeypatch.setattr(convert, "to_urdf", lambda _: to_urdf(other))
-    with pytest.raises(TableError, match="the URDF made of a table differs from the table"):
+    with pytest.raises(TableError, match="the URDF made from a table differs from the table"):
         load(table)
     assert load(table, verify=False).nq == 6
 

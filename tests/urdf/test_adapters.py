@@ -223,7 +223,7 @@ def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
         return T
 
     monkeypatch.setattr(model_check, "_placements", moved)
-    with pytest.raises(OracleError, match=r"made of a pinocchio.Model differs from the model"):
+    with pytest.raises(OracleError, match=r"made from a pinocchio.Model differs from the model"):
         urdfkin.load(pin.buildModelFromUrdf(file("ur5")))
 
 

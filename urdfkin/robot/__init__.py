@@ -1,7 +1,7 @@
 """The class `Robot`: kinematics of a loaded robot, with every result checked against Pinocchio.
 
-Equation numbers refer to chapter 7 of the textbook in `docs/equations.md`. With `verify=True`, the default, a
-method compares each result with Pinocchio's before returning the result.
+Equation numbers refer to chapter 7 of the textbook that `docs/equations.md` cites. With `verify=True`, the
+default, a method compares each result with Pinocchio's before returning the result.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
 _RANK_SAMPLES = 3
 #: Internal members, which name completion does not list.
 _INTERNAL = {"plan", "verifier"}
-#: Maximum number of float64 values of an array, whose number of bytes must fit in 63 bits.
+#: Maximum number of float64 values in an array, because the number of bytes must fit in 63 bits.
 _MOST_NUMBERS = (2**63 - 1) // 8
 
 
@@ -95,7 +95,7 @@ class Robot(Displayable):
 
     A configuration `q` has the shape (..., nq). Joint velocities `v` and joint accelerations `a` have the
     shape (..., nv). The leading axes are batch axes, which broadcast as in NumPy. The order of joints and the
-    meaning of `v` are Pinocchio's.
+    definition of `v` are the same as in Pinocchio.
 
     Each of `q`, `v` and `a` may have one of four forms:
 
@@ -104,7 +104,7 @@ class Robot(Displayable):
     - a text with names: `"elbow=0.5, wrist=2"`
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
-    A mapping or text without one of the names is an error, except after the name of a pose.
+    A mapping or text must contain all names, except after the name of a pose.
 
     Methods that compute a quantity share these arguments:
 
@@ -134,7 +134,8 @@ class Robot(Displayable):
         verifier: Verifier of the robot's results, with the URDF text that Pinocchio reads, and the record of
             all checks so far.
         findings: Warnings and notes about the URDF; `load` rejects a URDF with errors.
-        base_frame: Default base of chains: the base in the catalogue, or the root link of other robots.
+        base_frame: Default base of chains: the base named in the catalogue of robots; for other robots, the
+            root link.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -165,7 +166,7 @@ class Robot(Displayable):
         self.findings = Findings(findings)
         #: Bounds on the errors of poses from a USD stage, which has single precision; None: double precision.
         self.single: SinglePrecision | None = None
-        #: Path of the prim of each link, for a robot from a USD stage.
+        #: USD path of each link's prim (scene object), for a robot from a USD stage.
         self.prims: Mapping[str, str] = {}
         self.base_frame = base_frame or tree.frame_name(0)
         self._tip_frame = tip_frame
@@ -209,7 +210,7 @@ class Robot(Displayable):
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
-        >>> cell = arm.view("joint_1=30deg, joint_2=0", height=300)  # as the last line of a cell: shown
+        >>> cell = arm.view("joint_1=30deg, joint_2=0", height=300)  # shown by a notebook
         """
         q_0 = configuration.checked(self.tree, q, "q")
         if q_0.ndim != 1:
@@ -365,7 +366,7 @@ class Robot(Displayable):
 
     @property
     def frame_names(self) -> tuple[str, ...]:
-        """Names of all links and joints in Pinocchio's form, each once.
+        """Names of all frames (links and joints), as in Pinocchio, each name once.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").frame_names
@@ -375,7 +376,7 @@ class Robot(Displayable):
 
     @property
     def all_frames(self) -> tuple[str, ...]:
-        """Names `link:NAME` and `joint:NAME` of the frames of all links and joints, each once.
+        """Frame names: `link:NAME` for each link, and `joint:NAME` for each joint.
 
         Each name is a `FrameName`, which always means the link or joint NAME, even if another link or joint
         has the literal name `link:NAME`.
@@ -388,7 +389,7 @@ class Robot(Displayable):
 
     @property
     def tip_frame(self) -> str:
-        """The default tip: the tip in the catalogue, or the leaf link behind the most moving joints.
+        """The default tip: the tip in the robot catalogue, or the leaf link after the most moving joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame
@@ -402,7 +403,7 @@ class Robot(Displayable):
         return self._tip_frame
 
     def _default_frame(self) -> str:
-        """Return the tip in the catalogue, or the only leaf; raise InputError for several leaves."""
+        """Return the tip in the robot catalogue, or the only leaf; raise InputError for several leaves."""
         if not self._has_one_tip:
             leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
             raise InputError(
@@ -441,7 +442,7 @@ class Robot(Displayable):
     def limits(self) -> FloatArray:
         """(2, nq) lower and upper limits of `q`, rad, m; infinite for a joint without limits.
 
-        The array does not contain the limits of mimic joints, which `limit_violations` also checks.
+        The array does not contain the limits of mimic joints; `limit_violations` checks these limits too.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").limits.tolist()
@@ -483,7 +484,7 @@ class Robot(Displayable):
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
         The same seed gives the same configurations. In some robots, no value of a mimicked joint satisfies
-        the limits of the mimicked joint and of the mimic joint. Then only the limits of the mimicked joint
+        both its own limits and the limits of its mimic joint. Then only the limits of the mimicked joint
         apply, and `limit_violations` names the mimic joint.
 
         Args:
@@ -491,7 +492,8 @@ class Robot(Displayable):
             seed: Seed of the random generator.
 
         Raises:
-            InputError: `n` or `seed` is not a whole number >= 0, or `n` configurations exceed the memory.
+            InputError: `n` or `seed` is not a whole number >= 0, or `n` configurations do not fit into
+                memory.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -570,14 +572,14 @@ class Robot(Displayable):
         return integration.difference(self.tree, *ends)
 
     def to_pinocchio(self, q: Given, *, mimic: bool = False) -> FloatArray:
-        """Convert `q` (..., nq) to Pinocchio's configuration, for the model of `pinocchio_model`.
+        """Convert `q` (..., nq) to a configuration of the Pinocchio model that `pinocchio_model` returns.
 
         Pinocchio stores a continuous joint as (cos q, sin q). If `mimic` is False, Pinocchio stores a
         separate coordinate for each mimic joint.
 
         Args:
             q: (..., nq) rad, m.
-            mimic: The argument `mimic` of `pinocchio_model` for this Pinocchio model.
+            mimic: The value of `mimic` that was passed to `pinocchio_model`.
 
         Returns:
             (..., model.nq).
@@ -596,12 +598,12 @@ class Robot(Displayable):
     def pinocchio_model(self, *, mimic: bool = False) -> Any:
         """Return a new `pinocchio.Model` that Pinocchio builds from this robot's URDF text.
 
-        `to_pinocchio(q)` returns a configuration of this model. With a root joint, the model has Pinocchio's
-        free-flyer or planar joint.
+        `to_pinocchio(q)` returns a configuration of this model. If the robot has a root joint, this joint is
+        a free-flyer or a planar joint in the model.
 
         Args:
-            mimic: True: the mimic joints follow their mimic rules, which Pinocchio 4.1 rejects for some
-                robots. False: each mimic joint is an independent joint.
+            mimic: True: the mimic joints follow their mimic rules; Pinocchio 4.1 then rejects some robots.
+                False: each mimic joint is an independent joint.
 
         Raises:
             OracleError: Pinocchio does not accept this robot.
@@ -627,7 +629,7 @@ class Robot(Displayable):
 
         Args:
             q: (..., model.nq), a configuration of `pinocchio_model(mimic=mimic)`.
-            mimic: The argument `mimic` of `pinocchio_model` for this Pinocchio model.
+            mimic: The value of `mimic` that was passed to `pinocchio_model`.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -639,12 +641,12 @@ class Robot(Displayable):
         return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=as_bool(mimic, "mimic"))
 
     def convention(self, name: str | Path | Convention, joints: Sequence[str] | None = None) -> Conversion:
-        """Return the conversion of q, v, a, Jacobians and six-vectors to the convention of a tool, and back.
+        """Return the conversion of q, v, a, Jacobians and six-vectors to a program's convention, and back.
 
         Args:
             name: A built-in convention, such as "mujoco", "drake" or "isaaclab" (docs/conventions.md), or the
                 path of a TOML file.
-            joints: Names of the joints in the order of your tool or policy; None: the order of the
+            joints: Names of the joints in the order of your program or policy; None: the order of the
                 convention.
 
         Raises:
@@ -667,7 +669,7 @@ class Robot(Displayable):
     def with_convention(
         self, name: str | Path | Convention, joints: Sequence[str] | None = None
     ) -> ConventionRobot:
-        """Return this robot with methods whose arguments and results are in the convention of another tool.
+        """Return this robot with methods whose arguments and results are in the convention of a program.
 
         The arguments are those of `convention`.
 
@@ -687,13 +689,13 @@ class Robot(Displayable):
         """Return this robot with some joints fixed at a value; q, v and a do not contain these joints.
 
         A mimic joint is locked together with its mimicked joint. Pinocchio checks the results of the returned
-        robot with the reduced model (`buildReducedModel`) of the whole URDF.
+        robot with a reduced model, which `buildReducedModel` makes from the model of the whole URDF.
 
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
-            joints: The joints that remain movable; all other joints are locked. A locked joint without a
-                value in `lock` has the value 0. If `lock` begins with a pose, such as "ready", the joint has
-                the value in the pose.
+            joints: The joints that remain movable; all other joints are locked. If `lock` has no value for a
+                locked joint, the value is 0. If `lock` begins with a pose, such as "ready", the value is that
+                in the pose.
 
         Raises:
             UnknownNameError: there is no such joint or pose.
@@ -808,7 +810,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from
 
         name = as_str(relative_to, "relative_to")
-        # A message with the call needs the repr of a plain string, and not that of a subclass.
+        # Error messages repeat the call, so the name must be a plain string; a subclass has another repr.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -1034,8 +1036,8 @@ class Robot(Displayable):
             rows: Rows of J: "all", "linear" or "angular".
 
         Raises:
-            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or
-                another value of `rows`.
+            InputError: a wrong length, a number that is not finite, batch shapes that do not broadcast, or an
+                invalid value of `rows`.
             VerificationError: Pinocchio's Jacobian differs by more than the bound.
 
         >>> import urdfkin
@@ -1078,7 +1080,7 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Return the analytical Jacobian J = C^-1 J_v (eq. 7.122), derivatives of position and orientation.
+        """Return the analytical Jacobian J = C^-1 J_v (eq. 7.122): derivatives of position and orientation.
 
         The orientation is three Euler angles or a quaternion. The check uses Pinocchio's rotation and
         Jacobian, and an independent formula for the derivatives of the angles
@@ -1096,8 +1098,9 @@ class Robot(Displayable):
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or in a
-                checked call than the rounding error, about 1e-13 rad. A quaternion has no singularity.
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or, in a
+                checked call, nearer than the rounding error (about 1e-13 rad). A quaternion has no
+                singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin
@@ -1222,7 +1225,7 @@ class Robot(Displayable):
             digits: Decimal digits of the interval arithmetic, at least 15. None: 30 digits plus one for each
                 joint before the frame. With 15 digits, the intervals are about as wide as the rounding errors
                 of doubles.
-            hessian: Whether to enclose the Hessian too, in less than 0.1 ms for each pair of joints.
+            hessian: Whether to enclose the Hessian too; this takes less than 0.1 ms for each pair of joints.
 
         Raises:
             InputError: an argument is a batch or has a wrong length, or `digits` is below 15.
@@ -1358,9 +1361,9 @@ class Robot(Displayable):
     ) -> Any:
         """Return a `torch.nn.Module` with the kinematics of a frame, for PyTorch.
 
-        The module is an object of the class `Kinematics` in `export("torch", ...)`. `module(q)` returns the
-        placement (..., 4, 4), and each quantity is a method of the module. Tensors may have any leading
-        shape, any floating type and any device. PyTorch, which must be installed, can compute derivatives of
+        The module is an object of the class `Kinematics` in `export("torch", ...)`. By default, `module(q)`
+        returns the placement (..., 4, 4). Each quantity is a method of the module. Tensors may have any batch
+        axes, any floating type and any device. PyTorch, which must be installed, can compute derivatives of
         the results.
 
         Args:
@@ -1391,7 +1394,8 @@ class Robot(Displayable):
     def chain(self, tip: str | None = None, base: str | None = None) -> FrameChain:
         """Return the chain of joints between two frames.
 
-        The path may lead down the tree, up the tree, or through the common ancestor.
+        The path may lead towards the tips, towards the root, or through the common ancestor of the two
+        frames.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
@@ -1457,9 +1461,9 @@ class Robot(Displayable):
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the table leads to the tip. "flange": the table leads to the flange, and a separate
                 tool transform leads from the flange to the tip.
-            parallel_offset: Rows with the offset along consecutive parallel joint axes. "last": the row of
-                the last parallel axis. "first": the row of the first parallel axis. "each": the row of each
-                parallel axis contains the offset of one link.
+            parallel_offset: Row or rows that contain the offset along consecutive parallel joint axes.
+                "last": the row of the last parallel axis. "first": the row of the first parallel axis.
+                "each": the row of each parallel axis contains the offset of one link.
             flip: Names of joints whose positive direction is reversed in the table.
             first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
@@ -1467,7 +1471,7 @@ class Robot(Displayable):
             slide: Position of the axes of prismatic joints. "drawn": the axis passes through the joint's
                 origin in the URDF. "minimal": the axis passes through the origin of the next revolute joint,
                 so that a is 0.
-            like: A published table, whose frames, signs and zero positions the new table has. With `like`,
+            like: A published table; the new table has the same frames, signs and zero positions. With `like`,
                 the arguments `flip`, `first`, `last`, `sign` and `parallel_offset` have no effect.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
@@ -1578,7 +1582,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the compiled tree of the joints that move some links; later calls return the same object."""
+        """Return the compiled tree of the joints that move `links`; later calls return the same object."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1630,7 +1634,7 @@ class Robot(Displayable):
         verify: Verify | None,
         threads: int | None,
     ) -> PreparedFrame | None:
-        """Return the fast evaluator for a call; None if the call needs the general code."""
+        """Return the fast evaluator for a call; None if the evaluator does not support the call."""
         policy = self.verifier.policy if verify is None else verify
         if base is not None or threads is not None or (policy is not True and policy is not False):
             return None
@@ -1646,7 +1650,7 @@ class Robot(Displayable):
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         """Return the fast evaluator of a frame; later calls return the same object."""
         # A plain name is a fast key; the hash of an enumeration member is slow.
-        # The types in the other keys distinguish the name "link:a" from `LinkFrame("link:a")`.
+        # The other keys contain types, to distinguish the name "link:a" from `LinkFrame("link:a")`.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
@@ -1672,7 +1676,7 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
     """Return the docstring of a method of `Robot`, with the shared arguments and errors.
 
-    The shape, the units and the equations of the result are those of `QUANTITIES`.
+    `QUANTITIES` contains the shape, the units and the equations of the result.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)

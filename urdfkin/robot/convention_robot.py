@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 class ConventionRobot:
     """A robot in the convention of a target program; `robot.with_convention("mujoco")` returns it.
 
-    The methods have the names and arguments of those of `Robot`. q, v and a, the columns of Jacobians and the
-    rows of six-vectors have the target program's order; q, v and a also have its units. Pinocchio checks each
-    result before the result is converted.
+    The methods have the same names and arguments as the methods of `Robot`. q, v and a, the columns of
+    Jacobians and the rows of six-vectors have the target program's order; q, v and a also have the target
+    program's units. Pinocchio checks each result before the result is converted.
 
     Attributes:
         robot: The robot.
@@ -129,7 +129,7 @@ class ConventionRobot:
     def _call(
         self, method: Callable[..., FloatArray], given: tuple[Any, ...], *more: Any, **options: Any
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
-        """Return the inputs in urdfkin's convention, and the result of a method of `Robot` for them."""
+        """Call a method of `Robot`; return the inputs in urdfkin's convention, and the result."""
         read: list[ArrayLike] = [
             self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", given, strict=False)

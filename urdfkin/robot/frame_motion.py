@@ -83,7 +83,7 @@ class FrameMotion:
 
     @property
     def agrees(self) -> bool:
-        """Whether all differences from Pinocchio are within the bounds; True without a comparison.
+        """Whether all differences from Pinocchio are within the bounds; also True if nothing was compared.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").agrees
@@ -95,7 +95,8 @@ class FrameMotion:
     def singular_values(self) -> FloatArray:
         """(n, min(6, nv)) singular values of the Jacobian, largest first.
 
-        The rows of the Jacobian have different units: metres and radians.
+        The rows of the Jacobian have different units (metres and radians), so the values depend on the unit
+        of length.
 
         >>> import urdfkin
         >>> urdfkin.frame_motion(urdfkin.load("ur5"), [np.zeros((3, 6))] * 3, "tool0").singular_values.shape
@@ -150,8 +151,8 @@ def frame_motion(
 
     Args:
         robot: The robot.
-        motion: A trajectory, such as from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n, nv) in
-            rad, m and s.
+        motion: A trajectory, for example from `urdfkin.read_trajectory`; or q (n, nq), v (n, nv) and a (n,
+            nv) in rad, m and s.
         frame: Name of a link or joint.
         reference: Reference frame of velocity, acceleration and Jacobian.
 

@@ -48,7 +48,7 @@ class LoadOptions(TypedDict):
     joints: Sequence[str] | None
 
 
-def load(  # noqa: PLR0911  each kind of source has a branch
+def load(  # noqa: PLR0911  (many returns): each kind of source has its own branch
     source: Source | DHTable | ProductOfExponentials | ModuleType | XmlElement | XmlTree,
     *,
     verify: Verify = True,
@@ -263,7 +263,7 @@ def _load_usd(
 
 
 def _plain(robot: Robot, text: Text, **options: Any) -> Robot:
-    """Return the robot of a text without a root joint, without locks and with all of its mimic rules."""
+    """Load a text as a robot with a fixed root, without locked joints and with all mimic rules."""
     origin = robot.origin
     plain = origin.mimic is not False and origin.root_joint is None and not origin.lock
     return robot if plain else robot_of(text, **options)
@@ -365,7 +365,7 @@ def robot_of(
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
-    """Return the first finding because of which Pinocchio cannot check the robot; None: no such finding."""
+    """Return the first finding that prevents a check by Pinocchio; None if there is no such finding."""
     problems = {
         PinocchioReading.REFUSES: "Pinocchio refuses the file",
         PinocchioReading.DIFFERS: "Pinocchio reads another robot",

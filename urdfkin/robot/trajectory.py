@@ -4,13 +4,13 @@
 ends at rest, and the acceleration is continuous.
 
 *Differences.* Joint velocities that a file does not contain are computed by central differences of the
-configurations, with an error proportional to the square of the time step. Joint accelerations from
-configurations have larger errors at the start and the end of the trajectory, which are proportional to the
-time step. To estimate the errors, the differences are also computed from every second sample.
+configurations, with an error proportional to the square of the time step. If joint accelerations are computed
+from configurations, the errors at the start and the end of the trajectory are larger: they are proportional
+to the time step. To estimate the errors, the differences are also computed from every second sample.
 
-*Unwrapping.* A log often wraps the angle of a wheel or of a planar joint to [-pi, pi] or [0, 2 pi], so the
-angle jumps at the end of the range. The quaternion of a floating joint may change its sign without a change
-of orientation. A velocity from such a jump would be huge and wrong, so the jumps are removed first.
+*Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
+The angle then jumps at the end of the range. The quaternion of a floating joint may change its sign without a
+change of orientation. A velocity from such a jump would be huge and wrong, so the jumps are removed first.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 _FEWEST = 3
 #: Arrays of an .npz file with the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: Largest rounding error of the times, as a fraction of the smallest time step, without a note for the user.
+#: A note tells the user if the times' rounding error exceeds this fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
@@ -149,9 +149,9 @@ class Trajectory:
         q: (n, nq) configurations, rad and m.
         v: (n, nv) joint velocities, rad/s and m/s.
         a: (n, nv) joint accelerations, rad/s^2 and m/s^2.
-        rates: Origin of v and a, such as "by central differences".
-        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, the error of v
-            and a is unknown.
+        rates: How v and a were obtained, such as "by central differences".
+        exact: Whether v and a are the exact derivatives of q, except for rounding. If False, v and a are
+            approximate, or come from a file; see `errors`.
         notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
@@ -176,7 +176,7 @@ class Trajectory:
         return f"<Trajectory: {len(self.t)} samples in {self.t[-1] - self.t[0]:.4g} s, rates {self.rates}>"
 
     def derivation(self) -> str:
-        """Return one line with the origin of v and a, and with the estimates of the errors.
+        """Return one line that states how v and a were obtained, and their estimated errors.
 
         >>> import urdfkin
         >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101).derivation()
@@ -186,7 +186,7 @@ class Trajectory:
             return self.rates
         v, a = self.errors
         return (
-            f"{self.rates}; largest errors about {v:.1e} (v) and {a:.1e} (a), in rad or m per s and s^2,"
+            f"{self.rates}; largest errors about {v:.1e} rad/s or m/s (v) and {a:.1e} rad/s^2 or m/s^2 (a),"
             " estimated with half of the samples"
         )
 
@@ -231,7 +231,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
     # With the derivatives s' and s'' of s, v is `step` times s', and a is `step` times s''.
-    # Screw motions have constant directions too, because their velocities are expressed in the moving frame.
+    # This is also true for screw motions, because their velocities are expressed in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -251,8 +251,8 @@ def read_trajectory(
 
     A heading may end with a unit: `elbow [deg]`, `elbow_deg`, `v:elbow [deg/s]`, `lift_mm`, `time [ms]`.
     Without t, the samples are one second apart. If the file has no a, or neither v nor a, central differences
-    replace the missing arrays. For v, the angles of continuous, planar and floating joints are unwrapped
-    first. The attributes `rates`, `errors` and `notes` of the result report these computations.
+    replace the missing arrays. Before v is computed, the angles of continuous, planar and floating joints are
+    unwrapped. The attributes `rates`, `errors` and `notes` of the result report these computations.
 
     Args:
         robot: The robot.
@@ -344,7 +344,7 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of differences from all samples and from half of the samples.
+    """Estimate the largest error of central differences by comparing them with those of half of the samples.
 
     With half of the samples, the error is larger by the factor 2^`order`.
     """
@@ -383,7 +383,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Return the unit of each number of "q", "v" or "a" by its name, such as "m/s"; "" for quaternions."""
+    """Map the name of each number of q, v or a to its unit, such as "m/s"; quaternions have the unit ""."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -404,7 +404,7 @@ def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 
 
 def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """Return joint velocities (n, nv) by central differences; free joints: in the moving frame."""
+    """Return joint velocities (n, nv) by central differences; planar and floating: in the moving frame."""
     slopes = _gradient(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -449,8 +449,8 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first other line may contain the names of the
-    columns, in any order. Without names, the columns are those in `required`, in this order.
+    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
+    names of the columns, in any order. Without names, the columns are those in `required`, in this order.
 
     Args:
         text: The content of the file.
@@ -496,7 +496,7 @@ def read_columns(
 
 #: Allowed names of the time column.
 _TIMES = ("t", "time", "timestamp")
-#: Number of units of time in one second, by the name of the unit.
+#: Number of time units in one second, by the name of the unit.
 _PER_SECOND = {
     **dict.fromkeys(("s", "sec", "second", "seconds"), 1.0),
     "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9,
@@ -560,14 +560,14 @@ def _unit(text: str, where: str, expected: str) -> str:
 
 
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
-    """Return a column in SI units; 30 degrees become the double that `parse_quantity` returns for `30deg`."""
+    """Return a column in SI units; degrees are converted exactly as by `parse_quantity`."""
     if unit == "deg":
         return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
 def width_of(text: str, where: str) -> int:
-    """Return the number of cells in the first line that is not skipped; 0: no such line."""
+    """Return the number of cells in the first line that is not skipped; 0 if there is no such line."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
@@ -597,7 +597,7 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a line contains the names of columns, which can also be numbers, such as "1"."""
+    """Return whether a line contains the names of columns; a name can also be a number, such as "1"."""
     return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
@@ -609,7 +609,7 @@ def _check_columns(
     required: Sequence[str],
     optional: Sequence[str],
 ) -> None:
-    """Raise InputError if a column is unknown, missing or duplicate; `headings` are the written names."""
+    """Raise InputError if a column is unknown, missing or duplicate; `headings`: names as in the file."""
     known, given = {*required, *optional}, Counter(names)
     wrong = {
         "unknown": [name for name in names if name not in known],
@@ -626,14 +626,13 @@ def _check_columns(
         )
 
 
-#: Largest range of angles that were wrapped to one turn, rad, with a margin for a rounding to two decimals.
+#: Wrapped angles have at most this range (rad): one turn, with a margin for rounding to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: Angle between two samples, rad, above which the direction of the rotation is uncertain. In the opposite
-#: direction, the joint would turn by less than twice this angle.
+#: Above this angle (rad) between two samples, the direction of the rotation is uncertain.
+#: The rotation in the opposite direction would then be less than twice this angle.
 _AMBIGUOUS = math.tau / 3.0
 
-#: Largest motion (rad or m) of a mimic joint that counts as rounding, if the mimicked joint makes whole
-#: turns.
+#: If the mimicked joint makes whole turns, a smaller motion (rad or m) of the mimic joint is only rounding.
 _ROUNDING = 1e-9
 
 
@@ -649,9 +648,9 @@ class Unwrapped:
 def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
     """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
-    Between two samples, a joint is assumed to turn in the shorter direction. Angles that span more than one
-    turn were not wrapped, and stay unchanged. The angles of revolute joints, which have limits, stay
-    unchanged too.
+    Between two samples, a joint is assumed to turn in the shorter direction. If the angles of a joint span
+    more than one turn, they have not been wrapped, and stay unchanged. The angles of revolute joints, which
+    have limits, stay unchanged too.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -726,7 +725,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint that moves if the mimicked joint turns by whole turns."""
+    """Yield a note for each mimic joint whose pose changes because the mimicked joint was unwrapped."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):

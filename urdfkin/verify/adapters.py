@@ -1,7 +1,8 @@
 """Read a robot file with other libraries, with one adapter for each library.
 
 This module imports only NumPy and the chosen library. The command `urdfkin readers` imports this module.
-`scripts/make_libraries.py` runs this module as a program, with the Python of an environment with one library:
+`scripts/make_libraries.py` runs this module as a program, with the Python interpreter of a virtual
+environment in which one library is installed:
 
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
@@ -9,8 +10,9 @@ The program reads a list of cases `{"name", "text", "configurations"}` and print
 case. A configuration maps each independent joint to its value: one number (rad or m), three numbers for a
 planar joint (x, y, angle), or seven for a floating joint (x, y, z, qx, qy, qz, qw).
 
-An adapter passes all inputs that the library's documentation requires, but no values of mimic joints, whose
-rules are in the file. The adapter does not correct wrong poses.
+An adapter passes all inputs that the library's documentation requires. It passes no values for mimic joints,
+because the library can read the mimic rules from the file. The adapter does not correct poses that the
+library computes wrongly.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ import numpy as np
 #: Value of a joint; several numbers for a planar or floating joint.
 Value = Any
 Poses = dict[str, Any]
-#: Numbers of values of a planar joint and of a floating joint.
+#: A planar joint has 3 values, and a floating joint has 7.
 _PLANAR, _FLOATING = 3, 7
 #: Suffixes of the three joints that replace a planar joint in MuJoCo.
 _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
@@ -48,8 +50,8 @@ class Reading:
 
     Attributes:
         joints: Names of the joints that have a coordinate, in the library's order.
-        poses: Function (joint values) that returns the pose (4, 4) of each link in the root link, except for
-            links that the library merges into other links.
+        poses: Function of the joint values. It returns the pose (4, 4) of each link relative to the root
+            link; links that the library merges into other links are missing.
     """
 
     joints: list[str]
@@ -89,7 +91,7 @@ def _file(text: str) -> Any:
 
 def _scalar(value: Value) -> float:
     if np.ndim(value):
-        raise TypeError("the library has no joints of several coordinates")
+        raise TypeError("the library does not support joints with several coordinates")
     return float(value)
 
 
@@ -100,13 +102,13 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Return link poses in the root link; without a pose of the root link, in the world."""
+    """Convert link poses from the world to the root link; a missing pose of the root is the identity."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
 
 def read_pinocchio(text: str) -> Reading:
-    """Read a URDF with Pinocchio, with coupled mimic joints."""
+    """Read a URDF with Pinocchio; mimic joints follow their mimic rules."""
     import pinocchio as pin
 
     if _is_path(text):
@@ -139,7 +141,7 @@ def read_pinocchio(text: str) -> Reading:
 
 
 def read_mujoco(text: str) -> Reading:
-    """Read a URDF with MuJoCo, without merging links at fixed joints, and with a minimum for each mass."""
+    """Read a URDF with MuJoCo; links at fixed joints are not merged, and each mass has a minimum."""
     import mujoco
 
     root = "world"
@@ -180,7 +182,7 @@ def read_mujoco(text: str) -> Reading:
 
 
 def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
-    """Yield the name and the value of each MuJoCo joint for a joint of the URDF; three for a planar joint."""
+    """Yield the name and value of each MuJoCo joint that replaces a URDF joint: three for a planar joint."""
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR[0] in names:
@@ -188,7 +190,7 @@ def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, V
 
 
 def read_drake(text: str) -> Reading:
-    """Read a URDF with Drake, as a discrete plant with the contact solver SAP, which mimic joints require."""
+    """Read a URDF with Drake; mimic joints require a discrete plant and the contact solver SAP."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 
@@ -235,7 +237,7 @@ def read_idyntree(text: str) -> Reading:
     }
     computed.setFloatingBase(root)
 
-    # The model exists only as long as the loader, to which the default of `_loader` refers.
+    # The model is deleted together with its loader, so the argument `_loader` keeps the loader alive.
     def poses(values: Mapping[str, Value], _loader: Any = loader) -> Poses:
         q = np.zeros(model.getNrOfPosCoords())
         for name in places.keys() & values.keys():
@@ -278,7 +280,7 @@ def read_urchin(text: str) -> Reading:
 
 
 def _urchins(joint: Any, value: Value) -> Value:
-    """Convert a joint value to urchin's layout; urchin accepts a matrix for a floating joint."""
+    """Convert a joint value to urchin's form: a 4 by 4 matrix for a floating joint."""
     if joint.joint_type != "floating":
         return value
     return _rigid(_rotation(value[3:]), value[:3])
@@ -308,7 +310,7 @@ def read_kinpy(text: str) -> Reading:
 
 
 def read_ikpy(text: str) -> Reading:
-    """Read one path of a URDF from the root to a tip; ikpy reads no branches."""
+    """Read one path of a URDF from the root to a tip, because ikpy does not support branches."""
     from ikpy.chain import Chain
 
     root, children = _root(text), _children(text)
@@ -367,7 +369,7 @@ def read_newton(path: str) -> Reading:
     model = builder.finalize(device="cpu")
     state, starts = model.state(), model.joint_q_start.numpy()
     counts = np.diff(np.append(starts[: len(builder.joint_label)], model.joint_coord_count))
-    # Newton adds a free joint to a body without a joint; the file does not contain this free joint.
+    # If a body has no joint, Newton adds a free joint, which is not in the file.
     places = {
         str(label).rpartition("/")[2]: (int(start), int(count))
         for label, kind, leader, start, count in zip(
@@ -440,7 +442,7 @@ def version(name: str) -> str | None:
 
 
 def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a library's joints and poses for a case, or the text of the library's error."""
+    """Return the joints and the link poses that a library computes, or the library's error message."""
     try:
         reading = LIBRARIES[name].read(case["text"])
         found = [reading.poses(values) for values in case["configurations"]]
@@ -461,10 +463,10 @@ def _lines(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
 
 
 def main() -> None:
-    """Print the answers of the library that the first argument names, to the cases on standard input."""
+    """Read cases from standard input, and print the results of the library named by the first argument."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    output = os.dup(1)  # libraries may print to standard output, which becomes standard error
+    output = os.dup(1)  # texts that libraries print are redirected to standard error
     os.dup2(2, 1)
     for line in _lines(sys.argv[1], json.load(sys.stdin)):
         os.write(output, f"{line}\n".encode())

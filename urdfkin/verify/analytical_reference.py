@@ -30,7 +30,7 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     basis of the three axes.
 
     Args:
-        name: SciPy's name of the sequence: capital letters are body axes, small letters are fixed axes.
+        name: SciPy's name of the sequence: capital letters mean body axes, small letters mean fixed axes.
         R: (..., 3, 3) rotation from body axes to world axes.
         J_v: (..., 6, n) velocity Jacobian, [linear; angular], in world axes.
     """
@@ -51,8 +51,8 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 def quaternion_jacobian(quat: Numbers, J_v: Numbers) -> Numbers:
     """Return the Jacobian (..., 7, n) of the position and a unit quaternion (..., 4), scalar last.
 
-    The derivative of the quaternion is half of the quaternion product (w, 0) `quat`; w is the angular
-    velocity. `J_v` is the velocity Jacobian (..., 6, n), [linear; angular], in world axes.
+    The derivative of the quaternion is half the product of the quaternions (w, 0) and `quat`, where w is the
+    angular velocity. `J_v` is the velocity Jacobian (..., 6, n), [linear; angular], in world axes.
     """
     w = J_v[..., 3:, :].swapaxes(-1, -2)
     q, q0 = quat[..., np.newaxis, :3], quat[..., np.newaxis, 3:]

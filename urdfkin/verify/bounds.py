@@ -5,12 +5,12 @@ A result is accepted if each of its numbers differs from the oracle's number by 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
-terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. The
-difference of the two sums is proportional to the scale, not to the sums.
+terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. If
+large terms cancel, the two sums are small, but their difference is still proportional to the scale.
 
-*k* is the number of roundings to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
-adds a fixed number of roundings. A joint also rotates the vectors of the joints after it, but a rotation does
-not amplify an error. The error therefore grows linearly with the number of joints.
+*k* counts the rounding errors, to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
+adds a fixed number of rounding errors. A joint also rotates the vectors of the joints after it, but a
+rotation does not amplify errors. The error therefore grows linearly with the number of joints.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -28,14 +28,14 @@ The references LOCAL and WORLD need one more factor: a rotation into the frame's
 product with p (WORLD).
 
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
-worst way. Reports state differences in multiples of eps * scale, because such multiples of different robots
-can be compared.
+worst way. Reports state differences in multiples of eps * scale, so that differences of small and large
+robots can be compared.
 
 *Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
-vectors (`urdfkin.kinematics.number_kinds`), so no intermediate value exceeds the result. Eq. 7.129 contains
-the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The difference v_i^2 z x z is 0 except for
-rounding errors, which are large for fast joints with an oblique axis. The bound on the angular acceleration
-alpha therefore uses w_i instead of w_{i-1}.
+vectors (`urdfkin.kinematics.number_kinds`). All terms are then positive, so no intermediate value exceeds the
+result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The difference v_i^2
+z x z is 0 except for rounding errors, which are large for fast joints with an oblique axis. The bound on the
+angular acceleration alpha therefore uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
 #: Indices of position, velocities and accelerations in the state of a moving base.
 _OF_BASE = 9, 12, 15, 18, 21
-#: Number of configurations in a block of the kernel `lengths`; a block fits into the first-level cache.
+#: How many configurations the kernel `lengths` processes at once; their data fit into the first-level cache.
 _BLOCK = 64
 
 
@@ -78,9 +78,9 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) upper bound on the number of rounding errors of one factor, that is, of one
-            rotated vector. The bound counts all URDF joints on the path, a rotated base, and one additional
-            joint.
+        roundings: (n, frames) upper bound on the number of rounding errors in one rotated vector (a factor).
+            The bound counts all URDF joints on the path, a rotated base as one joint, and one additional
+            joint as a margin.
     """
 
     p: FloatArray
@@ -100,7 +100,8 @@ def magnitudes(
     Args:
         plan: The compiled tree.
         q: (n, nq) rad, m.
-        v: (n, nv) or None. Without v, only `p` and `roundings` are valid, for placements and Jacobians.
+        v: (n, nv) or None. Without v, only `p` and `roundings` are valid; placements and Jacobians need no
+            other bounds.
         a: (n, nv) or None.
         base: (1 or n, 24) state of the moving base.
     """
@@ -117,7 +118,7 @@ def magnitudes(
             preload.spend("lengths", time.thread_time() - begin)
     else:
         _by_kernel(kernel, lengths, inputs, out)
-    is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)  # a rotated base has as many roundings as a joint
+    is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)  # a rotated base counts as one more joint
     out[5] = of_joints(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
@@ -135,7 +136,7 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
 
 
 def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with a compiled function; the bits are those of `_by_steps`."""
+    """Compute `out` with a compiled function; the result equals that of `_by_steps` bit for bit."""
     links = lengths.links
     # The stride of an input is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -301,7 +302,7 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with a scale (n, frames, ...), and with k = factors * roundings of one factor."""
+    """Return the bound with the given scale (n, frames, ...); k is `factors` times `size.roundings`."""
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
@@ -313,10 +314,10 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass, which
     `urdfkin.verify.mujoco` places at the root. At the end, MuJoCo converts the results to the frame's origin.
-    The distance from the centre of mass to a joint or to the frame is at most the length p of the path, so
-    lever arms are at most 2 p. The conversion to the centre of mass and back is a cross product with a lever
-    arm, which at most doubles the number of factors. A joint has `MUJOCO` rounding errors instead of
-    `ROUNDINGS`.
+    A joint or the frame is at most the length p of the path away from the centre of mass. Lever arms are
+    therefore at most 2 p. The conversion to the centre of mass and back is a cross product with a lever arm,
+    which at most doubles the number of factors. In MuJoCo, each joint adds `MUJOCO` rounding errors instead
+    of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -335,9 +336,10 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rules: Number of mimic rules of the joints on the path. A joint that mimics a mimic joint has two.
-        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m; positive if the offsets of a chain
-            of mimic rules cancel each other.
+        rules: Number of mimic rules of the joints on the path; a joint that mimics a mimic joint counts as
+            two rules.
+        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if offsets in
+            a chain of mimic rules cancel, because their rounding errors do not cancel.
     """
 
     angles: FloatArray
@@ -353,8 +355,8 @@ def true_value_magnitudes(
     The true values are computed from the decimals in the URDF and from the doubles q, v and a, and are
     rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One program makes
     at most 16.8 rounding errors (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the conversion of
-    decimals to doubles: half an eps each for the offset, the axis and the true value; the axis counts twice,
-    because two rotations use the axis. Two kinds of numbers need additional roundings:
+    decimals to doubles: half an eps each for the offset, the axis and the true value. The axis counts twice,
+    because it is used in two rotations. Two kinds of numbers need additional roundings:
 
     - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint rotate by
       at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -365,8 +367,9 @@ def true_value_magnitudes(
     *Chains of mimic rules.* If a mimic joint mimics another mimic joint, r rules form a chain. Let X be the
     value of the joint with all terms replaced by their absolute values: |q| for an independent joint, and |m|
     X' + |c| for a joint that mimics a joint with X'. A program may combine the r rules to one rule M q + C.
-    This rule has r - 1 sums in C, and the sum of M q and C. No sum exceeds X, so the combined rule adds an
-    error of at most (r - 1) / 2 X eps; all other rounding errors are those of the separate rules.
+    The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum exceeds X, so the
+    combined rule adds an error of at most (r - 1) / 2 X eps; all other rounding errors are those of the
+    separate rules.
 
     *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
     error of 1 eps rad changes a vector by at most eps times the length of the vector.
@@ -410,9 +413,9 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
 
     *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref; urdfkin rotates the hinge by ref and by q
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
-    all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error, and a
-    coordinate of a position by at most the angle error times the length of the path. The scale is multiplied
-    by 1 + `angles` / k, which allows twice these changes and so covers terms of second order.
+    all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
+    of a position changes by at most the angle error times the length of the path. The scale is multiplied by
+    1 + `angles` / k, which allows twice these changes and so covers terms of second order.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
@@ -490,8 +493,8 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     """Return the scale of the bound on J-dot, (n, frames, 6, nv).
 
     The linear rows of a revolute joint's column are z x d. The vector d is at most as long as the path to the
-    frame, and the derivative of d is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot
-    is the derivative of components along the frame's axes, which rotate.
+    frame. The derivative of d is at most the bound on the velocity of the frame's origin. In LOCAL, J-dot is
+    the derivative of components along the frame's axes, which rotate.
     """
     turning, sliding = column_weights(plan)
     w, p, vel = size.w[..., None], size.p[..., None], size.vel[..., None]
@@ -504,10 +507,10 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     return _in_six_rows(linear, angular)
 
 
-#: Numbers of products in Pinocchio's derivative of Jacobian column i by joint j, linear rows:
-#: the first pair if joint j is joint i or is nearer to the root than joint i, the second pair otherwise.
-#: A pair is the number of products z x (z x d) of two revolute joints, and the number of products z x z
-#: of a revolute and a prismatic joint.
+#: Pinocchio's derivative of Jacobian column i by joint j is a sum of products (linear rows).
+#: The first pair applies if joint j is joint i or is nearer to the root than joint i; else the second.
+#: First number of a pair: how many products z x (z x d) the sum has for two revolute joints.
+#: Second number: how many products z x z the sum has for a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -524,15 +527,15 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     never longer than the path.
 
     Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
-    contains sums of the numbers of products:
+    contains the numbers of products that these steps add:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
     - one to move the result to the frame's origin p, p x (w_1 x w_2)
-    - two to move the other column to p, (v - p x w) x w
+    - two to move a column to p before the product, (v - p x w) x w
 
     urdfkin computes the single product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first
     rotates the two columns by R, so each of the two products has the five factors R, z, R, z and d. The bound
-    allows three products of four factors, which is more.
+    allows three products of four factors each (12 in total), which covers the 10 factors of urdfkin.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -575,8 +578,8 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     - middle angle: delta / s + delta <= 2 delta / s
 
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
-    multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. For s, the
-    function uses the smallest possible value, `apart` - delta. The functions arctan2 and sine add about 3
+    multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
+    the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. The bound includes these errors, because
     `Magnitudes.roundings` counts one joint more than the path contains.
 
@@ -615,7 +618,7 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return four times the error of R: the distance (rad) from a singularity with no valid digit."""
+    """Return four times the error of R (rad); within this distance of a singularity, no digit is correct."""
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 

@@ -53,12 +53,12 @@ class Call:
 
     Args:
         tree: The robot.
-        plan: Function that returns the compiled tree for some links.
+        plan: Function that returns the compiled tree for a list of links.
         frame: Name of a link or joint, or several names.
         reference: A `Reference` or its name.
         base: Motion of the root link; None: fixed at the world origin.
         given: The inputs of the quantity: q, or q and v, or q, v and a.
-        also: Further frames to compute, which the caller does not return.
+        also: Additional frames that are computed, but not returned to the user.
         options: Other arguments of the method, by name.
 
     Raises:
@@ -151,7 +151,7 @@ class Call:
         return out.reshape(self.n, len(self.links), *shape)
 
     def in_shape(self, result: FloatArray) -> FloatArray:
-        """Reshape a result (n, frames, ...) to the caller's batch shape; one frame has no axis of frames."""
+        """Reshape a result (n, frames, ...) to the caller's batch shape; a single frame adds no axis."""
         return result.reshape(*self.shape, *result.shape[1 if self.several else 2 :])
 
     def compute(self, evaluate: Callable[..., T], *arguments: Any, **options: Any) -> T:
@@ -189,11 +189,11 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return whether `frame` is a list, and the names."""
+    """Return True and the names for a list of names; False and the name for a single name."""
     if isinstance(frame, str):
         return False, (frame,)
     try:
-        return True, tuple(frame)[: len(frame)]  # an iterator has no length and raises TypeError
+        return True, tuple(frame)[: len(frame)]  # `len` raises TypeError for an iterator
     except TypeError:
         raise InputError(
             "a frame must be the name of a link or joint, or a list of such names",

@@ -1,4 +1,4 @@
-"""Certificates, which record the checked and the unchecked results of a robot, and `VerificationError`."""
+"""Certificates (records of a robot's checked and unchecked results), and `VerificationError`."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class LineEntry(TypedDict):
         says("Largest difference between a result and the oracle's, in eps * scale; null: not finite."),
     ]
     share: Annotated[
-        Size | None, says("Largest ratio of such a difference to its bound; null: the ratio is not finite.")
+        Size | None, says("Largest ratio of a difference to its bound; null: the ratio is not finite.")
     ]
     unchecked: Annotated[Count, says("Number of results that were returned without a check.")]
 
@@ -196,7 +196,7 @@ class Certificate(Displayable):
         return cast("CertificateDocument", plain(document))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the certificate as JSON; after an error no partial file remains.
+        """Write the certificate as JSON; if an error occurs, no partial file remains.
 
         Raises:
             SourceError: the folder does not exist, or the file cannot be written (permission, disk full).
@@ -279,7 +279,7 @@ class Ledger:
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """Return the account of a quantity; later calls return the same object."""
+        """Return the counts of a quantity; later calls return the same object."""
         if (known := self._accounts.get(quantity)) is not None:
             return known
         with _ledger_lock:
@@ -291,7 +291,7 @@ class Ledger:
             account.checked += comparison
 
     def unchecked(self, quantity: str, results: int, reason: str | None = None) -> None:
-        """Count results without a check, for a `reason`; None: calls with verify=False."""
+        """Count results that were not checked; `reason` is None for calls with verify=False."""
         account = self.account(quantity)
         with _ledger_lock:
             if reason is None:
@@ -311,5 +311,5 @@ class Ledger:
             )
 
     def __reduce__(self) -> tuple[type[Ledger], tuple[()]]:
-        # A copied ledger has no counts, because the copy may be in another process.
+        # The counts are not copied, because the copy may be used in another process.
         return type(self), ()

@@ -26,10 +26,11 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 
 
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
-    """Compare the joints and the tip of a chain with Pinocchio at q (n, nq).
+    """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the child link. A chain towards the tips reaches this frame
-    after the motion of the joint, and a chain towards the root before the motion.
+    Pinocchio's frame of a joint is the frame of the child link. In a chain that leads towards the tips, this
+    frame comes after the motion of the joint. In a chain that leads towards the root, this frame comes before
+    the motion.
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
     computes along the chain, which is a part of the two paths. The bound counts all joints and lengths of
@@ -81,7 +82,7 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
     values = path.coupling.values(path.coupling.select(verifier.tree, q))
     off = np.abs(base @ found.placement(values) - tip)[:, :3]
     return (
-        f"base . F(sign q - offset) . tool is off by at most {off[..., 3].max():.2e} m"
+        f"base . F(sign q - offset) . tool differs from Pinocchio by at most {off[..., 3].max():.2e} m"
         f" and {off[..., :3].max():.2e} rad on {len(q)} samples"
     )
 
@@ -99,7 +100,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes base and tip along two paths from the root, and the product from base to tip.
+    # Pinocchio computes base and tip relative to the root; the product computes the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + size) + left_out(path)

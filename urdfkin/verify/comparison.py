@@ -1,7 +1,7 @@
 """Compare results with an oracle's, in multiples of eps * scale and as a fraction of the bound.
 
 `disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes these
-differences in one pass, because NumPy would take as long as Pinocchio.
+differences in one pass, because the comparison with NumPy would take as long as Pinocchio's computation.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class BatchComparison:
         results: Number of compared results.
         worst: Largest difference of two numbers, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; above 1 is a failure.
-        index: Indices of the result with the largest ratio `share` in the batch.
+        index: Indices, in the batch, of the result that has this ratio.
     """
 
     results: int = 0
@@ -39,7 +39,7 @@ class BatchComparison:
     index: tuple[int, ...] = ()
 
     def __add__(self, other: BatchComparison) -> BatchComparison:
-        """Combine the comparisons of two batches, with the `index` of the batch with the larger `share`.
+        """Combine the comparisons of two batches; `index` comes from the batch with the larger `share`.
 
         A `share` of NaN counts as larger than any number.
         """
@@ -58,7 +58,7 @@ class BatchComparison:
 
 
 def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
-    """Compare urdfkin's results with the oracle's; `worst_of_each` describes `axes`."""
+    """Compare urdfkin's results with the oracle's; `axes` has the same meaning as in `worst_of_each`."""
     return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
 
 
@@ -75,7 +75,8 @@ def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
 def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> FloatArray:
     """Return |ours - theirs| in multiples of eps * scale.
 
-    The result is inf if `ours`, `theirs` or `scale` is not finite, or if different numbers have the scale 0.
+    The result is inf if `ours`, `theirs` or `scale` is not finite, or if the scale is 0 and the two numbers
+    differ.
     """
     unit = np.where(scale > 0.0, np.maximum(EPS * scale, LEAST_UNIT), 0.0)
     difference = np.abs(ours - theirs)
@@ -84,7 +85,7 @@ def disagreement(ours: FloatArray, theirs: FloatArray, scale: FloatArray) -> Flo
 
 
 def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """Return the largest `disagreement` of each result, as an array with the first `axes` axes of `ours`.
+    """Return the largest `disagreement` of each result, as an array of shape `ours.shape[:axes]`.
 
     For placements (n, frames, 4, 4), `axes` is 2, and each result is a 4 by 4 matrix. The scale can be
     broadcast to the shape of the results.

@@ -7,7 +7,8 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `check_imu` subtracts gravity from
-the oracle's result, in the sensor's axes. An error of sign or order therefore causes a disagreement.
+the oracle's result, in the sensor's axes. The two computations use different steps, so an error in the sign
+of gravity or in the order of the steps causes a disagreement.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def check_analytical_jacobian(
         bound = bounds.quaternion_jacobian_bound(bound)
         theirs = quaternion_jacobian(quat, J_v)
         # q and -q are the same rotation; urdfkin and the oracle return the quaternion with qw >= 0.
-        # If |qw| is below the rounding error, the sign of urdfkin's quaternion is accepted.
+        # If |qw| is below the rounding error, both signs of urdfkin's quaternion are accepted.
         opposite = (ours * theirs)[..., 3:, :].sum(axis=(-2, -1)) < 0.0
         flipped = opposite & (np.abs(quat[..., 3]) <= bounds.sign_limit(bound, quat.shape[:-1]))
         theirs[..., 3:, :] *= np.where(flipped, -1.0, 1.0)[..., np.newaxis, np.newaxis]
@@ -60,9 +61,10 @@ def check_relative_placement(
 ) -> tuple[FloatArray, Bound]:
     """Return an oracle's relative placements (n, frames, 4, 4), and the bound on urdfkin's error.
 
-    `bound_of` computes the bound of placements in the world. The relative placement is the pose of frame b in
-    frame a, the last frame of `x.plan`. Frame a has a path of length s_a and k_a roundings; frame b has s_b
-    and k_b. Errors in multiples of eps:
+    `bound_of` computes the bound of placements in the world. The relative placement is the pose of frame b
+    relative to frame a; frame a is the last frame of `x.plan`. The path to frame a has the length s_a and k_a
+    rounding errors; the path to frame b has the length s_b and k_b rounding errors. Errors in multiples of
+    eps:
 
     | Number | Source | Error at most |
     |---|---|---|

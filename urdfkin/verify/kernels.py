@@ -33,13 +33,13 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 #: Bit pattern of inf, as an integer.
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: Distance in rows between the compared row and the row that is loaded into the processor's cache.
+#: How many rows ahead of the compared row a row is loaded into the processor's cache.
 _AHEAD = 4
 
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
-    """Return whether a row is finite; for inf and NaN, 0 * x is NaN."""
+    """Return whether all numbers of a row are finite: if x is inf or NaN, 0 * x is NaN."""
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -63,7 +63,7 @@ def _units(difference, size):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference in row `i` of finite numbers, with row `k` of the scale."""
+    """Return the largest difference in row `i`, by row `k` of the scale; all numbers must be finite."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -83,9 +83,9 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each three numbers with a common scale to `units`, in eps * scale.
+    """Write the largest difference of each group of three numbers with the same scale to `units`.
 
-    The difference may be NaN or inf.
+    The difference is in multiples of eps * scale, and may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -99,10 +99,10 @@ def _divide_threes(ours, theirs, unit, width, units):
 
 @helper()
 def _most(x, count):
-    """Return the bit pattern of the largest of several non-negative numbers, which may be inf or NaN.
+    """Return the bit pattern of the largest of several numbers, which are non-negative, inf or NaN.
 
-    The bit patterns of non-negative doubles have the order of the doubles. The sign bit, which some
-    processors set for NaN, is removed.
+    Bit patterns of non-negative doubles, compared as integers, have the same order as the doubles. The sign
+    bit, which some processors set for NaN, is removed.
     """
     most = 0
     for j in range(count):
@@ -193,7 +193,7 @@ _LENGTHS = {
     "rotate": _unturned,
     **dict.fromkeys(("times", "dot", "cross"), _product),
 }
-_EQUATIONS: Any = ModuleType("length_equations")  # Numba finds the functions of a module
+_EQUATIONS: Any = ModuleType("length_equations")  # Numba can call functions that are attributes of a module
 vars(_EQUATIONS).update(vars(bound(decorate=helper(), **_LENGTHS)))
 _STEPS = rebound(steps, decorate=helper(), others={"eq": _EQUATIONS})
 _carried, _turned, _slid, _freed = (_STEPS[name] for name in ("carried", "turned", "slid", "freed"))
@@ -216,7 +216,7 @@ def _of_row(x, row, at):
 
 @helper()
 def _read(x, first, m, at, factor, to):
-    """Write factor * |x[k, at]| to `to` for m configurations k from `first` on; one row of `x` serves all."""
+    """Write factor * |x[k, at]| to `to` for m rows from k = `first`; a single row of `x` is repeated."""
     step = 1 if len(x) > 1 else 0
     for i in range(m):
         to[i] = _product(factor, abs(x[(first + i) * step, at]))

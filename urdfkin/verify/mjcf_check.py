@@ -1,7 +1,7 @@
 """Read an MJCF file in a process with limits on time and memory, and compare the robot with MuJoCo's model.
 
-Pinocchio checks every result with the URDF text that urdfkin writes for the tree, but not the conversion from
-the MJCF file to the tree. `load` therefore makes three comparisons:
+Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
+from the MJCF file to the tree. `load` therefore makes three comparisons:
 
 - the placements of bodies and sites with those of MuJoCo's model of the file
 - the mimic rules with the joint equalities of MuJoCo's model
@@ -159,7 +159,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Compare the mimic rules with MuJoCo's joint equalities; return the largest ratio to a bound.
+    """Compare the mimic rules with MuJoCo's joint equalities; return the largest ratio of error to bound.
 
     The result is None if there are no mimic rules.
     """
@@ -189,7 +189,7 @@ def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
 
 def _error(where: str, found: str) -> OracleError:
     return OracleError(
-        "the robot made of an MJCF file differs from the file",
+        "the robot made from an MJCF file differs from the file",
         where=where,
         found=found,
         remedy="please report this as an error of urdfkin, with the file",

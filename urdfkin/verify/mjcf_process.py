@@ -47,7 +47,7 @@ def serve() -> None:
     """Read a request from standard input and write the answers to standard output."""
     request = json.load(sys.stdin)
     try:
-        # MuJoCo writes a log file without this function.
+        # This function prevents MuJoCo from writing a log file.
         library().set_mju_user_warning(lambda message: None)
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
@@ -57,11 +57,11 @@ def serve() -> None:
             write_answer(answer)
     except Exception as error:
         write_answer(error_answer(error, "MuJoCo cannot compile this MJCF"))
-    os._exit(0)  # without the exit handlers of the libraries
+    os._exit(0)  # skips the exit handlers of the libraries
 
 
 def error_answer(error: Exception, what: str) -> dict[str, Any]:
-    """Return an answer from which `parse_answers` raises an error; `what` describes an unexpected error."""
+    """Return an answer that makes `parse_answers` raise an error; `what` describes an unexpected error."""
     if isinstance(error, UrdfkinError):
         parts = {key: getattr(error, key) for key in ("what", "where", "remedy")}
         return {"error": parts | {"found": _with_memory_hint(error.found)}}
@@ -70,7 +70,7 @@ def error_answer(error: Exception, what: str) -> dict[str, Any]:
 
 
 def _with_memory_hint(found: str | None) -> str | None:
-    """Add a hint about memory to the message "unknown exception" of MuJoCo."""
+    """Add a hint about memory to MuJoCo's message "unknown exception"."""
     return f"{found} Perhaps {_TOO_MUCH}" if found and found.endswith("unknown exception!") else found
 
 
@@ -84,7 +84,7 @@ def parse_answers(
 ) -> tuple[list[dict[str, Any]], str]:
     """Return the answers in the output of a process, and the reason why further answers are missing.
 
-    Texts of libraries, and a last line that a crash has cut off, are skipped.
+    Lines that libraries print are skipped, and also a last line that is incomplete because of a crash.
 
     Args:
         output: Output of the process.
@@ -188,7 +188,7 @@ def _pinocchio_placements(
 ) -> FloatArray:
     """Return the placements (n, bodies, 4, 4) that Pinocchio computes from an MJCF file at MuJoCo's `qpos`.
 
-    `coordinates` is the index of each joint's first number in `qpos`, by the joint's name.
+    `coordinates` maps each joint's name to the index of the joint's first number in `qpos`.
 
     Raises:
         OracleError: Pinocchio does not accept the file, or reads other joints or bodies from it.
@@ -214,7 +214,7 @@ def _pinocchio_placements(
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # a revolute joint without limits has the coordinates cosine and sine
+            else:  # a revolute joint without limits has two coordinates, the cosine and sine of its angle
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]

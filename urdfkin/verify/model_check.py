@@ -1,6 +1,7 @@
 """Check the URDF text that urdfkin writes for a `pinocchio.Model` or for a Denavit-Hartenberg table.
 
-Pinocchio checks a robot's results with the URDF text, so an error in the text would remain unnoticed.
+Pinocchio reads the same URDF text to check a robot's results, so the usual checks do not find an error in the
+text.
 
 | Source of the text | Comparison |
 |---|---|
@@ -56,7 +57,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
         raise OracleError(
-            "the robot made of a pinocchio.Model differs from the model",
+            "the robot made from a pinocchio.Model differs from the model",
             where=f"{tree.name}, {names[found.index[1]]}",
             found=f"{found.share:.3g} times the bound of rounding, Pinocchio {version()}",
             remedy="please report this as an error of urdfkin, with the model",
@@ -114,7 +115,7 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
     if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
         raise TableError(
-            "the URDF made of a table differs from the table",
+            "the URDF made from a table differs from the table",
             where=table.robot,
             found=f"a tip {off[..., 3].max():.3g} m off",
             remedy="please report this as an error of urdfkin, with the table",

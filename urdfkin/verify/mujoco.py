@@ -9,12 +9,12 @@ changes the text before MuJoCo reads it:
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
   body to the world. A planar joint becomes two slide joints and a hinge.
-- The mimic joints are coupled by `rules_of_text`, because MuJoCo's kinematics ignores constraints.
+- The mimic joints follow the rules from `rules_of_text`, because MuJoCo's kinematics ignores constraints.
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
-floating or planar joint, S also contains the rotation from the axes of the child link, in which v is, to the
-axes of the parent link, in which the slide joints are fixed.
+floating or planar joint, v is in the axes of the child link, but the slide joints are fixed in the parent
+link. S therefore also contains the rotation from the child's axes to the parent's axes.
 """
 
 from __future__ import annotations
@@ -45,12 +45,13 @@ from urdfkin.verify.pinocchio import depth_of
 
 #: Mass (kg) and moments of inertia (kg m^2) of each link while MuJoCo reads the text.
 _MASS = "1"
-#: Maximum length of a chain of links. MuJoCo rejects more than 1,023 links, but after a quadratic time.
+#: Maximum number of links in a chain, because MuJoCo's time grows with the square of this number.
+#: MuJoCo rejects chains of more than 1,023 links, but only after this time.
 _DEEPEST = 1_000
 #: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Numbers of coordinates and of joint velocities in urdfkin's layout; (1, 1) for all other kinds of joints.
+#: Numbers of coordinates and of joint velocities of a joint in urdfkin; (1, 1) for all other kinds of joints.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -67,8 +68,8 @@ class _Joint:
 class _MujocoIndices:
     """Indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
-    The joint of a moving base, which is not in urdfkin's q and v, has q = v = -1. A locked joint has v = -1,
-    and the offset is the value of the joint.
+    The joint of a moving base is not part of urdfkin's q and v, so its indices are q = v = -1. A locked joint
+    has v = -1; its offset is the value at which the joint is locked.
     """
 
     kind: str
@@ -81,7 +82,7 @@ class _MujocoIndices:
 
 
 class MujocoOracle(Oracle):
-    """MuJoCo's results for one robot. MuJoCo must support all elements of the URDF text."""
+    """MuJoCo's results for one robot; raise OracleError if MuJoCo does not support the URDF text."""
 
     title = "MuJoCo"
 
@@ -200,7 +201,7 @@ class MujocoOracle(Oracle):
         poses, velocity, acceleration = self._moved(x, 3)
         if not Reference.of(x.reference).at_world:
             return _referred(x.reference, poses, acceleration)
-        # Only a spatial acceleration can be converted to the world origin as its reference point.
+        # A spatial acceleration can be shifted to the world origin; a classical acceleration cannot.
         spatial = acceleration.copy()
         spatial[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         out, velocity = _referred(x.reference, poses, spatial), _referred(x.reference, poses, velocity)
@@ -234,7 +235,7 @@ class MujocoOracle(Oracle):
         poses = self._poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # the derivative of rotating axes contains -w x J
+        if which.own_axes:  # in rotating axes, the derivative of J has the additional term -w x J
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(which, poses, rate, columns=True)
@@ -243,7 +244,7 @@ class MujocoOracle(Oracle):
         return out
 
     def _moved(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return placements, velocities, classical accelerations (n, frames, ...) in LOCAL_WORLD_ALIGNED."""
+        """Return placements, velocities and classical accelerations (n, frames, ...), LOCAL_WORLD_ALIGNED."""
         velocity, acceleration = np.empty((2, len(x.q), len(x.frames), 6))
 
         def read(body: int, at: tuple[int, int]) -> None:
@@ -323,8 +324,7 @@ class MujocoOracle(Oracle):
             second = (S @ x.a[..., None] + self._spread_rate(q, v) @ v[..., None])[..., 0]
         rates = np.array(np.broadcast_to(rates, (n, self._model.nv)))
         if self.moving_base and base is not None:
-            # The velocity of the base's slide joints is in world axes, that of the ball joint in the base's
-            # axes.
+            # The slide joints' velocity is in world axes; the ball joint's velocity is in the base's axes.
             at, back = self._indices[0].qvel, np.swapaxes(_rotation(qpos[:, 3:7]), -1, -2)
             velocity, acceleration = np.asarray(base.velocity), np.asarray(base.acceleration)
             rates[:, at : at + 3] = velocity[..., :3]
@@ -365,7 +365,10 @@ class MujocoOracle(Oracle):
 
 
 def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return the rotation (n, 3, 3) or (n, 2, 2) of a floating or planar joint, and its slide count."""
+    """Return a floating or planar joint's rotation, and the number of slide joints that replace the joint.
+
+    The rotation has the shape (n, 3, 3) for a floating joint, and (n, 2, 2) for a planar joint.
+    """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _rotation(_unit_quaternion(coordinates)), 3

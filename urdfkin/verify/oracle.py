@@ -14,8 +14,8 @@ conversions are independent, so a wrong broadcast, order or name in one of them 
 
 Both conversions parse units with `urdfkin.errors.numbers`, and use the same values of named poses.
 
-Mimic rules: Pinocchio's model has no mimic joints (`urdfkin.verify.pinocchio`). When the first result is
-checked, this module parses the URDF text again and reads the mimic rules.
+Mimic rules: the Pinocchio model is built without mimic joints (`urdfkin.verify.pinocchio`). This module
+therefore parses the URDF text again and reads the mimic rules, when the first result is checked.
 
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
 planar joint three, a floating joint seven, and a mimic joint none. `Oracle.rules` compares this order with
@@ -53,7 +53,7 @@ from urdfkin.verify.bounds import KERNELS
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return a rule for each mimic joint in `joints`, relative to an independent joint.
+    """Return the rule of each mimic joint in `joints` as a function of an independent joint.
 
     Raises:
         ValueError: a multiplier or offset is not a number.
@@ -70,9 +70,10 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 
 
 def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
-    """Return mimic rules q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1 of independent joints.
+    """Resolve chains of mimic rules, so that each rule refers to an independent joint.
 
-    A chain of mimic joints is resolved from the independent joint on, and each rule only once.
+    The rules of a chain are combined to q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1, beginning at
+    the independent joint. Each rule is resolved only once.
     """
     known: dict[str, Mimic] = {}
     for joint in rules:
@@ -163,7 +164,7 @@ class PinocchioLayout:
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
             self._joints.append(_JointIndices(size, *full, *at[rule.leader], rule.multiplier, rule.offset))
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: Index in v and factor in G of each Pinocchio joint velocity; 0 for the base.
+        #: For each of Pinocchio's joint velocities: index in v and factor in G (both 0 for the base).
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):
@@ -172,7 +173,7 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: True if Pinocchio's coordinates, or joint velocities, are the numbers of q, or of v.
+        #: True if Pinocchio's configuration is equal to q without conversion; `_same_v`: the same for v.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -181,7 +182,7 @@ class PinocchioLayout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-        """Return indices in both vectors q, multipliers and offsets of the joints with one pair (nq, nv)."""
+        """Return Pinocchio's and urdfkin's indices, multipliers and offsets of joints of size (nq, nv)."""
         joints = [joint for joint in self._joints if joint.sizes == sizes]
         return (
             np.array([joint.full_q for joint in joints], dtype=np.int64),
@@ -221,7 +222,7 @@ class PinocchioLayout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G without the base; G adds mimic joints' columns to those of mimicked joints."""
+        """Return J_full G without the base; G adds a mimic joint's columns to its mimicked joint's."""
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)
@@ -301,7 +302,7 @@ def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
 
 
 class BaseNumbers(Protocol):
-    """Placement, velocity and acceleration of the base, as the user gave them; samples are leading axes."""
+    """Placement, velocity and acceleration of the base, as given by the user; leading axes are samples."""
 
     @property
     def placement(self) -> FloatArray:
@@ -379,7 +380,7 @@ _OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
 class _CoordinateNames:
-    """Lookup from names to indices in q or v.
+    """Map from the names of joints and coordinates to indices in q or v.
 
     Args:
         joints: Name and number of joint velocities of each joint, in order.
@@ -426,7 +427,9 @@ def _number(text: str) -> float:
     found = parse_quantity(text)
     value = parse_float(text) if found is None else found.value
     if value is None:
-        raise OracleError("the two readers read this number differently", found=repr(text[:60]))
+        raise OracleError(
+            "urdfkin and the oracle's reader read this number differently", found=repr(text[:60])
+        )
     return value
 
 
@@ -447,9 +450,9 @@ class QueryBatch(NamedTuple):
         inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv).
         reference: Reference frame, as the user gave it; without effect on placements.
         base: Motion of the base; None: fixed at the world origin.
-        joints: True: use the library's functions for joints, if the library has such functions.
-        divided: True: `frames` is a section of a longer list. Then the oracle uses its function for several
-            frames even for one frame, because a function for one frame may round differently.
+        joints: True: use the library's functions for joints, if there are any.
+        divided: True: `frames` is a section of a longer list. Then, even for one frame, the oracle uses its
+            function for several frames, because its function for a single frame may round differently.
 
     >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
     >>> x.q.shape, x.v.shape, x.reference.name
@@ -580,11 +583,12 @@ class Oracle:
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of the text. An oracle uses only the joints of the tree, for a comparison.
+        tree: urdfkin's tree of the text. An oracle uses only the tree's joints, to compare them with the
+            joints in its own model.
         mimic: True: couple mimic joints. False: every mimic joint moves freely.
-        moving_base: Build the model on a free-flyer, which receives the base's motion.
-        root_joint: Kind of the root joint that urdfkin has added to the tree, "floating" or "planar", and
-            that the text does not contain; None: urdfkin has added no joint.
+        moving_base: Whether a free-flyer with the base's motion connects the world and the root.
+        root_joint: Kind ("floating" or "planar") of the root joint that urdfkin has added to the tree; the
+            text does not contain this joint. None: urdfkin has added no joint.
         lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
 
     Attributes:
@@ -680,7 +684,7 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
     A compiled kernel computes large batches, because NumPy would take longer than Pinocchio takes for the
-    Jacobians. The kernel and NumPy return the same bits.
+    Jacobians. The results of the kernel and of NumPy are identical.
 
     Args:
         full: J_full (..., columns).

@@ -73,7 +73,7 @@ def _library(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle with a name; raise UnknownNameError, or InputError for a missing library."""
+    """Return the oracle with the given name; raise UnknownNameError, or InputError for a missing library."""
     wanted = as_str(name, "oracle")
     if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)
@@ -83,7 +83,7 @@ def oracle_library(name: object) -> OracleLibrary:
 
 
 def version(package: str) -> str:
-    """Return the version of a package, or "not installed"; for urdfkin, "a checkout"."""
+    """Return the version of a package, or "not installed"; "a checkout" if urdfkin is not installed."""
     return installed_version(package) or ("a checkout" if package == "urdfkin" else "not installed")
 
 

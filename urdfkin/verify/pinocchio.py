@@ -7,10 +7,10 @@ PyPI project `pinocchio` contains plugins for the test runner nose, in a module 
 The oracle shares no code with urdfkin's computation. Pinocchio reads the URDF text with its own parser.
 `urdfkin.verify.oracle` converts the user's arguments for Pinocchio and finds frames and joints by name.
 
-Pinocchio's model is built without mimic joints, because Pinocchio 4.1 with mimic joints refuses four of the
-robots in its own examples. `urdfkin.verify.oracle` reads the mimic rules from the text. The rules define a
-matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The suffix "full" marks
-Pinocchio's vectors, which contain numbers for the mimic joints too.
+Pinocchio's model is built without mimic joints, because Pinocchio 4.1 rejects four of its own example robots
+if their mimic joints are enabled. `urdfkin.verify.oracle` reads the mimic rules from the text. The rules
+define a matrix G and a vector g_0, with q_full = G q + g_0, v_full = G v and J = J_full G. The suffix "full"
+marks Pinocchio's vectors, which contain numbers for the mimic joints too.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from urdfkin.verify.oracle import (
     mimic_rules,
 )
 
-#: Tests compare the definitions of accelerations and J-dot with these versions of Pinocchio.
+#: Tests confirm urdfkin's definitions of accelerations and J-dot only for these versions of Pinocchio.
 _MAJOR = "4"
 _REQUIREMENT = "'pin>=4,<5'"
 
@@ -113,10 +113,10 @@ def _project_of(file: Path) -> tuple[str, str] | None:
 _STACK_FOR_A_LINK = 16_384
 #: Chains with fewer links than this number fit into any stack.
 _SHALLOW = 100
-#: Maximum nv of a robot; Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), at most 2 GB.
+#: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MOST_RATES = 315
 
-#: Number of floating-point values of a block of results, which fits into the processor's cache.
+#: Number of floating-point values in a block of results; such a block fits into the processor's cache.
 _BLOCK_SIZE = 16384
 #: Function (n) that returns the results for the next n configurations.
 _Next = Callable[[int], list[FloatArray]]
@@ -138,12 +138,12 @@ def build_model(
 ) -> Any:
     """Return Pinocchio's model of a URDF text.
 
-    Pinocchio would crash the process for a robot that needs too much memory, or for a long chain of links.
-    The robot is rejected; the chain is parsed with a larger stack.
+    Pinocchio would crash the process in two cases. A robot that needs too much memory is rejected. A long
+    chain of links is parsed with a larger stack.
 
     Args:
         text: The URDF text.
-        tree: urdfkin's tree of the text, for the size of the model.
+        tree: urdfkin's tree of the text, from which the size of the model is computed.
         root_joint: Kind of the joint between the world and the root: "floating" or "planar"; None: fixed.
         mimic: True: the mimic joints follow their mimic rules. False: each mimic joint is independent.
         lock: Value (rad or m) of each locked joint, which `buildReducedModel` removes from the model.
@@ -151,7 +151,7 @@ def build_model(
 
     Raises:
         OracleError: Pinocchio does not accept the text, or the robot is too large.
-        InstallationError: Pinocchio is missing, or a different project has its name.
+        InstallationError: Pinocchio is missing, or the module `pinocchio` belongs to a different project.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MOST_RATES:
@@ -198,7 +198,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `check` reports every known reason, so the reason of this error is unknown.
+        # `urdfkin check` reports every known reason, so the reason of this error is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,
@@ -228,7 +228,7 @@ class PinocchioOracle(Oracle):
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames.
 
-        The frame of the world becomes the frame of the base.
+        The base's frame takes the place of the world's frame in the list of frames.
         """
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
         # `appendModel` rejects equal names of a link and a joint; numbers as names avoid this error.
@@ -258,7 +258,7 @@ class PinocchioOracle(Oracle):
     def _inputs(self, x: QueryBatch, count: int) -> tuple[FloatArray, ...]:
         """Convert the first `count` of urdfkin's inputs q, v and a to Pinocchio's vectors.
 
-        The free-flyer of a moving base has its velocity and spatial acceleration in the base's axes.
+        If the base moves, the velocity and the spatial acceleration of the free-flyer are in the base's axes.
         """
         q, *v_and_a = x.inputs[:count]
         full = [self._layout.configurations(q), *map(self._layout.rates, v_and_a)]
@@ -314,7 +314,7 @@ class PinocchioOracle(Oracle):
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians; those of one frame are in blocks of configurations that fit into the cache."""
+        """Yield the Jacobians; for a single frame, in blocks of configurations that fit into the cache."""
         if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return
@@ -367,7 +367,7 @@ class PinocchioOracle(Oracle):
         return self._layout.couple(coupled_j.swapaxes(-1, -2)).swapaxes(-1, -2)
 
     def screws(self, x: QueryBatch) -> FloatArray:
-        """Return the columns (n, 6, columns) of `data.J` after `computeJointJacobians`, mimic joints too."""
+        """Return the columns (n, 6, columns) of Pinocchio's joint Jacobian, mimic joints included."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
         # Pinocchio 4.1 crashes the process if nv is 0, and returns a vector if nv is 1.
@@ -409,8 +409,8 @@ def _stacked(compute: _Next, *shape: int) -> FloatArray:
 def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
     """Write the results of n configurations to `memory` (rows, frames, ...) in blocks, and yield each block.
 
-    If `memory` has fewer than n rows, each block overwrites the previous block. Results without numbers are
-    not computed: for a Jacobian without columns, Pinocchio 4.1 crashes the process.
+    If `memory` has fewer than n rows, each block overwrites the previous block. Empty results are not
+    computed, because Pinocchio 4.1 crashes the process for a Jacobian without columns.
     """
     if 0 in memory.shape:
         yield memory

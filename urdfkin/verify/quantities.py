@@ -135,7 +135,7 @@ class Quantity:
     def ours(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        """Return urdfkin's results (n, frames, ...) for the first of `inputs` (q, v, a)."""
+        """Return urdfkin's results (n, frames, ...) for the inputs q, v and a that the quantity needs."""
         results: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
         return results
 
@@ -231,8 +231,8 @@ JACOBIAN_RATE = Quantity(
     command="jacobian-rate",
     summary="time derivative of a frame's Jacobian",
     page="Time derivative J' for joint velocities --v. The table has a row for each column of the Jacobian."
-    " In local_world_aligned, J a + J' v is the result of `urdfkin acceleration`. In local and world it is"
-    " the spatial acceleration.",
+    " In local_world_aligned, J a + J' v is the result of `urdfkin acceleration`. In local and world,"
+    " J a + J' v is the spatial acceleration.",
     example="urdfkin jacobian-rate panda --q random --v random --frame panda_hand",
 )
 HESSIAN = Quantity(
@@ -251,7 +251,8 @@ HESSIAN = Quantity(
     command="hessian",
     summary="derivatives of a frame's Jacobian by each joint coordinate",
     page="The table has a group of rows for each column of the Jacobian. Each row is the derivative of the"
-    " column by one joint coordinate. The sum of the rows times joint velocities is `urdfkin jacobian-rate`.",
+    " column by one joint coordinate. The sum of all rows, each multiplied by the velocity of its joint, is"
+    " the result of `urdfkin jacobian-rate`.",
     example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
 )
 ACCELERATION = Quantity(

@@ -31,15 +31,13 @@ from urdfkin.verify.oracle import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Bound on the difference between entries of rotation matrices that two programs compute from the same
-#: angles.
-#: Errors: one eps each for a sine and a cosine; half an eps each for two products and a sum, which is at most
-#: 1.
+#: Two programs compute a rotation matrix from the same angles: bound on the difference of two entries.
+#: A sine and a cosine have an error of one eps each; two products and a sum (at most 1), half an eps each.
 _ROTATION = 9.0 * EPS
-#: Bound on the difference between components of an axis that two programs normalise.
+#: Two programs normalise the same axis: bound on the difference of two components.
 #: The length has an error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
-#: Largest difference from 1 of the length of a normalised axis.
+#: An axis is normalised if its length differs from 1 by at most this number.
 _UNIT = 1e-6
 #: Maximum number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
@@ -83,7 +81,7 @@ def second_reading(
             contain.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    if "<!DOCTYPE" in text:  # yourdfpy would read the files and entities that a document type names
+    if "<!DOCTYPE" in text:  # yourdfpy would read the external files that a document type names
         return SecondReading(by, unread="the file has a document type")
     try:
         robot = read(text)
@@ -118,7 +116,7 @@ def read(text: str) -> yourdf.Robot:
     """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow
 
-    # The encoded text is UTF-8, even if the removed declaration names another encoding.
+    # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
     logger = logging.getLogger("yourdfpy.urdf")
     before, logger.disabled = logger.disabled, True
@@ -132,7 +130,7 @@ def read(text: str) -> yourdf.Robot:
 def _differences(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield each difference of a joint, with the known fault of yourdfpy that explains it, or ""."""
+    """Yield each difference of a joint, and the known fault of yourdfpy that explains it ("": no fault)."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""
@@ -191,7 +189,7 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield a line for each name that the two readers find a different number of times."""
+    """Yield a line for each name whose number of occurrences differs between the two readers."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:

@@ -1,12 +1,12 @@
 """Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
 *Error of J and residual.* Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <=
-|E| in the spectral norm, and also in the larger Frobenius norm, which this module uses. The matrix E is the
-sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
+|E| in the spectral norm, and therefore also in the larger Frobenius norm, which this module uses. The matrix
+E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
 
 *Orthogonality.* The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b.
-By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor between (1 -
-a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
+By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor. The factor is
+between (1 - a)^(1/2) (1 - b)^(1/2) and (1 + a)^(1/2) (1 + b)^(1/2).
 
 *Rounding.* The computed residuals have rounding errors too. The error of a sum of m products is at most m eps
 times the sum of the absolute values of the products.
@@ -56,7 +56,8 @@ class SingularValues(Displayable):
             columns.
         U: (..., rows, k) left singular vectors, directions of the frame's velocity.
         V: (..., nv, k) right singular vectors, directions of v; 0 for a joint that does not move the frame.
-        columns: The Jacobian with the names of the frame and of the joints; None for another matrix.
+        columns: The Jacobian with the names of the frame and of the joints; None if the matrix is not a
+            robot's Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -148,7 +149,8 @@ class SingularValues(Displayable):
     def condition(self) -> Between:
         """Condition number (...): the largest singular value divided by the smallest.
 
-        If the smallest singular value may be 0, the upper bound is inf.
+        If the lower bound on the smallest singular value is 0, the upper bound on the condition number is
+        inf.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -175,8 +177,9 @@ class SingularValues(Displayable):
         """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
 
         The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
-        product rule gives the derivative of the product without a division. The gradient is NaN if the
-        smallest singular value may be 0, because the manipulability may not be differentiable there.
+        manipulability is the product of all singular values; the product rule gives its derivative without a
+        division by a singular value. The gradient is NaN if the smallest singular value may be 0, because the
+        manipulability may not be differentiable there.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -210,8 +213,8 @@ def singular_values(
 ) -> SingularValues:
     """Return the singular values of some rows of finite matrices J (..., m, nv), with guaranteed bounds.
 
-    `error` bounds the error of each number of J. `moving` (nv,) is False for columns that are 0 in every
-    configuration.
+    `error` contains an upper bound on the error of each number of J. `moving` (nv,) is False for columns that
+    are 0 in every configuration.
 
     >>> found = singular_values(np.array([[3.0, 0.0], [0.0, 4.0]]), np.zeros((2, 2)), np.array([True, True]))
     >>> found.values.value.tolist(), bool(found.values.upper[0] - found.values.lower[0] < 1e-12)
@@ -229,7 +232,7 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # A lower bound that is not finite becomes 0, and an upper bound becomes inf.
+    # A lower bound that is not finite becomes 0; an upper bound that is not finite becomes inf.
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 
@@ -244,7 +247,7 @@ def _skew(U: FloatArray) -> FloatArray:
 def _norm(E: FloatArray) -> FloatArray:
     """Return an upper bound (...) on the Frobenius norm of non-negative matrices (..., m, n)."""
     largest = E.max(axis=(-2, -1), initial=0.0)
-    # The norm of a matrix that contains inf is inf.
+    # A matrix that contains inf is not scaled; its norm is inf.
     unit = np.where((largest > 0.0) & np.isfinite(largest), largest, 1.0)
     with np.errstate(over="ignore", under="ignore"):
         norm: FloatArray = unit * np.linalg.norm(E / unit[..., np.newaxis, np.newaxis], axis=(-2, -1))

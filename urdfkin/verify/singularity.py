@@ -5,11 +5,10 @@
 - Minimal dependent set: linearly dependent columns that become independent if any column is removed. The
   joints of such columns cause the loss of rank.
 
-A geometric reason, such as parallel axes, is stated only if the columns satisfy the condition of the reason
-within the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the
-axis, and a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if
-their columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column
-is 0.
+A geometric reason, such as parallel axes, is stated only if the columns satisfy the geometric condition, up
+to the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the axis,
+and a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if their
+columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column is 0.
 """
 
 from __future__ import annotations
@@ -27,17 +26,17 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 
 #: Maximum number of columns in a minimal dependent set.
 _LARGEST_SET = 4
-#: Maximum number of columns of a Jacobian that is searched for minimal dependent sets.
+#: A Jacobian with more columns than this number is not searched for minimal dependent sets.
 _MOST_COLUMNS = 16
-#: Rounding error of the singular value decomposition of a small matrix, in eps for each row and each column.
+#: Relative rounding error of a singular value decomposition, in eps times the number of rows plus columns.
 _ROUNDINGS = 16.0
-#: Largest fraction of the norm at which a singular value counts as 0, for random configurations.
+#: At random configurations, a singular value below this fraction of the norm counts as 0.
 _NEGLIGIBLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class FrameColumns:
-    """A robot's Jacobian, with the frame and the joints of its columns.
+    """A robot's Jacobian, with the names of its frame and of its joints.
 
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin in world axes.
@@ -48,8 +47,8 @@ class FrameColumns:
             for a column that does not belong to a single joint axis.
         active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the base moves. Lost directions on a moving base cannot be compared with
-            `samples`.
+        moving_base: Whether the base moves. If the base moves, lost directions cannot be compared with
+            `samples`, which have a fixed base.
     """
 
     J: FloatArray
@@ -143,7 +142,7 @@ class _Explanation:
         self._names = [columns.joints[i] for i in self._moving]
 
     def result(self, full: int, least: float) -> Singularity:
-        """Return the rank with lost directions and reasons; `least` bounds the smallest singular value."""
+        """Return the rank, lost directions and reasons; the smallest singular value is at most `least`."""
         U, s, Vt = np.linalg.svd(self._A)
         self._noise = 8.0 * self._matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
         motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
@@ -151,7 +150,7 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # An arm with fewer joints than rows loses other directions in each configuration.
+        # An arm with fewer joints than rows loses different directions in different configurations.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -168,7 +167,7 @@ class _Explanation:
         return Singularity(self._rank, full, least, lost, motions, tuple(reasons))
 
     def _of_samples(self) -> tuple[int, FloatArray]:
-        """Return the rank at random configurations, and an orthonormal basis of directions lost in all."""
+        """Return the rank at random configurations, and a basis of the directions lost in all of them."""
         samples = self._columns.samples()[:, self._rows[:, None], self._moving]
         usual = max(int(np.linalg.matrix_rank(J, tol=_NEGLIGIBLE * np.linalg.norm(J))) for J in samples)
         U, s, _ = np.linalg.svd(np.concatenate(list(samples), axis=1))
@@ -204,7 +203,7 @@ class _Explanation:
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield each minimal dependent set, as indices of the columns of joints that move the frame."""
+        """Yield each minimal dependent set, as indices among the joints that move the frame."""
         if self._A.shape[1] > _MOST_COLUMNS:
             return
         found: list[set[int]] = []
@@ -284,7 +283,7 @@ class _Explanation:
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return a sentence about the line that all joint axes intersect; None: no line."""
+        """Return a sentence about a line that all joint axes intersect; None if there is no such line."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -295,8 +294,8 @@ class _Explanation:
             return None
         point = np.cross(f, m) / (f @ f)
         return (
-            f"All axes meet, or are parallel to, the line along {_vector(f / np.linalg.norm(f))} through the"
-            f" point at {_vector(point)} m from the origin of {self._columns.frame}."
+            f"Each axis intersects or is parallel to the line along {_vector(f / np.linalg.norm(f))} through"
+            f" the point at {_vector(point)} m from the origin of {self._columns.frame}."
         )
 
     def _null_motion(self, motion: FloatArray) -> str:
@@ -321,7 +320,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return a basis of the row space with many zeros, computed by Gaussian elimination."""
+    """Return a basis of the space that the rows span; Gaussian elimination gives the basis many zeros."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -335,7 +334,7 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the space of `rows`, which are projections of orthonormal vectors."""
+    """Return an orthonormal basis of the span of `rows`, which are projections of orthonormal vectors."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
 

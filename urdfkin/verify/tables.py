@@ -9,19 +9,20 @@ motion of base b and of tip t in the world, and r = p_t - p_b:
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. This module implements
-these equations a second time, because `urdfkin.kinematics.equations` computes the table's results.
+These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame.
+`urdfkin.kinematics.equations` computes the table's results, so this module implements the equations
+independently.
 
-The bound is the sum of the rounding errors of urdfkin and of Pinocchio. For a table that was changed by
-snapping, the bound also includes the deviation that the table states. The bound on rounding errors is
-proportional to the robot's reach: the length of the paths from the root to the table's base and to its tip,
-with prismatic displacements. If the sum of all lengths in the table is larger than the reach, the bound uses
-this sum, but at most `PROMISED` times the reach. Tables with Hayati rows never exceed this limit. The bound
-on a Jacobian column is multiplied by the mimic multipliers.
+The bound is the sum of the rounding errors of urdfkin and of Pinocchio. If snapping (rounding to simple
+angles) has changed a table, the bound also includes the deviation that the table states. The bound on
+rounding errors is proportional to the robot's reach: the length of the paths from the root to the table's
+base and to its tip, with prismatic displacements. If the sum of all lengths in the table is larger than the
+reach, the bound uses this sum, but at most `PROMISED` times the reach. Tables with Hayati rows never exceed
+this limit. The bound on a Jacobian column is multiplied by the multipliers of its mimic joints.
 
-A row has only four parameters, so nearly parallel axes may need lengths of kilometres. If two such lengths
-cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this error, and
-`TableCheck.loss` states the error.
+A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
+such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
+error, and `TableCheck.loss` states the error.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ PROMISED = 10.0
 
 
 class TableError(UrdfkinError):
-    """A table and Pinocchio differ by more than rounding errors and the changes by `--snap` allow.
+    """A table and Pinocchio differ by more than rounding errors and `--snap` can explain.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.TableError, urdfkin.UrdfkinError)
@@ -143,7 +144,7 @@ def own_length(table: DHTable) -> float:
 
 
 def _loss(table: DHTable) -> str:
-    """Return a text with the length that loses digits, the size of the loss, and the remedy."""
+    """Return a text that names the length with the largest rounding error, this error, and the remedy."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -284,7 +285,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
                 weights[joint.kind.turns][names.index(leader)] += factor
     own = own_length(table)
     reach = np.maximum(reach, np.minimum(own, PROMISED * reach))
-    # `Joint.tilt` is the angle between the axis of a joint in urdfkin and in Pinocchio.
+    # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = of_rows(len(table.rows)) + of_joints(joints, 4.0 * tilt) + angles
     rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))

@@ -1,13 +1,14 @@
 """Read a USD stage in a process with limits on time and memory, and compare the robot with OpenUSD's readers.
 
-Pinocchio checks every result with the URDF text that urdfkin writes for the tree, but not the conversion from
-the USD stage (scene) to the tree. `load` therefore makes two comparisons:
+Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's checks do not cover the conversion
+from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 
-- with OpenUSD's parser UsdPhysics. Both parsers must find the same bodies, frames, degrees of freedom and
-  limits for each joint. A difference is an error.
+- with OpenUSD's parser UsdPhysics. UsdPhysics and urdfkin's parser must find the same bodies, frames, degrees
+  of freedom and limits for each joint. A difference is an error.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
   robot in one configuration, in which each link must have the placement of its prim. The file states these
-  transforms separately from the joint frames, so a difference is a warning about the file.
+  transforms separately from the joint frames. A difference means that the file contradicts itself, and is
+  only a warning.
 
 Both comparisons allow only rounding to single precision, in which a stage stores its numbers.
 """
@@ -50,7 +51,7 @@ from urdfkin.verify.verifier import Verifier
 PATIENCE = 60.0
 #: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE` (derived in `_check_joint`).
 _ROTATION = 18.0
-#: Number of roundings in a joint's origin (derived in `_check_joint`).
+#: Number of rounding errors in a joint's origin (derived in `_check_joint`).
 _ORIGIN = 3.0
 #: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE`.
 #: `_compare_prims` derives this bound.
@@ -94,7 +95,7 @@ def read_usd(
     """
     version()
     path = at_home(source)
-    read_bytes(path)  # a missing file has the usual error
+    read_bytes(path)  # raises the usual error if the file is missing
     request = {
         "path": os.path.realpath(path),
         "name": str(path),
@@ -119,7 +120,7 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
-    """Compare a robot with OpenUSD's readings of the stage from which urdfkin read the robot.
+    """Compare a robot with the data that OpenUSD reads from the same stage.
 
     Returns:
         A sentence for the certificate, and remarks about prims whose placements differ.
@@ -145,7 +146,8 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u, and the angle
       error is twice this length, 16 u. The sum is `_ROTATION` u.
-    - Origin: `_ORIGIN` roundings, of the scale factor, of the scaled origin, and of the transformed origin.
+    - Origin: three rounding errors (`_ORIGIN`): of the scale factor, of the scaled origin, and of the
+      transformed origin.
     """
     if theirs is None:
         raise _error(f"{name}, joint {path}", "the parser does not find this joint")
@@ -182,7 +184,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers about rounding to single precision, by the joint's name (`urdfkin.urdf.usd.Usd.single`).
+#: For each joint, by name: five numbers about rounding to single precision (`urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -262,8 +264,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
     - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
       quaternion changes the rotation by at most 2 u. The parallel component changes the length of the
-      quaternion, which UsdGeom does not normalize, and so changes a rotation by the angle t by at most 2 u
-      sin t. The sum is at most 4 u.
+      quaternion. UsdGeom does not normalize the quaternion, so a rotation by the angle t changes by at most 2
+      u sin t. The sum is at most 4 u.
     - Matrix: the vector of the nine errors is at most sqrt(3) u long, also after the rows are normalized. A
       rotation by a small angle t changes the matrix by a vector of length sqrt(2) t: sqrt(3/2) u.
     """
@@ -273,7 +275,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
-    if tree.links[0] in prims:  # the stage may place the root anywhere
+    if tree.links[0] in prims:  # the root's pose in the stage is arbitrary, so all poses are relative to it
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
     of_links = single_precision(tree, answer["single"]).links
@@ -309,7 +311,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         words = (
             f"UsdGeom places {len(remarks)} of the {len(prims)} prims elsewhere, by up to {worst[0]:.3g} m"
         )
-        # An error of one body moves all bodies after it, so only the first difference is a remark.
+        # An error of one body displaces all bodies after it, so only the first difference is reported.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

@@ -4,7 +4,7 @@ A USD stage (scene) can require any amount of time and memory, or crash OpenUSD'
 in C++. The request and the answer are JSON on standard input and standard output.
 
 OpenUSD's package UsdPhysics has its own code for bodies, joint frames and limits. The answer contains the
-numbers of UsdPhysics and of `urdfkin.urdf.usd`.
+data from UsdPhysics and from `urdfkin.urdf.usd`, for a comparison.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def serve() -> None:
         write_answer(answer_of(request))
     except Exception as error:
         write_answer(error_answer(error, "OpenUSD cannot read this stage"))
-    os._exit(0)  # without the exit handlers of the libraries
+    os._exit(0)  # skips the exit handlers of the libraries
 
 
 def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
@@ -67,7 +67,7 @@ def _second_reading(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # A joint with PhysicsArticulationRootAPI also has the description of an articulation.
+            # A joint with PhysicsArticulationRootAPI also has the description of an articulation: skip it.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _described(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}

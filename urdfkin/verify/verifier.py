@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.tree_parameters import TreeParameters
     from urdfkin.verify.tables import TableCheck
 
-#: Number of random configurations in the check of a table; the zero configuration and the limits are added.
+#: Number of random configurations in the check of a table, besides the zero configuration and the limits.
 TABLE_SAMPLES = 40
 
 #: True: check all results of a call. "sample": check `SAMPLE` configurations of a call. False: check none.
@@ -73,7 +73,7 @@ class Verifier:
     Args:
         text: The URDF text that Pinocchio reads.
         tree: urdfkin's tree of the same text.
-        origin: The arguments of `load`, from which an error message makes a command that repeats a
+        origin: The arguments of `load`. An error message uses them for a command that repeats the
             computation.
         policy: Default of the argument `verify` of a robot's methods.
         mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
@@ -109,7 +109,7 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot, built at the first call; a moving base has a free-flyer.
+        """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer.
 
         Raises:
             OracleError: the oracle does not accept the text, or reads other joints from it.
@@ -131,7 +131,7 @@ class Verifier:
         """Return a new `pinocchio.Model` of the robot, for the user.
 
         Raises:
-            OracleError: Pinocchio does not accept the text, or reads another robot from it.
+            OracleError: Pinocchio does not accept the text, or reads a different robot from it.
         """
         if self.unverifiable is not None:
             raise OracleError(self.unverifiable, where=self.tree.name)
@@ -145,8 +145,8 @@ class Verifier:
         )
 
     def locked(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        """Return the verifier of the robot with more locked joints."""
-        # Pinocchio may accept this robot, even if it refuses the robot with more moving joints.
+        """Return the verifier of this robot with additional locked joints."""
+        # Pinocchio may accept a robot with fewer moving joints, even if it has refused the original robot.
         known = self.unverifiable if self.unverifiable not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
@@ -174,7 +174,7 @@ class Verifier:
         return self._refusals.get(by.name)
 
     def policy_of_call(self, verify: Verify | None) -> Verify:
-        """Return the valid value of the argument `verify` of a call; None becomes the robot's `policy`."""
+        """Return the value of `verify` for a call; None means the robot's `policy`."""
         return as_verify(self.policy if verify is None else verify)
 
     def require_pinocchio(self, verify: Verify | None) -> None:
@@ -322,8 +322,8 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table; return None, with a warning, if Pinocchio cannot check the robot.
 
-        A warning also reports that very large lengths in the table cause rounding errors above the usual
-        bound.
+        If very large lengths in the table cause rounding errors above the usual bound, a warning reports
+        this.
 
         Raises:
             TableError: urdfkin and Pinocchio differ by more than the bound.
@@ -348,7 +348,7 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Compare the placements of all links from tree parameters with Pinocchio's; return a line of text.
+        """Compare the links' placements from Khalil-Kleinfinger parameters with Pinocchio's; return a text.
 
         The result is None, with a warning, if Pinocchio cannot check the robot.
 
@@ -425,7 +425,9 @@ def oracle_results_with_bound(
 
 
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
-    """Return the bound on the difference between urdfkin's results and the oracle's, for broadcasting.
+    """Return the bound on the difference between urdfkin's results and the oracle's.
+
+    The arrays of the bound can be broadcast to the shape of the results.
 
     The length of a path without prismatic joints is the same in every configuration. The bound of a placement
     or a Jacobian on a fixed base is then computed for one configuration, stored, and used for all.
@@ -479,8 +481,8 @@ def as_verify(verify: object) -> Verify:
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
-    A sample is random with a fixed seed, because every k-th configuration of an ordered batch could be
-    biased.
+    The sample is random with a fixed seed. In an ordered batch, a regular choice, such as every k-th
+    configuration, could be biased.
     """
     step = min(_MOST, max(1, _PART_SIZE // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

@@ -1,8 +1,8 @@
 """Enclosures: intervals that provably contain the true values of one sample.
 
 Interval arithmetic (`urdfkin.verify.exact.numbers`) evaluates `urdfkin.kinematics.equations` for the decimals
-in the URDF text and the exact values of q, v and a. An enclosure proves a bound on the rounding error, but
-not the equations, which the agreement with Pinocchio supports.
+in the URDF text and the exact values of q, v and a. An enclosure proves a bound on the rounding error. An
+enclosure does not prove that the equations are correct; the comparison with Pinocchio checks the equations.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
-#: Minimum number of decimal digits (that of a double) and maximum number (for a limited time).
+#: Decimal digits: at least 15, the precision of a double, and at most 10,000, to limit the computing time.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])
@@ -45,7 +45,9 @@ _ENDS = np.vectorize(ends, otypes=[float, float])
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Enclosure:
-    """Bounds of the true value of each number in a result, in the shape of the result of the `Robot` method.
+    """Lower and upper bounds of the true value of each number in a result.
+
+    The arrays have the shape of the result of the `Robot` method.
 
     Attributes:
         quantity: Name of the quantity.
@@ -67,7 +69,7 @@ class Enclosure:
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is between `lower` and `upper`; other shapes raise InputError."""
+        """Return whether each number of `x` is between `lower` and `upper`; check the shape of `x`."""
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 

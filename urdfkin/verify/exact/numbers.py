@@ -4,7 +4,8 @@ An interval consists of a midpoint with many digits, and a radius. The library A
 that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
 triples of intervals.
 
-`read_exact` reads the decimals of a URDF text, which `urdfkin.urdf.lint` has checked, without rounding them.
+`read_exact` reads the decimals of a URDF text without rounding them. The text has already been checked by
+`urdfkin.urdf.lint`.
 """
 
 from __future__ import annotations
@@ -29,14 +30,14 @@ from urdfkin.system.locks import lock_over_forks
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.verify.bounds import DecimalErrors
 
-#: Number of digits in the accuracy study, enough to measure an error in the last of a double's 16 digits.
+#: Number of digits in the accuracy study, enough to measure the rounding errors of doubles (16 digits).
 DIGITS = 50
 #: Twice the 15 decimal digits of a double.
 _TWO_DOUBLES = 30
 #: Number of bits for each decimal digit of an interval.
 _BITS = math.log2(10.0)
-#: Number of additional bits of an interval. 15 digits, the precision of a double, then have 55 bits.
-#: With 53 bits, an interval could be four times as wide as the distance of two doubles.
+#: Number of additional bits of an interval: 15 digits, the precision of a double, then have 55 bits.
+#: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _MORE_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT = 17
@@ -51,7 +52,8 @@ _ONE_THREAD = lock_over_forks()
 def enough_digits(joints: int) -> int:
     """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    Each joint on the path to the frame adds one digit. A joint with an oblique axis needs a third of a digit.
+    Each joint on the path to the frame adds one digit. This is enough, because a joint with an oblique axis
+    loses only about a third of a digit.
     """
     return _TWO_DOUBLES + joints
 
@@ -73,7 +75,7 @@ def exact(value: Number) -> Number:
 
 def ends(x: Number) -> tuple[float, float]:
     """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
-    if isinstance(x, int):  # most numbers of a large robot are zeros
+    if isinstance(x, int):  # a fast path, because most numbers of a large robot are the integer 0
         return float(x), float(x)
     return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
 
@@ -157,9 +159,9 @@ def from_quaternion(quaternion: Sequence[Number], kind: NumberType = BALLS) -> M
 def nearest_rotation(M: Matrix) -> Matrix:
     """Return the rotation U nearest to M, from the polar decomposition M = U H; M must be nearly a rotation.
 
-    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The orthogonal
-    factor of the result X = U (1 + E) is also U. From X^T X - 1 = 2 E + E^2, and because the eigenvalues of E
-    are above -1, follow |E| <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of
+    Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
+    (1 + E) has the same orthogonal factor U as M. From X^T X - 1 = 2 E + E^2, and because the eigenvalues of
+    E are above -1, follow |E| <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of
     each interval.
     """
     with ctx.workprec(ctx.prec + _SPARE):
@@ -205,10 +207,10 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
 ) -> dict[int, ExactJoint]:
-    """Read the exact numbers of the joints with the indices `among` (None: all), by index in the tree.
+    """Return the exact numbers of the joints with the indices `among` in the tree (None: all), by index.
 
     Raises:
-        InputError: the text does not contain a joint, except for the `root_joint` of `load`.
+        InputError: a joint is not in the text, and is not the root joint that `load` has added.
     """
     exact_text = _ExactText(text, kind)
     indices = range(len(tree.joints)) if among is None else among
@@ -223,7 +225,7 @@ def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArra
     return _ExactText(text).conversion(tree, path, q)
 
 
-@lru_cache(maxsize=1)  # parsing a large URDF takes longer than computing the intervals of one sample
+@lru_cache(maxsize=1)  # parsing a large URDF is slower than computing the intervals of one sample
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = BALLS) -> None:
         self.kind = kind
@@ -242,7 +244,7 @@ class _ExactText:
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
     def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
-        """Return the joint `free`, locked at a double."""
+        """Return a fixed joint: the joint `free` at the value in `lock`."""
         R, p = free.R, free.p
         value = free.multiplier * self.kind.number(lock.q) + free.offset
         if lock.joint.kind.turns:
@@ -271,7 +273,7 @@ class _ExactText:
         return x, y, z
 
     def has_quaternion(self, origin: Element | None) -> bool:
-        """Return whether an origin's rotation is `quat_xyzw`; before URDF 1.1 this attribute is ignored."""
+        """Return whether `quat_xyzw` gives an origin's rotation; URDF before 1.1 ignores this attribute."""
         return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
 
     def rotation(self, origin: Element | None) -> Matrix:
@@ -281,7 +283,7 @@ class _ExactText:
         return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.kind)
 
     def rule(self, name: str) -> tuple[Number, Number]:
-        """Return M and C of a mimic joint's value M q + C, with the value q of the independent joint."""
+        """Return M and C of a mimic joint's value M q + C, where q is the value of the independent joint."""
         multiplier, offset = self.kind.number(1.0), self.kind.number(0.0)
         elements = self.elements
         while (rule := elements[name].find("mimic")) is not None and elements[name].get("type") != "fixed":
@@ -317,7 +319,7 @@ class _ExactText:
         return DecimalErrors(angles, rules, np.array(lengths))
 
     def value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
-        """Return bounds on a joint's value and its rounding error; `at`: values of independent joints."""
+        """Return bounds on a joint's value and its rounding error; `at`: the independent joints' values."""
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
             return _ValueBound(abs(at[name]), 0.0, 0.0, 0)
@@ -332,7 +334,7 @@ class _ValueBound(NamedTuple):
 
     Attributes:
         moved: |M q|.
-        offset: Sum of the absolute values of the terms of C, one for each mimic rule.
+        offset: Sum of the absolute values of the terms of C; C has one term for each mimic rule.
         error: Rounding error of the value, in eps, if a program applies the rules one after the other.
         rules: Number of mimic rules.
     """

@@ -1,8 +1,8 @@
 """The forward recursion of section 7.7, computed with intervals that contain the true values.
 
 The inputs are the URDF's decimals and the exact values of q, v and a. The equations are those of
-`urdfkin.kinematics.equations`, in world axes as in the textbook. The results measure rounding errors;
-Pinocchio's results check the equations.
+`urdfkin.kinematics.equations`, in world axes as in the textbook. The results serve to measure rounding
+errors; the equations are checked by comparison with Pinocchio.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: Axis of the child link, and True for a rotation, for each joint velocity of a planar or floating joint.
+#: For each joint velocity of a planar or floating joint: axis in the child link, and True for a rotation.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -37,7 +37,7 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Convert the motion of one base to the state of the root link, with the nearest exact rotation."""
+    """Convert the base's motion to the root link's state, with the rotation nearest to the given matrix."""
 
     def vector(x: FloatArray) -> Vector:
         return exact(x[0]), exact(x[1]), exact(x[2])
@@ -65,9 +65,9 @@ def move(
     *,
     base: State | None = None,
 ) -> ExactMotion:
-    """Return the motion of the links of `joints` in one sample; without `base`, the root link is fixed.
+    """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
-    `joints` is a result of `read_exact`, in which a joint comes after all joints on its path to the root.
+    `joints` is a result of `read_exact`, in which each joint comes after the joints between it and the root.
     """
     q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
@@ -131,7 +131,7 @@ def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Refer
     """Return the spatial acceleration (6,) of a link, [linear; angular].
 
     The linear part at the frame's origin is the classical acceleration minus w x vel. In WORLD, the linear
-    part is that of the body point at the world origin, which is smaller by alpha x p.
+    part refers to the body point at the world origin, so alpha x p is subtracted.
     """
     s = motion.states[link]
     linear = equations.minus(s.acc, equations.cross(s.w, s.vel))
@@ -156,7 +156,7 @@ def hessian_values(motion: ExactMotion, link: int, reference: Reference) -> NDAr
     """Return the Hessian (6, nv, nv) of a link."""
     out = np.zeros((motion.nv, motion.nv, 6), dtype=object)
     for of, by, factor, six in _RECURSION.hessian(motion.states[link], motion.columns[link], reference):
-        # The product of an interval and a NumPy array is not defined.
+        # Each number is multiplied separately, because NumPy cannot multiply an interval by an array.
         out[of, by] += _array([factor * x for x in six])
     return out.transpose(2, 0, 1)
 
