@@ -164,7 +164,7 @@ def _cell(value: Units | str) -> str:
 
 
 #: Factor by which the largest disagreement of a robot may grow without a regression.
-#: The maximum over random samples varies by smaller factors.
+#: Smaller factors are normal, because the samples are random.
 FACTOR = 2.0
 #: Largest disagreement (in eps * scale) that is never a regression; a single rounding can be as large.
 FLOOR = 2.0
@@ -234,7 +234,7 @@ class ChangeEntry(TypedDict):
 class ComparisonDocument(Header):
     """The output of `urdfkin report compare --format json`.
 
-    The header entry `sha256` lists the robots of the new report.
+    The header entry `sha256` contains the SHA-256 of each robot's text in the new report.
     """
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
@@ -307,7 +307,10 @@ def by_source(document: Document) -> dict[str, ReportedRobot]:
 
 
 def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
-    """Return renamed files, old to new source: only one missing and one new source have the robot's name."""
+    """Return the new source of each renamed file, by old source.
+
+    A file is renamed if a robot's name has exactly one missing source and exactly one new source.
+    """
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1

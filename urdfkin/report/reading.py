@@ -117,8 +117,8 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
             yield f"`model`: joint {joint['name']}: wrong index in q or v"
     if (model["nq"], model["nv"]) != (q, v) or (len(model["coordinates"]), len(model["rates"])) != (q, v):
         yield (
-            f"`model`: the joints have {q} coordinates and {v} joint velocities, which differ from"
-            " `nq` and `nv`"
+            "`model`: `nq`, `nv`, `coordinates` or `rates` is wrong:"
+            f" the joints have {q} coordinates and {v} joint velocities"
         )
 
 

@@ -45,7 +45,7 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if math.isfinite(max(found.written)):
         off = f"in every configuration no frame is off by more than {_both(*found.written)}"
     if found.up_to_single:
-        cause = "each joint differs by no more than the rounding of its own numbers"
+        cause = "each joint differs by no more than the rounding of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
     if found.within_single and found.single is not None:
         single = f"rounding to single precision can move a frame by up to {_both(*found.single)}"
@@ -122,8 +122,8 @@ def far_frames(found: Sameness) -> list[Interval]:
 def farthest(found: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    For the verdict "same up to single precision", the heading lists the changes of B, because this verdict is
-    about unchanged models and the distances are distances after the changes.
+    The distances are distances after the changes of B, but the verdict "same up to single precision" is about
+    the models without changes. For this verdict, the heading therefore lists the changes.
     """
     changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
     return f"Largest distance over all configurations within limits{changed}"
@@ -134,7 +134,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return a text with the distance of a frame without changes of B; empty if it is only rounding."""
+    """Return a text with the distance of a frame if B is not changed; empty if only rounding causes it."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -143,7 +143,7 @@ def as_written(found: Sameness) -> str:
 def where(found: Sameness, frame: Interval) -> str:
     """Return the configuration at which a lower bound is attained, with units.
 
-    The text has the coordinates of A, and the coordinates of joints of B that no joint of A moves.
+    The text has the coordinates of A, and the coordinates of those joints of B that match no joint of A.
     """
     from urdfkin.model.configuration import coordinate_names, units
 

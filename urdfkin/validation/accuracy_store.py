@@ -90,7 +90,7 @@ class AccuracyResult:
         self._store.write_entry(key, STUDY_SUFFIX, pack(key, {"accuracy": found}))
 
     def stamp(self, robot: int) -> str:
-        """Return the sha256 of the robot's text, which identifies the text to which a result belongs."""
+        """Return the sha256 of the robot's text; a result is valid only for the text with this sha256."""
         return self._store.manifest.robots[robot][1]
 
     def _check_same(self, other: AccuracyResult) -> None:

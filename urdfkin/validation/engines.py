@@ -137,7 +137,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, RobotTasks] | None:
-        """Return a task for an idle worker, preferably of a new robot, and the robot's other tasks."""
+        """Return a task for an idle worker, and the robot's remaining tasks; prefer a new robot."""
         for tasks in self._waiting:
             self._begun.append(tasks)
             if (task := self.next(tasks)) is not None:

@@ -1,8 +1,9 @@
 """Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
 
 The file `robots/features.toml` defines small robots, each with one feature of URDF. For robots of the
-catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimals of
-the URDF, and configurations from digests of names. Therefore, the files depend only on these texts.
+catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimal
+numbers in the URDF. Configurations are computed from sha256 digests of names. Therefore, the vectors depend
+only on the URDF and the names.
 """
 
 from __future__ import annotations
@@ -66,8 +67,8 @@ _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: A multiple of 1 / 1024 has few decimals and is exactly a double.
 _GRID = 1024.0
-#: Number of digits of a tolerance, and number of digits before the last rounding.
-#: The first rounding removes differences between processors.
+#: Number of digits of a tolerance, and number of digits to which it is first rounded.
+#: Results of different processors differ in the last digits; the first rounding removes these digits.
 _DIGITS, _FIRST_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -257,7 +258,7 @@ def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArr
 
 
 def _tolerance(k: float, scale: float) -> str:
-    """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
+    """Return k * eps * scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_DIGITS):
