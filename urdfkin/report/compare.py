@@ -163,7 +163,7 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else units(value)
 
 
-#: Factor by which the largest disagreement of a robot may grow without a regression.
+#: It is a regression if the largest disagreement of a robot grows by more than this factor.
 #: Smaller factors are normal, because the samples are random.
 FACTOR = 2.0
 #: Largest disagreement (in eps * scale) that is never a regression; a single rounding can be as large.
@@ -250,7 +250,7 @@ COMPARISON = DocumentKind(
 
 
 def compare(old: Document, new: Document, factor: float = FACTOR) -> ReportComparison:
-    """Compare two reports; the largest disagreement of a robot may grow by `factor` without a regression."""
+    """Compare two reports; a growth of a robot's largest disagreement above `factor` is a regression."""
     changes = [*_run(old, new), *_robots(old, new, factor)]
     return ReportComparison(tuple(changes), tuple(new["sha256"]))
 
@@ -307,9 +307,9 @@ def by_source(document: Document) -> dict[str, ReportedRobot]:
 
 
 def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
-    """Return the new source of each renamed file, by old source.
+    """Return the new source of each renamed file; the key is the old source.
 
-    A file is renamed if a robot's name has exactly one missing source and exactly one new source.
+    A file counts as renamed if exactly one missing and exactly one new source have the same robot name.
     """
     gone, new = _by_name(before, after), _by_name(after, before)
     return {

@@ -31,7 +31,7 @@ from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports in a history, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of latest runs with marks on a terminal, and in the charts of the page.
+#: Number of latest runs that are shown: as marks on a terminal, and in the charts of the page.
 MARKED, CHARTED = 20, 60
 #: Number of latest changes (and of runs on a terminal) that are shown without --all.
 SHOWN = 20
@@ -39,7 +39,7 @@ SHOWN = 20
 _LISTED = 500
 #: Mark of each verdict; the empty verdict belongs to a run without the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: Lower end of the chart of disagreements: common logarithm of the ratio to the bound.
+#: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _LOWEST = -3.0
 
 

@@ -85,7 +85,7 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Return a text with the largest distance and angle between matching frames; empty: only rounding."""
+    """Describe the largest distance and angle between matching frames; empty if they are rounding errors."""
 
     def largest(end: str) -> float:
         return max((getattr(frame, end) for frame in frames), default=0.0)
@@ -105,7 +105,7 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Return a text with the distance and the angle of two matching frames; empty: only rounding."""
+    """Describe the distance and the angle of two matching frames; empty if they are rounding errors."""
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
     if frame.radians > FACTOR * rounding[1]:
         parts.append(up_to(angle, frame.radians_seen, frame.radians))
@@ -122,8 +122,8 @@ def far_frames(found: Sameness) -> list[Interval]:
 def farthest(found: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    The distances are distances after the changes of B, but the verdict "same up to single precision" is about
-    the models without changes. For this verdict, the heading therefore lists the changes.
+    The distances are computed after the changes of B, but the verdict "same up to single precision" is about
+    the unchanged models. For this verdict, the heading therefore lists the changes.
     """
     changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
     return f"Largest distance over all configurations within limits{changed}"
@@ -134,7 +134,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return a text with the distance of a frame if B is not changed; empty if only rounding causes it."""
+    """Describe the distance of a frame for the unchanged model B; empty if it is a rounding error."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -218,7 +218,7 @@ PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
 
 
 def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
-    """Return a row of the table with the titles `PAIRS` for each pair."""
+    """Return the rows of the table with the titles `PAIRS`: one row for each pair of models."""
     rows = list[tuple[str, ...]]()
     for one in found:
         words = "equivalent" if one.verdict is Verdict.SAME_AFTER else one.verdict.value

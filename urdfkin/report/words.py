@@ -89,7 +89,7 @@ def in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return the headings of the table of robots, each with its quantities."""
+    """Return the quantities in each column of the table of robots; the key is the heading."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name

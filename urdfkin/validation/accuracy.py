@@ -217,7 +217,7 @@ def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
 
 
 def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
-    """Return columns of matrices (..., rows, nv)."""
+    """Return the columns of matrices (..., rows, nv) that `indices` selects."""
     return np.take_along_axis(J, indices[..., np.newaxis, :], axis=-1)
 
 

@@ -1,7 +1,7 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-`accuracy.json` contains the settings. The result of each robot is a file in the folder of the chunks,
-with a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
+`accuracy.json` contains the settings. Each robot's result is a file with a checksum, in the same folder as
+the chunks. The name of the file is the sha256 of all data on which the numbers in the file depend.
 """
 
 from __future__ import annotations

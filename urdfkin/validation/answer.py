@@ -35,8 +35,8 @@ class Failure:
         verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
         summary: Summary of the readable parts of the robot.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the failure is temporary, because the process or the cluster caused it, not the
-            robot. A temporary failure is not stored, so a resumed run computes the chunk again.
+        passing: Whether the failure is temporary: the process or the cluster caused it, not the robot. A
+            temporary failure is not stored, so a resumed run computes the chunk again.
     """
 
     verdict: ValidationVerdict
@@ -93,7 +93,7 @@ def _name_and_message(error: Exception) -> str:
 
 #: Reasons that a report gives if the process of a robot crashed.
 CRASHED = "the process that validated the robot crashed"
-CRASHED_TWICE = "the process that validated the robot crashed twice; the second process had no other robot"
+CRASHED_TWICE = "the process that validated the robot crashed twice; the second process had only this robot"
 
 
 def crash_failure(subject: RobotInput, reason: str, cause: str) -> Failure:
@@ -107,7 +107,7 @@ _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """A file does not contain the results of its chunk; the message states the reason."""
+    """A file is damaged or belongs to another chunk; the message states the reason."""
 
 
 def encode_answer(key: str, found: Answer) -> bytes:
@@ -118,7 +118,11 @@ def encode_answer(key: str, found: Answer) -> bytes:
 
 
 def decode_answer(key: str, content: bytes) -> Answer:
-    """Return the answer of a chunk; raise DamagedError if the file is damaged or belongs to another chunk."""
+    """Return the answer in the file of a chunk.
+
+    Raises:
+        DamagedError: The file is damaged or belongs to another chunk.
+    """
     body = unpack(key, content)
     try:
         if "failure" in body:

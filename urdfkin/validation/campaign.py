@@ -191,7 +191,7 @@ def _can_be_loaded(subject: RobotInput) -> bool:
 
 
 def stored(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store; a complete store gives the report of an uninterrupted run.
+    """Return the report of a store; if the store is complete, the report equals that of an uninterrupted run.
 
     The report of an incomplete store is marked as interrupted.
 
@@ -277,7 +277,7 @@ def chunks_of_shard(robots: int, cut: Cut, shard: str | None = None) -> list[ran
     """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
     The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read
-    only once. Another form of the shard raises InputError.
+    by one shard only. Another form of the shard raises InputError.
 
     >>> chunks_of_shard(2, Cut(1000), "1/4"), chunks_of_shard(2, Cut(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])

@@ -262,7 +262,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Release a robot's text on the workers after its last chunk; the text can be sent again."""
+        """Delete a robot's text on the workers if no sent chunk needs the text; it can be sent again."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]

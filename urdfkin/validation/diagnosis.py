@@ -62,7 +62,7 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return how much of the largest difference a mistake does not explain, as a fraction; 0: nothing.
+        """Return the fraction of the largest difference that a mistake does not explain.
 
         `predicted` contains urdfkin's results with the mistake. With `n`, only the first n results are
         compared.
@@ -384,7 +384,7 @@ class Mistakes:
         return tuple(found)
 
     def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the joint orders of other tools that are permutations of urdfkin's order."""
+        """For each known tool, yield the mistake that the joints are in this tool's order."""
         if self.conversion is not None:
             return
         from urdfkin.model.conventions import BUILT_IN
@@ -407,7 +407,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield, for each link, the mistake that the function computes the frame of this link."""
+        """For each link, yield the mistake that the function uses this link's frame."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return
@@ -425,7 +425,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield (0.0, sentence) for each wrong column of a Jacobian; 0.0 means fully explained."""
+    """Yield (0.0, sentence) for each wrong column that a mistake explains; 0.0: nothing is unexplained."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

@@ -121,7 +121,7 @@ class ReportedFinding(TypedDict):
     name: Annotated[str | None, says("Name of the link or joint with the problem; null: none.")]
     oracle: Annotated[
         Literal["refuses", "differs"] | None,
-        says("refuses: Pinocchio refuses the file. differs: Pinocchio reads another robot. null: neither."),
+        says("refuses: Pinocchio refuses the file. differs: Pinocchio misreads the file. null: neither."),
     ]
     also: Annotated[list[int], says("Line numbers of further findings that are merged into this finding.")]
 

@@ -33,8 +33,8 @@ class OraclePair:
 
     Attributes:
         failed: Number of results outside their bound.
-        worst: The largest disagreement in multiples of eps * scale; for Pinocchio too, this is the scale of
-            urdfkin's comparison with the second oracle.
+        worst: The largest disagreement in multiples of eps * scale. The scale is that of urdfkin and the
+            second oracle, also if the library is Pinocchio.
         share_of_bound: The largest ratio of a disagreement to its bound.
     """
 

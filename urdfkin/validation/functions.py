@@ -518,8 +518,8 @@ class _Run:
 
         The conversion rounds each joint angle before the angle is passed to the user's function. The rounded
         angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix has
-        an error of up to 2 eps |q|, and so has each term of the result, which contains this matrix as a
-        factor. The conversion of a base velocity by a matrix has at most 16 rounding errors.
+        an error of up to 2 eps |q|. Each term of the result has this matrix as a factor, so its relative
+        error is the same. The conversion of a base velocity by a matrix has at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
@@ -666,7 +666,7 @@ def _call(
             total.error(sample, f"{kind}, expected real numbers", configurations)
             return None
         found = np.array(given, dtype=np.float64)
-    except (Exception, SystemExit) as error:  # an exception of the user's code is a result of the check
+    except (Exception, SystemExit) as error:  # the check reports an exception of the user's code
         total.error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
         return None
     if found.shape != shape:

@@ -153,7 +153,7 @@ class Program:
         return answer
 
     def _start(self) -> None:
-        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  the file stays open while the process runs
+        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  no `with`: the file stays open while the process runs
         try:
             self._process = subprocess.Popen(
                 self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0

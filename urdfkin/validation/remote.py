@@ -20,9 +20,10 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of a worker for a chunk, one of three tuples:
-#: ("answer", the pickled answer), or ("died", the signal or exit status of the second crash),
-#: or ("other code", the versions of the worker), if these versions differ from the client's versions.
+#: Return value of a worker for a chunk: a word and a value.
+#: The value of "answer" is the pickled answer.
+#: The value of "died" is the signal or exit status of the second crash.
+#: The value of "other code" contains the worker's versions, which differ from the client's versions.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

@@ -62,7 +62,7 @@ LICENCE = "CC0-1.0"
 #: Number of configurations of each robot; the first is the zero configuration.
 #: If a joint's limits exclude zero, the joint is at the limit nearest to zero instead.
 SAMPLES = 3
-#: Bound of velocities, accelerations, and positions of planar and floating joints.
+#: Largest absolute value of velocities, of accelerations, and of positions of planar and floating joints.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: A multiple of 1 / 1024 has few decimals and is exactly a double.
@@ -77,7 +77,7 @@ SPATIAL_ACCELERATION = replace(
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
 #: The quantities of the test vectors.
-#: The scales of the classical and of the spatial acceleration include the difference w x vel.
+#: The classical and the spatial acceleration differ by w x vel; the scale of each includes this term.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -272,7 +272,7 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The files of one robot: vectors as JSON and as lines, and the URDF if it was written.
+    """The files of one robot: vectors as JSON and as lines of text, and the URDF if it was written.
 
     Attributes:
         numbers: Number of values in each file of vectors.

@@ -50,7 +50,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Then only the worker has this end of the pipe, so the pipe closes when the worker ends.
+            # Close this process's copy of the worker's end, so that the pipe closes when the worker ends.
             theirs.close()
 
     @property
