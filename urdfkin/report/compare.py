@@ -10,8 +10,8 @@ A change is a regression in these cases:
 - The worst disagreement grew by more than a factor, and is above the error of a single rounding.
 - The ratio of the worst disagreement to the bound grew by more than a factor, and is above a tenth.
 
-A changed model is not a regression: the report lists the changed axes, placements, limits and mimic rules of
-the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
+A changed model is not a regression; the report only lists the changed axes, placements, limits and mimic
+rules of the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ class ValidationRun(TypedDict):
     share_of_bound: Units
     versions: Annotated[dict[str, str], says("Versions of urdfkin, its libraries and the oracles.")]
     changes: Annotated[
-        list[ChangeEntry], says("Changes since the run before, as `urdfkin report compare` lists them.")
+        list[ChangeEntry], says("Changes since the previous run, as `urdfkin report compare` lists them.")
     ]
 
 
@@ -378,7 +378,7 @@ def _latest_verdicts(found: History, points: Sequence[Point]) -> list[str]:
 
 
 def changes(found: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes, each with the index of the run; the latest first, in each run regressions first."""
+    """Return all changes, each with the index of its run; latest runs first, in a run regressions first."""
     found_changes = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
     return sorted(found_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 

@@ -100,7 +100,7 @@ def as_html(document: Document) -> str:
 
 
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and the text of each file; a path is relative to the page, and the page is last.
+    """Yield the path and the text of each file; paths are relative to the page, which is the last file.
 
     If all details together are longer than `MOST` characters, each robot has its own file. For the page
     `report.html`, these files are in the folder `report-robots`.

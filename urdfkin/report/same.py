@@ -30,7 +30,7 @@ HEADS = ("frame", "at least", "at most", "angle at most")
 #: The question whether the two robots are equivalent.
 EQUIVALENT = SameQuestion()
 #: Factor above 1: distances up to FACTOR * (rounding error) count as rounding and are not printed.
-#: The sum of several terms has additional rounding errors.
+#: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
 #: Heading for joints whose mimic joints can exceed their limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
@@ -204,9 +204,9 @@ def _worst_case(found: Sameness, frames: Sequence[Interval]) -> list[str]:
 
 
 def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
-    """Return the changes of B and the differences; both are empty for the verdict "up to single precision".
+    """Return the changes of B and the differences.
 
-    With `all_`, both are always complete.
+    Both lists are empty for the verdict "up to single precision". With `all_`, both are always complete.
     """
     if found.up_to_single and not all_:
         return (), []

@@ -1,7 +1,7 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
 `accuracy.json` contains the settings. Each robot's result is a file with a checksum, in the same folder as
-the chunks. The name of the file is the sha256 of all data on which the numbers in the file depend.
+the chunks. The file name is the sha256 of all data that determine the numbers in the file.
 """
 
 from __future__ import annotations

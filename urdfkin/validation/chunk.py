@@ -32,7 +32,7 @@ from urdfkin.verify.oracles import PINOCCHIO
 DRAWN = 25
 #: Number of special configurations before the random configurations.
 SPECIAL = 3
-#: Minimum number of chunks of a robot with at least 200 samples, so that several workers can share the robot.
+#: A robot with at least 200 samples has at least this number of chunks, so that several workers can share it.
 _MIN_CHUNKS = 8
 #: Maximum number of draws in a chunk.
 #: For a typical robot, 40 draws take one second and give a few kilobytes of results.

@@ -300,7 +300,7 @@ class ReportedSecondReading(TypedDict):
     """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
     by: Annotated[str, says("Name and version of the second reader.")]
-    joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]
+    joints: Annotated[Count, says("Number of compared joints, fixed joints included.")]
     differences: Annotated[
         list[str], says("Differences between the two readings, each caused by an error of one reader.")
     ]

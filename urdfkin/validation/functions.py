@@ -300,7 +300,7 @@ def verify_function(
         raise InputError("the function to check must be callable", found=safe_repr(function))
     row = quantity_of(quantity)
     if row.of != "frames" or row is ACCELERATION_BREAKDOWN:
-        raise InputError("a function cannot be compared with this quantity", found=quantity)
+        raise InputError("urdfkin cannot check functions that compute this quantity", found=quantity)
     run = _Run(
         function,
         robot,

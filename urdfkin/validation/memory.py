@@ -16,7 +16,8 @@ from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
-#: Bytes that Pinocchio 4.1.0 needs (measured): PER_CUBE * nv^3 for the workspace, and PER_LINK for each link.
+#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for the workspace, and _PER_LINK bytes for each link.
+#: These numbers were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
 #: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
 _ARRAYS = 12
