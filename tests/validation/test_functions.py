@@ -336,7 +336,7 @@ def test_a_function_is_compared_without_an_oracle_and_the_result_says_so() -> No
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [({"quantity": "torque"}, "torque"), ({"quantity": "joint jacobian"}, "cannot be compared"),
+    [({"quantity": "torque"}, "torque"), ({"quantity": "joint jacobian"}, "cannot check functions"),
      ({"factor": 0.0}, "factor must be positive"), ({"samples": -1}, "samples"), ({"frame": "hand"}, "hand")],
 )  # fmt: skip
 def test_a_wrong_argument_is_an_error(arguments: dict[str, Any], words: str) -> None:

@@ -206,7 +206,7 @@ def _worst_case(found: Sameness, frames: Sequence[Interval]) -> list[str]:
 def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
     """Return the changes of B and the differences.
 
-    Both lists are empty for the verdict "up to single precision". With `all_`, both are always complete.
+    Without `all_`, both lists are empty for the verdict "same up to single precision".
     """
     if found.up_to_single and not all_:
         return (), []
