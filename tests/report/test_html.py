@@ -149,7 +149,7 @@ def test_failed_robots_come_first_are_open_and_have_the_command_that_computes_th
     assert rows == [verdict for verdict, _ in heads]
     panda = text[text.index('data-verdict="disagrees"') :]
     failures = panda.index("Results outside their bound")
-    assert failures < panda.index("Distributions against the bound")
+    assert failures < panda.index("Disagreements and bounds")
     assert failures < panda.index("urdfkin velocity panda --frame") < panda.index("<h3>Checks</h3>")
 
 
@@ -191,7 +191,7 @@ def banner(document: Document) -> list[str]:
 def test_the_banner_states_the_results_of_the_computation_and_of_the_model() -> None:
     document = arms()
     computation, model = banner(document)
-    assert computation.startswith("Does urdfkin compute right? Verified against Pinocchio")
+    assert computation.startswith("Are urdfkin's results correct? Verified against Pinocchio")
     assert model.startswith("Is the model right? No errors and no warnings")
     assert "No model was read" in banner(document | {"robots": []})[1]
     (note, *_) = document["robots"][0]["findings"]

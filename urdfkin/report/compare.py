@@ -10,8 +10,8 @@ A change is a regression in these cases:
 - The worst disagreement grew by more than a factor, and is above the error of a single rounding.
 - The ratio of the worst disagreement to the bound grew by more than a factor, and is above a tenth.
 
-A changed model is not a regression: the report lists the changed axes, placements, limits and mimic rules of
-the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
+A changed model is not a regression; the report only lists the changed axes, placements, limits and mimic
+rules of the joints. A renamed file is not a regression: robots are matched by the robot name in the file.
 """
 
 from __future__ import annotations
@@ -163,8 +163,8 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else units(value)
 
 
-#: Factor by which the largest disagreement of a robot may grow without a regression.
-#: The maximum over random samples varies by smaller factors.
+#: It is a regression if the largest disagreement of a robot grows by more than this factor.
+#: Smaller factors are normal, because the samples are random.
 FACTOR = 2.0
 #: Largest disagreement (in eps * scale) that is never a regression; a single rounding can be as large.
 FLOOR = 2.0
@@ -234,7 +234,7 @@ class ChangeEntry(TypedDict):
 class ComparisonDocument(Header):
     """The output of `urdfkin report compare --format json`.
 
-    The header entry `sha256` lists the robots of the new report.
+    The header entry `sha256` contains the SHA-256 of each robot's text in the new report.
     """
 
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
@@ -250,7 +250,7 @@ COMPARISON = DocumentKind(
 
 
 def compare(old: Document, new: Document, factor: float = FACTOR) -> ReportComparison:
-    """Compare two reports; the largest disagreement of a robot may grow by `factor` without a regression."""
+    """Compare two reports; a growth of a robot's largest disagreement above `factor` is a regression."""
     changes = [*_run(old, new), *_robots(old, new, factor)]
     return ReportComparison(tuple(changes), tuple(new["sha256"]))
 
@@ -307,7 +307,10 @@ def by_source(document: Document) -> dict[str, ReportedRobot]:
 
 
 def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
-    """Return renamed files, old to new source: only one missing and one new source have the robot's name."""
+    """Return the new source of each renamed file; the key is the old source.
+
+    A file counts as renamed if exactly one missing and exactly one new source have the same robot name.
+    """
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1

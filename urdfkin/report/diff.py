@@ -53,7 +53,7 @@ def pairs_markdown(found: Sequence[Changes]) -> str:
 
 
 def lines_of(found: Changes) -> list[str]:
-    """Return the changes as lines; after a joint's changes, a line states the distance that a frame moves."""
+    """Return the changes as lines; after a joint's changes, a line states how far they move a frame."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     by_element: dict[str, list[ModelChange]] = {}
     for change in found.changes:

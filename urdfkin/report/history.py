@@ -31,7 +31,7 @@ from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports in a history, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of latest runs with marks on a terminal, and in the charts of the page.
+#: Number of latest runs that are shown: as marks on a terminal, and in the charts of the page.
 MARKED, CHARTED = 20, 60
 #: Number of latest changes (and of runs on a terminal) that are shown without --all.
 SHOWN = 20
@@ -39,7 +39,7 @@ SHOWN = 20
 _LISTED = 500
 #: Mark of each verdict; the empty verdict belongs to a run without the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
-#: Lower end of the chart of disagreements: common logarithm of the ratio to the bound.
+#: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _LOWEST = -3.0
 
 
@@ -58,7 +58,7 @@ class ValidationRun(TypedDict):
     share_of_bound: Units
     versions: Annotated[dict[str, str], says("Versions of urdfkin, its libraries and the oracles.")]
     changes: Annotated[
-        list[ChangeEntry], says("Changes since the run before, as `urdfkin report compare` lists them.")
+        list[ChangeEntry], says("Changes since the previous run, as `urdfkin report compare` lists them.")
     ]
 
 
@@ -103,7 +103,7 @@ class HistoryDocument(Header):
     runs: Annotated[list[ValidationRun], says("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
     unusable: Annotated[list[Unused], says("Files that cannot be used, each with the reason.")]
-    repeated: Annotated[list[Unused], says("Files that repeat a validation run of another file.")]
+    repeated: Annotated[list[Unused], says("Files with the same validation run as another file.")]
 
 
 HISTORY = DocumentKind(
@@ -123,7 +123,7 @@ class History:
         robots: For each robot, the results in each run. The key is the robot's source in the latest run.
             Worse verdicts come first.
         unusable: Files that cannot be used, with the reason.
-        repeated: Files that repeat the run of another file.
+        repeated: Files with the same validation run as another file.
     """
 
     runs: list[ValidationRun] = field(default_factory=list)
@@ -378,7 +378,7 @@ def _latest_verdicts(found: History, points: Sequence[Point]) -> list[str]:
 
 
 def changes(found: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes, each with the index of the run; the latest first, in each run regressions first."""
+    """Return all changes, each with the index of its run; latest runs first, in a run regressions first."""
     found_changes = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
     return sorted(found_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 

@@ -48,12 +48,12 @@ if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-#: Maximum number of robots of a page whose details are all open when the page loads.
+#: If a page has at most this number of robots, the details of all robots are open when the page loads.
 _OPEN = 1
 #: Maximum number of failed robots whose details are open when the page loads.
 _FAILURES_OPEN = 20
-#: Maximum number of robots with histograms, each of which takes a second.
-#: In a larger report, only robots that are not verified have histograms.
+#: If a report has more robots than this number, only robots that are not verified have histograms.
+#: The reason is computing time: the histograms of one robot take a second.
 _DRAWN = 100
 #: Maximum number of characters of all details in one page; otherwise, each robot has a separate file.
 MOST = 5_000_000
@@ -100,7 +100,7 @@ def as_html(document: Document) -> str:
 
 
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and the text of each file; a path is relative to the page, and the page is last.
+    """Yield the path and the text of each file; paths are relative to the page, which is the last file.
 
     If all details together are longer than `MOST` characters, each robot has its own file. For the page
     `report.html`, these files are in the folder `report-robots`.

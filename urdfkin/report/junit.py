@@ -1,6 +1,6 @@
 """JUnit XML of a report, and of the checks of `urdfkin verify`.
 
-The layout conforms to the schema of Jenkins, junit-10.xsd, which other programs read too. The text of the
+The layout conforms to junit-10.xsd, the schema of Jenkins; other programs also accept it. The text of the
 element `failure` contains all information, because some programs ignore the attributes of this element.
 """
 

@@ -28,7 +28,7 @@ def print_document(out: Console, document: TextDocument) -> None:
 
 
 def print_table(out: Console, table: Table) -> None:
-    """Print a table with numbers at six digits; a name in the first column is never split over two lines.
+    """Print a table with six digits of each number; a name in the first column is never split over two lines.
 
     Numbers below the rounding error of the table's largest number are shown as 0. On a narrow terminal, a
     long name is on its own line above the other cells of the row. This line is left out if the previous row

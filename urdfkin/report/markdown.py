@@ -47,7 +47,7 @@ def as_markdown(document: Document) -> str:
     foot = [
         "",
         *_cross_check_table(document["robots"]),
-        "Worst disagreement for each quantity in eps·scale; rounding gives 1 to 10.",
+        "Worst disagreement for each quantity in eps·scale; rounding errors give 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
         " To repeat the run:</sub>",

@@ -74,7 +74,7 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
 
 
 def reason(robot: ReportedRobot) -> str:
-    """Return the reason of a verdict without the errors in the file, which the page lists as findings."""
+    """Return the reason of a verdict without errors in the file, because the page lists them as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -194,7 +194,8 @@ def _share(check: ReportedCheck, subject: int) -> float:
     """Return an upper estimate of (disagreement / bound) for one frame, joint or column.
 
     The document has no bound for a single frame, joint or column. Therefore, the disagreement is divided by
-    the smallest bound of the check. The estimate is at most the largest ratio in the check.
+    the smallest bound of the check. If this quotient is larger than the
+    largest ratio in the check, the function returns the largest ratio, which is an upper bound too.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     if not value:  # a disagreement of 0 lies within every bound

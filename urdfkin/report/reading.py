@@ -34,7 +34,7 @@ from urdfkin.validation.robot_summary import chain_disagreement, reader_disagree
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
 #: nq and nv of each kind of joint.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(_WITH_AXIS, (1, 1))
-#: Tolerance of rotation matrices and unit axes, which may come from text with 6 digits.
+#: Tolerance of rotation matrices and unit axes; texts may give their numbers with only 6 digits.
 _ROUNDED = 1e-5
 
 
@@ -117,8 +117,8 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
             yield f"`model`: joint {joint['name']}: wrong index in q or v"
     if (model["nq"], model["nv"]) != (q, v) or (len(model["coordinates"]), len(model["rates"])) != (q, v):
         yield (
-            f"`model`: the joints have {q} coordinates and {v} joint velocities, which differ from"
-            " `nq` and `nv`"
+            "`model`: `nq`, `nv`, `coordinates` or `rates` is wrong:"
+            f" the joints have {q} coordinates and {v} joint velocities"
         )
 
 

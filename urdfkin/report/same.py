@@ -30,7 +30,7 @@ HEADS = ("frame", "at least", "at most", "angle at most")
 #: The question whether the two robots are equivalent.
 EQUIVALENT = SameQuestion()
 #: Factor above 1: distances up to FACTOR * (rounding error) count as rounding and are not printed.
-#: The sum of several terms has additional rounding errors.
+#: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
 #: Heading for joints whose mimic joints can exceed their limits.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
@@ -45,7 +45,7 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if math.isfinite(max(found.written)):
         off = f"in every configuration no frame is off by more than {_both(*found.written)}"
     if found.up_to_single:
-        cause = "each joint differs by no more than the rounding of its own numbers"
+        cause = "each joint differs by no more than the rounding of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
     if found.within_single and found.single is not None:
         single = f"rounding to single precision can move a frame by up to {_both(*found.single)}"
@@ -85,7 +85,7 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Return a text with the largest distance and angle between matching frames; empty: only rounding."""
+    """Describe the largest distance and angle between matching frames; empty if they are rounding errors."""
 
     def largest(end: str) -> float:
         return max((getattr(frame, end) for frame in frames), default=0.0)
@@ -105,7 +105,7 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Return a text with the distance and the angle of two matching frames; empty: only rounding."""
+    """Describe the distance and the angle of two matching frames; empty if they are rounding errors."""
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
     if frame.radians > FACTOR * rounding[1]:
         parts.append(up_to(angle, frame.radians_seen, frame.radians))
@@ -122,8 +122,8 @@ def far_frames(found: Sameness) -> list[Interval]:
 def farthest(found: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    For the verdict "same up to single precision", the heading lists the changes of B, because this verdict is
-    about unchanged models and the distances are distances after the changes.
+    The distances are computed after the changes of B, but the verdict "same up to single precision" is about
+    the unchanged models. For this verdict, the heading therefore lists the changes.
     """
     changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
     return f"Largest distance over all configurations within limits{changed}"
@@ -134,7 +134,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Return a text with the distance of a frame without changes of B; empty if it is only rounding."""
+    """Describe the distance of a frame for the unchanged model B; empty if it is a rounding error."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -143,7 +143,7 @@ def as_written(found: Sameness) -> str:
 def where(found: Sameness, frame: Interval) -> str:
     """Return the configuration at which a lower bound is attained, with units.
 
-    The text has the coordinates of A, and the coordinates of joints of B that no joint of A moves.
+    The text has the coordinates of A, and the coordinates of those joints of B that match no joint of A.
     """
     from urdfkin.model.configuration import coordinate_names, units
 
@@ -204,9 +204,9 @@ def _worst_case(found: Sameness, frames: Sequence[Interval]) -> list[str]:
 
 
 def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
-    """Return the changes of B and the differences; both are empty for the verdict "up to single precision".
+    """Return the changes of B and the differences.
 
-    With `all_`, both are always complete.
+    Without `all_`, both lists are empty for the verdict "same up to single precision".
     """
     if found.up_to_single and not all_:
         return (), []
@@ -218,7 +218,7 @@ PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
 
 
 def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
-    """Return a row of the table with the titles `PAIRS` for each pair."""
+    """Return the rows of the table with the titles `PAIRS`: one row for each pair of models."""
     rows = list[tuple[str, ...]]()
     for one in found:
         words = "equivalent" if one.verdict is Verdict.SAME_AFTER else one.verdict.value

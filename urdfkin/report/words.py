@@ -65,7 +65,7 @@ def percent(share: Units) -> str:
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """Return the largest value; None is infinity."""
+    """Return the largest value; None means infinity, in the values and in the result."""
     largest = 0.0
     for value in values:
         if value is None:
@@ -89,7 +89,7 @@ def in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return the headings of the table of robots, each with its quantities."""
+    """Return the quantities in each column of the table of robots; the key is the heading."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name
@@ -117,7 +117,7 @@ def share_cell(robot: ReportedRobot) -> str:
 
 
 def error_cells(line: ReportedAccuracyLine) -> list[str]:
-    """Return the worst errors and then the typical errors, each of urdfkin and of Pinocchio."""
+    """Return four cells: the worst errors of urdfkin and of Pinocchio, then their typical errors."""
     both = line["urdfkin"], line["pinocchio"]
     return [*(f"{one['worst']:.2f}" for one in both), *(f"{one['typical']:.3f}" for one in both)]
 
@@ -158,7 +158,7 @@ def second_oracle_heads(title: str) -> list[str]:
 
 
 def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[tuple[str, list[str]]]:
-    """Yield each quantity with its cells for `second_oracle_heads`, over all robots."""
+    """Yield (quantity, cells) for each row of the table of the second oracle; a row covers all robots."""
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name) if "second_oracle" in check]
         if checks:

@@ -1,7 +1,7 @@
 """Accuracy study: errors of urdfkin and of Pinocchio relative to values with at least fifty digits.
 
-The values with fifty digits are intervals that contain the true values. Therefore, no error is
-underestimated. Errors are in eps * scale, like the numbers of a validation report.
+Each value with fifty digits is an interval that contains the true value. Therefore, no error is
+underestimated. Errors are given in multiples of eps * scale, as in a validation report.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(exact, otypes=[object])
-#: Representations of the orientation in each of the two lines for analytical Jacobians.
+#: The result has two lines for analytical Jacobians.
+#: Each line covers these representations of the orientation.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -102,15 +103,16 @@ def accuracy_study(
 
     The quantities are each link's placement, velocity, Jacobian, analytical Jacobians, Jacobian rate and
     acceleration. The configurations are the first random configurations of `validate`. One configuration
-    takes almost a second. `base` is the motion of the root link: one motion, or (samples, ...). Without
-    `base`, the root link is fixed.
+    takes almost a second. `base` is the motion of the root link: one motion for all samples, or one motion
+    for each sample. Without `base`, the root link is fixed.
 
     The result has one line for the analytical Jacobians of all twelve sequences of Euler angles, and one line
     for the analytical Jacobians of quaternions. Angles about fixed axes (such as roll, pitch and yaw) are
     left out: they have the same Jacobians as the corresponding Euler angles, with the rows in reverse order.
-    Samples nearer to a singularity than `Robot.analytical_jacobian` accepts are skipped. A sample is also
-    skipped if rounding errors make the sign of the quaternion uncertain. Pinocchio computes no analytical
-    Jacobians. Therefore, the study inserts the rotation and the Jacobian of each library into eq. 7.122.
+    A sample is skipped if it is so close to a singularity that `Robot.analytical_jacobian` raises an error. A
+    sample is also skipped if rounding errors make the sign of the quaternion uncertain. Pinocchio computes no
+    analytical Jacobians. Therefore, the study inserts the rotation and the Jacobian of each library into
+    eq. 7.122.
 
     Raises:
         OracleError: Pinocchio does not accept the robot.
@@ -204,10 +206,10 @@ class _AccuracyBatch:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return indices (n, links, most) of the Jacobian's columns that move each link.
+    """Return, for each link, the indices of the Jacobian's columns that are not zero (n, links, most).
 
-    Here `most` is the largest number of columns that move a link. For a link with fewer such columns, the
-    remaining indices are those of zero columns.
+    Here `most` is the largest number of such columns of a link. If a link has fewer such columns, indices of
+    zero columns follow.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
@@ -215,12 +217,15 @@ def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
 
 
 def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
-    """Return columns of matrices (..., rows, nv)."""
+    """Return the columns of matrices (..., rows, nv) that `indices` selects."""
     return np.take_along_axis(J, indices[..., np.newaxis, :], axis=-1)
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations (m, 3, 3), with the signs of the quaternions `near`."""
+    """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
+
+    Of the two quaternions q and -q of a rotation, the function returns the one closer to `near` (m, 4).
+    """
     K = davenport(R)
     q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))

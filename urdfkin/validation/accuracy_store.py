@@ -1,7 +1,7 @@
 """Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
 
-`accuracy.json` contains the settings. The result of each robot is a file in the folder of the chunks,
-with a checksum. The name of the file is the sha256 of all data on which the numbers in the file depend.
+`accuracy.json` contains the settings. Each robot's result is a file with a checksum, in the same folder as
+the chunks. The file name is the sha256 of all data that determine the numbers in the file.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class AccuracyResult:
         self._store.write_entry(key, STUDY_SUFFIX, pack(key, {"accuracy": found}))
 
     def stamp(self, robot: int) -> str:
-        """Return the sha256 of the robot's text, which identifies the text to which a result belongs."""
+        """Return the sha256 of the robot's text; a result is valid only for the text with this sha256."""
         return self._store.manifest.robots[robot][1]
 
     def _check_same(self, other: AccuracyResult) -> None:

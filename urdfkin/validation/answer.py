@@ -1,7 +1,7 @@
-"""Answer of a worker to a chunk (a result, or the reason of a failure), and the files that contain answers.
+"""Run a chunk, return a result or the reason of a failure, and save this answer in a file.
 
-Each exception of a robot becomes an answer. An answer is plain data, because some exceptions cannot be sent
-between processes.
+If an exception occurs while a robot is validated, the answer contains the exception's message. An answer is
+plain data, because some exceptions cannot be sent between processes.
 
 A file contains an answer as compressed JSON, with the key of the chunk and a checksum (sha256). A file may
 come from another machine, so it contains no code. Damaged, truncated, renamed and foreign files are detected
@@ -35,8 +35,8 @@ class Failure:
         verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
         summary: Summary of the readable parts of the robot.
         error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the process or the cluster caused the failure, not the robot. A passing failure is
-            not stored, so that a resumed run computes the chunk again.
+        passing: Whether the failure is temporary: the process or the cluster caused it, not the robot. A
+            temporary failure is not stored, so a resumed run computes the chunk again.
     """
 
     verdict: ValidationVerdict
@@ -91,9 +91,9 @@ def _name_and_message(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split()) or 'no message'}"
 
 
-#: Reasons in the report for a robot that crashed its process.
+#: Reasons that a report gives if the process of a robot crashed.
 CRASHED = "the process that validated the robot crashed"
-CRASHED_TWICE = "the process that validated the robot crashed twice; the second process computed nothing else"
+CRASHED_TWICE = "the process that validated the robot crashed twice; the second process had only this robot"
 
 
 def crash_failure(subject: RobotInput, reason: str, cause: str) -> Failure:
@@ -107,7 +107,7 @@ _MOST = 2**27
 
 
 class DamagedError(Exception):
-    """A file does not contain the results of its chunk; the message states the reason."""
+    """A file is damaged or belongs to another chunk; the message states the reason."""
 
 
 def encode_answer(key: str, found: Answer) -> bytes:
@@ -118,7 +118,11 @@ def encode_answer(key: str, found: Answer) -> bytes:
 
 
 def decode_answer(key: str, content: bytes) -> Answer:
-    """Return the answer of a chunk; raise DamagedError if the file is damaged or belongs to another chunk."""
+    """Return the answer in the file of a chunk.
+
+    Raises:
+        DamagedError: The file is damaged or belongs to another chunk.
+    """
     body = unpack(key, content)
     try:
         if "failure" in body:

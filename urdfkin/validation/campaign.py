@@ -121,7 +121,7 @@ def validate(
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
     given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
-    pinocchio()  # a missing Pinocchio is reported before the work
+    pinocchio()  # raises an error before the work starts if Pinocchio is missing
     found, unread = subjects(given, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
@@ -141,11 +141,13 @@ def validate(
             if saved is not None:
                 campaign.use(saved)
             for i, error in unread.items():
-                for index in collector.missing(i):  # after one failed chunk, no chunk is missing
+                # The loop ends after one chunk, because the robot has then failed.
+                for index in collector.missing(i):
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
-                load_kernels()  # a compilation in a worker would count as a robot's computing time
+                # If a worker compiled the kernels, this time would count as a robot's computing time.
+                load_kernels()
                 begin = time.perf_counter()
             collector.begin()
             _engine(jobs, isolate, executor).run(campaign.work(), campaign.enter)
@@ -189,7 +191,7 @@ def _can_be_loaded(subject: RobotInput) -> bool:
 
 
 def stored(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store; a complete store gives the report of an uninterrupted run.
+    """Return the report of a store; if the store is complete, the report equals that of an uninterrupted run.
 
     The report of an incomplete store is marked as interrupted.
 
@@ -217,7 +219,7 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
-    """Return the accuracy results of the compared robots, and whether no result is missing."""
+    """Return the accuracy results of the compared robots, and whether each robot has a result."""
     if not store.has_study:
         return (), True
     from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy
@@ -228,13 +230,12 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in found), None not in found
 
 
-#: Compiled kernels save time for runs with more samples than this number.
-#: The first number applies to kernels on disk, the second to kernels that must be compiled.
+#: Number of samples above which kernels save time: kernels on disk, and kernels that must be compiled.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
 def _kernels_pay(samples: int) -> bool:
-    """Return whether kernels save more time on these samples than their loading or compilation takes."""
+    """Return whether kernels save more time on these samples than it takes to load or compile them."""
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
 
 
@@ -276,7 +277,7 @@ def chunks_of_shard(robots: int, cut: Cut, shard: str | None = None) -> list[ran
     """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
     The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read
-    only once. Another form of the shard raises InputError.
+    by one shard only. Another form of the shard raises InputError.
 
     >>> chunks_of_shard(2, Cut(1000), "1/4"), chunks_of_shard(2, Cut(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])

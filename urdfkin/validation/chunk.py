@@ -32,7 +32,7 @@ from urdfkin.verify.oracles import PINOCCHIO
 DRAWN = 25
 #: Number of special configurations before the random configurations.
 SPECIAL = 3
-#: Minimum number of chunks of a robot with at least 200 samples, so that several workers can share the robot.
+#: A robot with at least 200 samples has at least this number of chunks, so that several workers can share it.
 _MIN_CHUNKS = 8
 #: Maximum number of draws in a chunk.
 #: For a typical robot, 40 draws take one second and give a few kilobytes of results.
@@ -44,11 +44,11 @@ class Chunk:
     """A range of samples of one robot.
 
     Attributes:
-        seed: Seed of the samples. This seed and the index of a draw initialize the draw's random generator.
+        seed: Seed of the samples. The random generator of a draw starts from this seed and the draw's index.
         index: Index of the chunk among the robot's chunks.
         first: Index of the chunk's first draw.
         samples: Number of random configurations.
-        memory: Bytes that the robot may use; None: half of the free memory of the machine.
+        memory: Number of bytes that the check of the robot may use; None: half of the machine's free memory.
     """
 
     subject: RobotInput

@@ -31,15 +31,15 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At most _PER_THREAD * (threads of all workers) + _MORE chunks are sent and not yet answered.
+#: At most _PER_THREAD * (threads of all workers) + _MORE chunks are on the cluster at the same time.
 #: With this number of chunks, no thread waits for its next chunk.
 _PER_THREAD, _MORE = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
-#: A robot can only crash the process of its chunks, not Dask's worker.
+#: The number is high because a robot cannot crash a Dask worker: each chunk runs in a separate process.
 _TRIES = 20
 #: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
-#: Packages that must have the same version on the scheduler and in this process, if the scheduler has them.
+#: If the scheduler has one of these packages, its version must equal the version in this process.
 _COMPARED = ("urdfkin", "pin")
 _NO_ROBOT = RobotInput(b"", Origin(""))
 
@@ -54,8 +54,8 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
 
     Args:
         scheduler: Address of a running scheduler, such as `tls://host:8786`; or `local:N` for N workers on
-            this machine, which end with the engine and open no port.
-        tell: Callback for messages: the number of workers, and the dashboard of a running scheduler.
+            this machine. Local workers open no port, and end with the engine.
+        tell: Callback for messages: the number of workers, and the address of the scheduler's dashboard.
 
     Raises:
         ClusterError: No scheduler answers at the address, or the versions of urdfkin or Pinocchio differ.
@@ -86,7 +86,7 @@ def _client(scheduler: str) -> Iterator[Client]:
             with client:
                 yield client
             return
-        # Dask would wait for ever if another thread deleted the client that failed.
+        # Delete the failed client in this thread: if another thread deleted it, Dask would wait for ever.
         gc.collect()
         keyed = "; give Dask the cluster's certificate and key, as docs/campaigns.md describes"
         raise ClusterError(
@@ -106,7 +106,7 @@ def _client(scheduler: str) -> Iterator[Client]:
 
 
 class _Portless:
-    """Base class for a Dask scheduler and a Dask worker without a web page, which all users could open."""
+    """Base class that starts no web server, because all users of the machine could open Dask's web page."""
 
     def start_http_server(self, *_: object, **__: object) -> None:
         """Override Dask's method and start no web server."""
@@ -200,7 +200,7 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: Task of each chunk that is sent but not yet answered, and how many times the chunk was sent.
+        #: Task of each chunk on the cluster, and how many times the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
         #: Text of each robot on the workers, and the number of chunks that need this text.
         self._robots: dict[int, Future[bytes]] = {}
@@ -245,7 +245,7 @@ class Cluster:
             self._robots.clear()
 
     def _limit_now(self) -> int:
-        """Return the maximum number of chunks that may be sent but not yet answered."""
+        """Return the maximum number of chunks that may be on the cluster at the same time."""
         if time.monotonic() - self._counted > _INTERVAL and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
             self._limit, self._counted = _PER_THREAD * threads + _MORE, time.monotonic()
@@ -262,7 +262,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Release a robot's text on the workers after its last chunk; the text can be sent again."""
+        """Delete a robot's text on the workers if no sent chunk needs the text; it can be sent again."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]

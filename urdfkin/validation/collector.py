@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-Results of adjacent chunks are added as they arrive, so memory does not grow with the number of samples. The
-order of the addition is the order of the chunks, so the sums do not depend on the order of arrival.
+When a result arrives, it is added to the results of adjacent chunks, so memory does not grow with the number
+of samples. The sum does not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class CampaignProgress:
         robots_done: Number of robots that are complete or failed.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_kept: Number of finished chunks from an earlier run.
-        failures: Number of robots so far that disagree or could not be checked.
+        failures: Number of robots so far that have a disagreement or could not be checked.
         label: Name of the current robot.
     """
 
@@ -130,7 +130,7 @@ class _RobotAnswers:
             self._add(range(index, index + 1), found)
 
     def _add(self, chunks: range, found: ChunkResult) -> None:
-        """Add a result to the sums of the adjacent ranges of chunks."""
+        """Insert a result; if adjacent chunks have results, replace these results by the sum."""
         at = next((i for i, (run, _) in enumerate(self._sums) if run.start > chunks.start), len(self._sums))
         if at and self._sums[at - 1][0].stop == chunks.start:
             at -= 1
@@ -159,7 +159,7 @@ class _RobotAnswers:
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
         """Return the report of the robot; `wanted` is the requested number of samples."""
-        # Results after the failed chunk are left out: their number depends on the speed of the workers.
+        # Results after the first failed chunk are left out: how many exist depends on the workers' speed.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._sums if run.start < last]

@@ -72,7 +72,7 @@ def tallies(
 
 
 def frame_bytes(samples: int, nv: int) -> int:
-    """Return the bytes of a frame's largest array: the Jacobians, or the placements if nv is small."""
+    """Return the size in bytes of one frame's largest array: Jacobians, or placements if nv is small."""
     return samples * 8 * max(16, 6 * nv)
 
 
@@ -102,7 +102,7 @@ class _Block(_ComparisonBatch):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # The robot caches the compiled tree of all frames only.
+        # If the block has all frames, the compiled tree is in the robot's cache.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
@@ -116,8 +116,8 @@ class _Block(_ComparisonBatch):
     def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
         """Yield the error statistics of each quantity.
 
-        The result for a joint is the result for the joint's child link. Pinocchio computes the two results
-        with different functions.
+        urdfkin computes the results for a joint and for the joint's child link only once, because they are
+        equal. Pinocchio computes them with two different functions.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
@@ -195,7 +195,10 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations of `free`, a tree without mimic rules; the rules of `tree` give the values."""
+    """Return configurations of the tree `free`, which has no mimic rules.
+
+    The values of mimic joints are computed with the mimic rules of `tree`.
+    """
     expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -2,8 +2,8 @@
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
-results with the user's results. A mistake is named if the largest difference becomes at least a thousand
-times smaller. If several mistakes lead to the same results, up to three of them are named.
+results with the user's results. A mistake is reported if the largest difference between them is then at
+least a thousand times smaller. If several mistakes lead to the same results, up to three are reported.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: Largest fraction of the difference that may remain if a mistake explains the results.
+#: A mistake explains the results if at most this fraction of the largest difference remains.
 EXPLAINED = 1e-3
-#: Maximum number of named mistakes.
+#: Maximum number of reported mistakes.
 _MOST = 3
-#: Number of configurations in the first test for two exchanged joints.
+#: Number of configurations in a first, fast test for two exchanged joints.
 _FEW = 4
-#: Smallest scale by which a difference is divided, relative to the largest scale.
+#: Differences are divided by their scale, which is at least _LEAST * (largest scale).
 _LEAST = 1e-9
 #: Maximum difference, relative to the scale, at which two results count as equal.
 _EQUAL = 1e-9
@@ -51,7 +51,7 @@ class Diagnosis:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         found: The function's results (n, ...).
         expected: urdfkin's results.
-        scale: The scale in the bound k * eps * scale of each number in `expected`.
+        scale: For each number in `expected`, the scale in its bound k * eps * scale.
         compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
@@ -62,9 +62,10 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the fraction of the largest difference that remains after a mistake; 0: fully explained.
+        """Return the fraction of the largest difference that a mistake does not explain.
 
-        `predicted` are urdfkin's results with the mistake. With `n`, only the first n results are compared.
+        `predicted` contains urdfkin's results with the mistake. With `n`, only the first n results are
+        compared.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -73,7 +74,7 @@ class Diagnosis:
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        """Return whether the predicted results equal the expected results: the mistake has no effect."""
+        """Return whether a mistake has no effect: the predicted results equal the expected results."""
         return bool((np.abs(predicted - self.expected) <= _EQUAL * self._nonzero_scale()).all())
 
     def _nonzero_scale(self, n: int | None = None) -> FloatArray:
@@ -87,8 +88,8 @@ class Diagnosis:
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     """Return at most three sentences about the mistakes that explain the results.
 
-    Each mistake is also combined with exchanged linear and angular halves of the six-vectors. A combination
-    is named only if no single mistake explains the results.
+    Each mistake is also tried together with exchanged linear and angular halves of the six-vectors. A
+    combination is reported only if no single mistake explains the results.
     """
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves
@@ -258,7 +259,7 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return (name, index in q, index in v, is an angle) for each joint with one coordinate.
+        """Return (name, index in q, index in v, whether q is an angle) for each joint with one coordinate.
 
         The indices belong to the function's convention.
         """
@@ -277,9 +278,9 @@ class Mistakes:
 
     @staticmethod
     def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Multiply the values of some joints, only in the first `count` inputs, by a factor.
+        """Multiply the values of some joints by a factor, in the first `count` of the inputs q, v and a.
 
-        `at` has the indices of each joint in q and in v.
+        For each of these joints, `at` contains the indices in q and in v.
         """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
@@ -383,7 +384,7 @@ class Mistakes:
         return tuple(found)
 
     def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the joint orders of other tools that are permutations of urdfkin's order."""
+        """For each known tool, yield the mistake that the joints are in this tool's order."""
         if self.conversion is not None:
             return
         from urdfkin.model.conventions import BUILT_IN
@@ -406,7 +407,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the mistake of a wrong frame, for each link."""
+        """For each link, yield the mistake that the function uses this link's frame."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return
@@ -424,7 +425,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield mistakes in single columns of a Jacobian, with 0.0 as the unexplained fraction."""
+    """Yield (0.0, sentence) for each wrong column that a mistake explains; 0.0: nothing is unexplained."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

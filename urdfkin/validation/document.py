@@ -60,7 +60,10 @@ class ReportedJoint(TypedDict):
     ]
     q: Annotated[
         int | None,
-        says("Index of the joint's first coordinate in q (mimic joint: of the mimicked joint); null: none."),
+        says(
+            "Index in q of the joint's first coordinate; for a mimic joint, index of the mimicked joint."
+            " null: none."
+        ),
     ]
     v: Annotated[int | None, says("Index of the joint's first entry in v and in a; null: none.")]
     limit: Annotated[ReportedLimit | None, says("The joint's limits; null: the joint has no limits.")]
@@ -118,7 +121,7 @@ class ReportedFinding(TypedDict):
     name: Annotated[str | None, says("Name of the link or joint with the problem; null: none.")]
     oracle: Annotated[
         Literal["refuses", "differs"] | None,
-        says("Whether Pinocchio refuses the file or reads another robot than specified; null: neither."),
+        says("refuses: Pinocchio refuses the file. differs: Pinocchio misreads the file. null: neither."),
     ]
     also: Annotated[list[int], says("Line numbers of further findings that are merged into this finding.")]
 
@@ -154,7 +157,8 @@ class Chain(TypedDict):
     modified: ReportedDHTable
     samples: Annotated[Count, says("Number of compared configurations; 0: no comparison.")]
     metres: Annotated[
-        float | None, says("Largest distance of a table's tip from Pinocchio's, metres; null: no comparison.")
+        float | None,
+        says("Largest distance (metres) between a table's tip and Pinocchio's tip; null: no comparison."),
     ]
     worst: Annotated[
         Units,
@@ -296,7 +300,7 @@ class ReportedSecondReading(TypedDict):
     """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
     by: Annotated[str, says("Name and version of the second reader.")]
-    joints: Annotated[Count, says("Number of joints compared in both readings, fixed joints included.")]
+    joints: Annotated[Count, says("Number of compared joints, fixed joints included.")]
     differences: Annotated[
         list[str], says("Differences between the two readings, each caused by an error of one reader.")
     ]

@@ -107,7 +107,7 @@ class RobotTasks:
 
     Attributes:
         robot: Index of the robot; -1 before the first task was taken.
-        index: Index of the latest chunk that was taken; the lower, the more chunks of the robot remain.
+        index: Index of the latest chunk that was taken; a lower index means that more chunks remain.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -137,7 +137,7 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, RobotTasks] | None:
-        """Return a task for an idle worker, preferably of a new robot, and the robot's other tasks."""
+        """Return a task for an idle worker, preferably of a new robot, and this robot's remaining tasks."""
         for tasks in self._waiting:
             self._begun.append(tasks)
             if (task := self.next(tasks)) is not None:

@@ -33,8 +33,8 @@ class OraclePair:
 
     Attributes:
         failed: Number of results outside their bound.
-        worst: The largest disagreement in units of eps * scale, with the scale of the comparison with the
-            second oracle.
+        worst: The largest disagreement in multiples of eps * scale. The scale is that of urdfkin and the
+            second oracle, also if the library is Pinocchio.
         share_of_bound: The largest ratio of a disagreement to its bound.
     """
 
@@ -58,8 +58,8 @@ class CrossCheck:
         urdfkin: urdfkin compared with the second oracle.
         pinocchio: Pinocchio compared with the second oracle.
         alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
-        undecided: Number of results without a majority. Either no two of the three results agree, or a result
-            agrees with two results that disagree with each other.
+        undecided: Number of results without a majority: no two of the three libraries agree, or one library
+            agrees with two others that disagree with each other.
     """
 
     by: str
@@ -119,7 +119,7 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale, expressed with the k of the second bound."""
+    """Return the sum of two bounds k * eps * scale; the sum has the k of the second bound and a new scale."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
@@ -193,7 +193,7 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return the statistics of the frames in `self` and `other` together, for the same samples."""
+        """Return combined statistics for the frames of `self` and of `other`; the samples are the same."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 

@@ -104,18 +104,18 @@ class FunctionCheck(Displayable):
             them.
         samples: Number of configurations.
         compared: Number of results that have the right shape.
-        factor: The bound is multiplied by this factor.
+        factor: Number by which each bound is multiplied.
         eps_scale: Largest difference in multiples of eps * scale.
-        share: Largest ratio of a difference to the bound times `factor`; at most 1 if all results agree.
-        oracle_share: Largest ratio of the difference between the function and the oracle to the bound times
-            `factor`. None without an oracle.
-        rows: Largest ratio in each row of the result, by name.
+        share: Largest value of difference / (bound * factor); at most 1 if all results agree.
+        oracle_share: Largest value of difference / (bound * factor), where the difference is between the
+            function and the oracle. None without an oracle.
+        rows: Largest ratio in each row of the result; the key is the name of the row.
         columns: Largest ratio in each column of a Jacobian; the key is the name of the joint velocity. Empty
             for other quantities.
         worst: The worst result; None if no result was compared.
         errors: Number of configurations with an exception or a wrong shape.
         first_errors: The first exceptions and wrong shapes, with messages.
-        diagnoses: Explanations of a disagreement. Each explanation alone explains all results.
+        diagnoses: Possible mistakes in the function; each mistake alone explains all results.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -254,8 +254,8 @@ def verify_function(
 
     The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and s. The values
     are random within the limits; the zero configuration and the joint limits come first. In every eighth
-    sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. An exception of
-    the function and a wrong shape are results of the check, not exceptions of this function.
+    sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. If the
+    function raises an exception or returns a wrong shape, the check reports this and continues.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -268,8 +268,9 @@ def verify_function(
             None: urdfkin's convention.
         samples: Number of random configurations.
         seed: Seed of the random configurations.
-        factor: Number that multiplies the bound, for a function that rounds more than the textbook's
-            recursion. `FunctionCheck.needed_factor` is the smallest factor with which the check passes.
+        factor: Number by which the bound is multiplied; above 1 for a function with larger rounding errors
+            than the textbook's recursion. `FunctionCheck.needed_factor` is the smallest factor with which the
+            check passes.
         batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
         **options: Further arguments of the `Robot` method that computes the quantity, such as
             `representation`.
@@ -299,7 +300,7 @@ def verify_function(
         raise InputError("the function to check must be callable", found=safe_repr(function))
     row = quantity_of(quantity)
     if row.of != "frames" or row is ACCELERATION_BREAKDOWN:
-        raise InputError("a function cannot be compared with this quantity", found=quantity)
+        raise InputError("urdfkin cannot check functions that compute this quantity", found=quantity)
     run = _Run(
         function,
         robot,
@@ -328,8 +329,8 @@ class _FunctionResults:
         good: Indices of the n configurations with a result of the right shape.
         found: The function's results (n, ...).
         expected: urdfkin's results (n, ...).
-        scale: The scale in the bound k * eps * scale of each number in `expected`.
-        k: (n,) the factor k in the bound k * eps * scale of each result.
+        scale: For each number in `expected`, the scale in its bound k * eps * scale.
+        k: (n,) for each result, the factor k in its bound k * eps * scale.
         theirs: The oracle's results (n, ...); None if no oracle can check the robot.
     """
 
@@ -502,7 +503,7 @@ class _Run:
             return scale
         if not conversion.is_constant and name != "jacobian":
             raise InputError(
-                f"urdfkin has no bound of the {name} for a base velocity in axes other than its own",
+                f"urdfkin has no bound of the {name} for a base velocity in axes other than the base's axes",
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )
@@ -516,9 +517,9 @@ class _Run:
         """Return the rounding errors of a conversion, in eps * scale; 0 for a permutation.
 
         The conversion rounds each joint angle before the angle is passed to the user's function. The rounded
-        angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix is
-        rotated by up to 2 eps |q|, and this matrix is a factor of each term of the result. The conversion of
-        a base velocity by a matrix has at most 16 rounding errors.
+        angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix has
+        an error of up to 2 eps |q|. Each term of the result has this matrix as a factor, so its relative
+        error is the same. The conversion of a base velocity by a matrix has at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
@@ -654,7 +655,10 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Return a copy of the function's result; None for an exception or a wrong shape, added to `total`."""
+    """Call the function and return a copy of the result.
+
+    After an exception or a wrong result, add the error to `total` and return None.
+    """
     try:
         given = np.asanyarray(function(*inputs))
         if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":
@@ -662,7 +666,7 @@ def _call(
             total.error(sample, f"{kind}, expected real numbers", configurations)
             return None
         found = np.array(given, dtype=np.float64)
-    except (Exception, SystemExit) as error:  # an exception of the user's code is a result of the check
+    except (Exception, SystemExit) as error:  # the check reports an exception of the user's code
         total.error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
         return None
     if found.shape != shape:

@@ -16,16 +16,17 @@ from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
-#: Bytes that Pinocchio 4.1.0 needs (measured): PER_CUBE * nv^3 for the workspace, and PER_LINK for each link.
+#: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for the workspace, and _PER_LINK bytes for each link.
+#: These numbers were measured.
 _PER_CUBE, _PER_LINK = 64, 24_000
-#: Maximum number of arrays at a time; each array has the size of a block of samples.
+#: Maximum number of arrays in memory at the same time; each array is as large as a block of samples.
 _ARRAYS = 12
 _PROC = Path("/proc")
 _GROUPS = Path("/sys/fs/cgroup")
 
 
 def limit(processes: int = 1) -> int | None:
-    """Return the bytes for each process of a validation; None if the system reports no free memory."""
+    """Return how many bytes each process of a validation may use; None if the free memory is unknown."""
     free = min(_free(), default=None)
     return None if free is None else int(_FRACTION * free / processes)
 
@@ -51,7 +52,7 @@ def check(tree: KinematicTree, samples: int, most: int | None) -> None:
 
 
 def _free() -> Iterator[int]:
-    """Yield free bytes: of the machine, within each control group, and within the limit of the process."""
+    """Yield the free memory in bytes: of the machine, of each control group, and of this process."""
     for line in _lines(_PROC / "meminfo"):
         if line.startswith("MemAvailable:"):
             yield int(line.split()[1]) * 1024

@@ -8,14 +8,14 @@ Each request is one line on the program's standard input:
 
 `coordinates` contains the names of the numbers in q. The entries `v` and `a` are present if the quantity
 needs them. The entry `reference` is present if the quantity has a reference frame. The entries `lock` (values
-of locked joints), `root_joint` and `convention` are present if the user gave them. The file contains the
-whole URDF, without locks and without a root joint. The answer is one line:
+of locked joints), `root_joint` and `convention` are present if the user gave them. The URDF file
+does not contain the locks and the root joint, because the request contains them. The answer is one line:
 
     {"result": [[...], ...]}    or    {"error": "a text"}
 
-The program runs with the rights of the user who starts it. If the program hangs, ends or answers with
-anything else, the call for this configuration raises `ProgramError`. The program is started again for the
-next configuration.
+The program runs with the rights of the user who starts it. If the program hangs, ends or gives an answer of
+another form, the call for this configuration raises `ProgramError`. The program is started again for the next
+configuration.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _DAY = 86400.0
 
 
 class ProgramError(Exception):
-    """The program did not answer a request with a result."""
+    """The program gave no result for a request."""
 
 
 class Program:
@@ -153,7 +153,7 @@ class Program:
         return answer
 
     def _start(self) -> None:
-        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  the file stays open while the process runs
+        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  no `with`: the file stays open while the process runs
         try:
             self._process = subprocess.Popen(
                 self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0

@@ -20,9 +20,10 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of a worker for a chunk.
-#: "answer" comes with the pickled answer, and "died" with the signal or exit status of the second crash.
-#: "other code" comes with the worker's versions, which differ from the versions of the client.
+#: Return value of a worker for a chunk: a word and a value.
+#: The value of "answer" is the pickled answer.
+#: The value of "died" is the signal or exit status of the second crash.
+#: The value of "other code" contains the worker's versions, which differ from the client's versions.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -66,7 +67,7 @@ class _CrashError(Exception):
 
 
 class _Parcel:
-    """A robot and a chunk as bytes; unpickling a parcel returns the chunk."""
+    """The bytes of a robot and of a chunk; the receiving process gets one chunk that contains the robot."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
@@ -81,7 +82,7 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
 
 
 def _idle_or_new() -> WorkerProcess:
-    """Return an idle process, which may have the robot in its cache; start a process if none is idle."""
+    """Return an idle process, which may already have read the robot; if none is idle, start a process."""
     with _lock:
         while _idle:
             process = _idle.pop()

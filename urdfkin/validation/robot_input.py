@@ -105,7 +105,7 @@ class RobotInput:
         """Return the robot for a comparison with Pinocchio.
 
         Raises:
-            OracleError: Pinocchio refuses the file or reads a different robot, as a finding states.
+            OracleError: Pinocchio refuses the file or reads a different robot; the message has the reason.
         """
         robot = self.read()
         if robot.verifier.unverifiable is not None:

@@ -81,7 +81,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
 
 
 def _remaining_range(narrowed: NarrowedRange | None) -> dict[str, Any] | None:
-    """Return the part of a joint's range in which its mimic joints are within limits; None: not narrowed."""
+    """Return the part of a joint's range in which its mimic joints are within limits; None: all of it."""
     if narrowed is None:
         return None
     lower, upper = narrowed.allowed or (None, None)

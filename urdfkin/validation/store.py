@@ -118,7 +118,7 @@ class Store:
             place.unlink(missing_ok=True)
 
     def check_names(self) -> None:
-        """Report files that have no chunk's name, for example renamed files, and move them to `damaged/`."""
+        """Report files whose names belong to no chunk, such as renamed files, and move them to `damaged/`."""
         keys = (
             self.manifest.key(robot, index)
             for robot in range(len(self.manifest.robots))
@@ -165,7 +165,7 @@ class Store:
             )
 
     def writing_process(self) -> str | None:
-        """Return words for the process that is writing to the store; None if no process is writing."""
+        """Describe the process that is writing to the store; None if no process is writing."""
         try:
             with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
                 return None if _try_lock(file, fcntl.LOCK_SH) else _holder(file)
@@ -260,7 +260,7 @@ def open_store(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether a process of another shard may have created the file before the manifest."""
+    """Return whether the file can exist before the manifest: another shard's process may have created it."""
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 
@@ -285,7 +285,7 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
 
 
 def _only_failed_robots_differ(store: Store, manifest: Manifest) -> bool:
-    """Return whether two manifests differ only in the digests of failed robots, whose files have changed."""
+    """Return whether the manifests are equal except for changed files of robots that have failed."""
     own, theirs = store.manifest.robots, manifest.robots
     if len(own) != len(theirs) or replace(store.manifest, robots=theirs).differences(manifest):
         return False

@@ -1,8 +1,9 @@
 """Test vectors: robots, configurations, and results at 50 digits with a tolerance for every number.
 
 The file `robots/features.toml` defines small robots, each with one feature of URDF. For robots of the
-catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimals of
-the URDF, and configurations from digests of names. Therefore, the files depend only on these texts.
+catalogue, the vectors contain the robot's name, not its URDF. All values are computed from the decimal
+numbers in the URDF. Configurations are computed from sha256 digests of names. Therefore, the vectors depend
+only on the URDF and the names.
 """
 
 from __future__ import annotations
@@ -61,13 +62,13 @@ LICENCE = "CC0-1.0"
 #: Number of configurations of each robot; the first is the zero configuration.
 #: If a joint's limits exclude zero, the joint is at the limit nearest to zero instead.
 SAMPLES = 3
-#: Bound of velocities, accelerations, and positions of planar and floating joints.
+#: Largest absolute value of velocities, of accelerations, and of positions of planar and floating joints.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: A multiple of 1 / 1024 has few decimals and is exactly a double.
 _GRID = 1024.0
-#: Number of digits of a tolerance, and number of digits before the last rounding.
-#: The first rounding removes differences between processors.
+#: Number of digits of a tolerance, and number of digits to which it is first rounded.
+#: Results of different processors differ in the last digits; the first rounding removes these digits.
 _DIGITS, _FIRST_DIGITS = 3, 12
 
 SPATIAL_ACCELERATION = replace(
@@ -76,7 +77,7 @@ SPATIAL_ACCELERATION = replace(
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
 #: The quantities of the test vectors.
-#: The scales of the classical and of the spatial acceleration include the difference w x vel.
+#: The classical and the spatial acceleration differ by w x vel; the scale of each includes this term.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -257,7 +258,7 @@ def configuration(tree: KinematicTree, name: str, sample: int) -> tuple[FloatArr
 
 
 def _tolerance(k: float, scale: float) -> str:
-    """Return k eps scale as a decimal, rounded up; 0 if the scale is 0."""
+    """Return k * eps * scale as a decimal, rounded up; 0 if the scale is 0."""
     if scale == 0.0:
         return "0"
     with localcontext(prec=_FIRST_DIGITS):
@@ -271,7 +272,7 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The files of one robot: vectors as JSON and as lines, and the URDF if it was written.
+    """The files of one robot: vectors as JSON and as lines of text, and the URDF if it was written.
 
     Attributes:
         numbers: Number of values in each file of vectors.

@@ -50,7 +50,8 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            theirs.close()  # only the worker process has this end, so the pipe closes when the process ends
+            # Close this process's copy of the worker's end, so that the pipe closes when the worker ends.
+            theirs.close()
 
     @property
     def alive(self) -> bool:
@@ -117,7 +118,7 @@ def _receive_chunks(connection: Connection, chunks: SimpleQueue[Chunk]) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when its parent ends. On Linux, the kernel does this, even if compiled code hangs."""
+    """End this process when its parent ends; on Linux, the kernel ends it, even if compiled code hangs."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
@@ -182,7 +183,8 @@ class _WorkerPool:
                     worker = _BusyWorker()
                     self._workers.append(worker)
             except Exception as error:
-                if self._workers:  # a new process cannot be started, so the running processes continue
+                if self._workers:
+                    # A running process takes the task later.
                     self._queue.put_back(task, tasks)
                     return
                 self._enter_answer(task, lost_failure("no process could be started", error))
