@@ -85,12 +85,12 @@ def test_every_mutant_of_the_package_compiles_and_has_a_test() -> None:
 def test_a_mutant_without_a_test_survives_and_one_with_a_test_is_detected(
     what: str, word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    places = [m for m in mutants(["verify/certificate"]) if m.place.endswith("Comparison.agrees")]
+    places = [m for m in mutants(["verify/comparison"]) if m.place.endswith("Comparison.agrees")]
     (mutant,) = [m for m in places if m.what == what]
     test = tmp_path / "test_one.py"
     test.write_text(
-        "from urdfkin.verify.certificate import Comparison\n"
-        "def test_a_share_above_one_disagrees():\n    assert not Comparison(1, 9.0, 1.4, ()).agrees\n",
+        "from urdfkin.verify.comparison import BatchComparison\n"
+        "def test_a_share_above_one_disagrees():\n    assert not BatchComparison(1, 9.0, 1.4, ()).agrees\n",
         encoding="utf-8",
     )
     monkeypatch.setattr("scripts.mutate.near_tests", lambda path: [str(test)])
@@ -101,7 +101,7 @@ def test_a_mutant_without_a_test_survives_and_one_with_a_test_is_detected(
 GONE = ("verification", "judge", "keeping")
 
 #: Quick to ask about, and to be relied on by everything that is handed out or reported.
-PARTS = ["validation/outcome", "validation/error_stats", "verify/certificate", "dh/table"]
+PARTS = ["validation/outcome", "validation/error_stats", "verify/certificate", "verify/comparison", "dh/table"]
 SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
 
 
