@@ -9,7 +9,7 @@ import numpy as np
 import urdfkin
 
 robot = urdfkin.load("panda")  # The argument is a name, a path, or URDF text.
-# The pose is a named pose with changes in radians, degrees or multiples of pi.
+# A text names a pose, and sets some joints to other values in radians, degrees or multiples of pi.
 # A mapping by name also works.
 pose = "neutral, panda_joint2=-30deg, panda_joint4=-2*pi/3, panda_joint6=1.5"
 
