@@ -100,8 +100,14 @@ def test_a_mutant_without_a_test_survives_and_one_with_a_test_is_detected(
 #: Parts of earlier versions.
 GONE = ("verification", "judge", "keeping")
 
-#: Quick to ask about, and to be relied on by everything that is handed out or reported.
-PARTS = ["validation/outcome", "validation/error_stats", "verify/certificate", "verify/comparison", "dh/table"]
+#: Parts of the package whose mutants are tested quickly, and on which all reports depend.
+PARTS = [
+    "validation/outcome",
+    "validation/error_stats",
+    "verify/certificate",
+    "verify/comparison",
+    "dh/table",
+]
 SEED = int(os.environ.get("URDFKIN_MUTATION_SEED", "1"))
 
 
