@@ -214,7 +214,7 @@ class _LinkAxis:
 def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_LinkAxis]()
-    # For each link: its antecedent, its pose in the antecedent's axis frame, the number of joints between.
+    # For each link: the antecedent, T_antecedent_link, and the number of joints between these links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -332,7 +332,7 @@ def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return CSV in metres and radians; each line contains a row, and T11 to T34 of T_frame_link."""
+    """Return CSV in metres and radians; each line has a row, and the entries T11 to T34 of T_frame_link."""
     entries = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *entries]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3], strict=True):

@@ -86,7 +86,7 @@ def write_matlab_rst(table: DHTable) -> str:
 
 
 def write_ets(table: DHTable) -> str:
-    """Return a module with `ets`, and `robot` of these transforms; raise InputError for a mimic joint."""
+    """Return a module with the transforms `ets` and a `robot` of them; raise InputError for a mimic joint."""
     check_no_mimic(table, "a sequence of elementary transforms")
     lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
