@@ -140,11 +140,12 @@ def dh_table(
             axis. "joint": the base contains this transform, and d_1 and theta_1 are zero (Craig's frame 0).
         sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
             negative. "alpha": the cell alpha is not negative.
-        slide: Position of the axis of each prismatic joint; the joint itself defines only the axis's direction. "drawn": the axis passes through the joint's origin in the URDF. "minimal": the axis passes
-            through the origin of the next revolute joint, so that a is 0.
-        like: A published table. The result copies its positive directions of the joints, its directions of x, its
-            offsets along parallel axes, and its zero positions of the first and the last joint. All
-            other numbers come from the URDF. With `like`, the arguments `flip`, `first`, `last`, `sign` and
+        slide: Position of the axis of each prismatic joint; the joint itself defines only the axis's
+            direction. "drawn": the axis passes through the joint's origin in the URDF. "minimal": the axis
+            passes through the origin of the next revolute joint, so that a is 0.
+        like: A published table. The result copies its positive directions of the joints, its directions of x,
+            its offsets along parallel axes, and its zero positions of the first and the last joint. All other
+            numbers come from the URDF. With `like`, the arguments `flip`, `first`, `last`, `sign` and
             `parallel_offset` are ignored.
 
     Raises:
