@@ -13,7 +13,7 @@ joint's row. For skew axes, beta is 0, and the other six numbers are unique exce
 Some numbers of a table can be chosen freely; `steps_like` chooses them as in another table (the reference).
 The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
 angles theta about coinciding axes. For parallel or coinciding axes, `steps_like` copies d or theta from the
-reference in all rows except one. In the remaining row, it chooses d or theta so that the sum is correct. In a
+reference in all rows except one. It chooses d or theta of the remaining row so that the sum is correct. In a
 Hayati row, d can also be chosen freely, because the two axes do not determine it.
 """
 
@@ -199,7 +199,6 @@ class PairWithReference:
 
     @property
     def _has_hayati_row(self) -> bool:
-        """Whether the two axes get a Hayati row: always for a small tilt, else as in the reference."""
         sine = tilt_of(self.A)
         reference_is_strict = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
         return self.hayati and (
@@ -216,10 +215,10 @@ class PairWithReference:
         """Distance (metres) along the first axis from the joint's frame to the x axis of a Hayati row.
 
         The tilt direction is the projection of the second axis onto the xy plane of the first joint's frame.
-        The vector from the first to the second axis, of length a along x, has the same component in this
-        direction as in the reference. If the tilt is small, this component is inaccurate; it is then computed
-        from a and from the perpendicular component. The result is None for parallel axes, or if it would
-        exceed `reach`.
+        Let v be the vector of length a along the x axis of the row. The component of v in the tilt direction
+        is the same as in the reference. If the tilt is small, this component is inaccurate; it is then
+        computed from a and from the perpendicular component of v. The result is None for parallel axes, or if
+        it would exceed `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, reference_tilt = tilt_of(self.A), math.hypot(along, across)
@@ -258,11 +257,11 @@ class PairWithReference:
 def steps_like(
     pairs: Sequence[PairWithReference], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Compute the transforms between the axes of a path, and theta of each row, similar to a reference.
+    """Compute transforms between a path's axes, and theta of each row, as close to a reference as possible.
 
     `phi_in` (rad) is the angle about the first axis, and `carry` (metres) is the offset along it, from frame
-    0 to the first joint's frame. If d of the last row must equal d in the reference, `tip` (metres) is the
-    value of `carry` that this requires at the last row; otherwise it is None.
+    0 to the first joint's frame. `tip` is the `carry` (metres) that the last row needs so that its d equals d
+    in the reference; None if d may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -293,7 +292,7 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for it.
-        # If one of the rows is a Hayati row, d is chosen so that the cell a of this row equals the reference.
+        # If a row up to that joint is a Hayati row, the reference's cell a in this row determines d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:

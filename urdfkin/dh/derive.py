@@ -45,7 +45,7 @@ from urdfkin.model.tree import FloatArray
 RIGHT_ANGLE_SLACK = 1e-3
 
 
-#: Values of the options of a derivation, which `urdfkin.dh.make.dh_table` explains.
+#: Allowed values of the options of a derivation; `urdfkin.dh.make.dh_table` explains them.
 _OPTIONS = {
     "near_parallel": ("hayati", "strict"),
     "last": ("tip", "flange"),
@@ -83,9 +83,9 @@ class Choices:
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
     """Return a table of a chain; it gives the pose of the chain's tip for every q, up to rounding errors.
 
-    If `like` is given (a standard table of the same joints), the result has its directions of x, its offsets
-    along parallel axes, and its zero positions of the first and the last joint. `like` has priority over
-    `choices`.
+    If `like` is given (a standard table of the same joints), the result copies its directions of x, its
+    offsets along parallel axes, and its zero positions of the first and the last joint. `like` has priority
+    over `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -187,7 +187,7 @@ def _place_prismatic_axes(
 
 
 def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: list[bool]) -> bool:
-    """Shift the axis of joint k to the origin of the next joint if that is revolute, or of the previous."""
+    """Shift the axis of joint k to the origin of a neighbouring revolute joint, preferably the next joint."""
     if k + 1 < len(is_prismatic) and not is_prismatic[k + 1]:
         _shift(constants, k, constants[k + 1][:3, 3].copy())
         return True
@@ -260,7 +260,7 @@ def _steps(
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
     """Return the transforms between consecutive axes, and theta of each row."""
-    # With "first", each row gets its own offset here, and `_sum_offsets_in_first_row` adds the offsets later.
+    # For "first", each row gets its own offset here; `_sum_offsets_in_first_row` adds the offsets later.
     each = choices.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):

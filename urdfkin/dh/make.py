@@ -1,8 +1,8 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
-The table can be given the frames of a published table. The author of a published table has chosen the
-positive direction of each joint: in Kinova's table, for example, the positive direction of the first joint is
-opposite to that in the URDF.
+The frames can be chosen as in a published table. The author of a published table has chosen the positive
+direction of each joint: in Kinova's table, for example, the positive direction of the first joint is opposite
+to that in the URDF.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def dh_table(
         tree: The robot.
         tip: Name of a link or joint frame.
         base: Name of a link or joint frame; the root link when None.
-        convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
+        convention: "standard" (distal, as in the textbook) or "modified" (proximal, as in Craig's book).
         near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses only the four
             parameters, and may give offsets of kilometres.
         snap: Tolerance in radians. An angle that differs by at most this tolerance from a multiple of 15

@@ -35,7 +35,7 @@ from urdfkin.system.resources import robots_dir
 
 #: Largest error of a rotation that is printed with six digits.
 _PRINTED = 1e-5
-#: Maximum number of lines from the heading of a pose to its third row, with blank lines and Markdown fences.
+#: Maximum number of lines from the heading of a pose to its third row, including blank lines and fences.
 _POSE_LINES = 6
 #: Pattern of a line that states a property, such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")

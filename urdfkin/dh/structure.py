@@ -254,8 +254,8 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     """Return an upper bound of the tip's distance (metres) from `origin`, a point of the first axis.
 
-    The bound is the length of the polygonal chain from `origin` to the tip. Its next vertex is always the
-    point of the next axis that is nearest to the last vertex. Travel of prismatic joints is added.
+    The bound is the length of the polygonal chain from `origin` to the tip. Each vertex is the point of the
+    next axis that is nearest to the previous vertex. Travel of prismatic joints is added.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -331,7 +331,7 @@ class Opw:
 def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     """Return the OPW parameters of a path of six revolute joints.
 
-    `tolerance` is the largest error of the tip on `SAMPLES` configurations, in metres and in radians.
+    `tolerance` is the largest allowed error of the tip on `SAMPLES` configurations, in metres and in radians.
 
     Raises:
         InputError: the path does not have exactly six revolute joints, or is not an OPW arm. The message

@@ -296,7 +296,7 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the (...,) guaranteed bound (metres) of the tip's displacement.
+        """Return a guaranteed bound (...,) of the tip's displacement (metres).
 
         `values` contains the values of the prismatic joints by name.
         """

@@ -85,8 +85,8 @@ class TreeParameters:
     Attributes:
         path_lengths: (joints,) sum of the URDF's offsets (metres) from the root to each joint.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero as
-            rounding errors (`urdfkin.dh.common_normals`).
+        left_out: Tilts within rounding errors are set to zero (`urdfkin.dh.common_normals`). This is the
+            largest sum (rad) of such tilts on a path from the root.
     """
 
     robot: str
@@ -200,7 +200,7 @@ class _LinkAxis:
         T_antecedent_axis: (4, 4) pose of this axis frame in the axis frame of the antecedent.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
         noise: Rounding errors of `T_antecedent_axis`.
-        left_out: Sum (rad) of the tilts between the root and this link that are replaced by zero as rounding
+        left_out: Sum (rad) of the tilts between the root and this link that are set to zero as rounding
             errors.
     """
 

@@ -34,13 +34,12 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 #: Default tolerance of the tip's position (metres).
 #: It covers the effect of one or two cells that are rounded to 0.1 mm.
 TOLERANCE = 2e-4
-#: Numbers of configurations for the fit and for its check.
+#: Number of sampled configurations for the fit, and for the check of the fit.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
 #: Differing cells are reported only if their correction reduces the tip error to this fraction.
 _CORRECTED = 0.5
-#: A single mistake is reported only if its correction reduces the tip error to this fraction,
-#: or to the tolerance.
+#: The correction of a reported single mistake reduces the tip error to this fraction or to the tolerance.
 _MISTAKE_CORRECTED = 0.05
 #: Smallest reported change of a cell, relative to the reach (a tenth of `EXPLAINED`).
 _LEAST_CHANGE = 1e-10

@@ -62,7 +62,7 @@ _LAST_WEIGHT = 1.2
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 #: Largest relative difference between two effects on the tip that are treated as equal.
 _SAME_EFFECT = 1e-6
-#: Number of slow steps after which the fit of the free parameters ends.
+#: Number of consecutive steps with little improvement after which the fit of the free parameters ends.
 _PATIENCE = 4
 #: Below this mean error, relative to the reach, joint offsets are not changed by large angles.
 _ROUNDING = 1e-13
@@ -214,7 +214,7 @@ def with_changes(
         k = model.variables[i]
         new_cells[i, k] += offset * units[k]
     # The base is changed in the frame of the first revolute joint, the tool in the frame of the last.
-    # A rotation about the axis of that joint then exactly equals a change of the joint's offset.
+    # A rotation about the axis of such a joint then exactly equals a change of the joint's offset.
     base = _with_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _with_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))

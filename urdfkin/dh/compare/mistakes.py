@@ -213,7 +213,7 @@ def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean(poses: FloatArray) -> FloatArray:
-    """Return the (4, 4) mean of nearly equal poses; the first pose if the mean is not a rotation."""
+    """Return the (4, 4) mean of nearly equal poses, or the first pose if the mean is not a rotation."""
     mean = poses.mean(axis=0)
     R = polar_factor(mean[:3, :3])
     return pose(R, mean[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])

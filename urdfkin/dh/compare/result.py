@@ -146,7 +146,7 @@ class TableComparison:
             values. The bounds do not include rounding errors.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
         differences: The cells that differ, in descending order of their effect at the tip. If exactly one
-            mistake is likely, only the cell of this mistake.
+            mistake is likely, the only entry is the cell of this mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
             fitted; empty if this would change too many cells, or would not remove the tip error.
         hidden: Row index and name of each cell whose value the tip's poses do not determine, because base,
@@ -180,7 +180,7 @@ class TableComparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the tip error, (angles multiplied by the reach) is within `tolerance` on all samples."""
+        """Whether the tip error (angles multiplied by the reach) is within `tolerance` on all samples."""
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property

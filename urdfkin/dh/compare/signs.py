@@ -76,7 +76,7 @@ class _PartialAlignment:
         base: (4, 4) transform that is multiplied with the base; it contains the offset of the first row.
         free_offset: Row index and sign of a joint offset that can be chosen freely; None if no offset can. If
             axes before the last joint coincide, only the sum of their joint angles is determined. The sign is
-            the direction in which this offset rotates x. The index 0 is the base.
+            the direction in which this offset rotates x. If the index is 0, the offset is part of the base.
     """
 
     cost: float
