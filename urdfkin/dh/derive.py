@@ -83,9 +83,8 @@ class Choices:
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
     """Return a table of a chain; it gives the pose of the chain's tip for every q, up to rounding errors.
 
-    If `like` is given (a standard table of the same joints), the result copies its directions of x, its
-    offsets along parallel axes, and its zero positions of the first and the last joint. `like` has priority
-    over `choices`.
+    `like` is a standard table of the same joints. The result copies its directions of x, its offsets along
+    parallel axes, and its zero positions of the first and the last joint. `like` has priority over `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))

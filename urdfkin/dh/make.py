@@ -76,10 +76,10 @@ def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[f
 
     The entries of the key are, in this order:
 
-    - the largest difference of the cells,
-    - the power of ten of the largest difference, with the cells that a shift of a prismatic axis changes,
+    - the largest difference of cells that do not depend on the position of a prismatic axis,
+    - the exponent of the next power of ten above the largest difference of all compared cells,
     - the number of rows with different zero positions, plus the number of rows with different signs of d,
-    - the number of poses that differ, among base and tool,
+    - the number of different rotations of base and tool,
     - the number of joints with reversed positive direction.
     """
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
