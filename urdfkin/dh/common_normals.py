@@ -10,10 +10,11 @@ Rz(phi_next) and Tz(delta_next) commute with the motion of the second joint, so 
 joint's row. For skew axes, beta is 0, and the other six numbers are unique except for the direction of x
 (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
-`steps_like` makes the free choices of another table. The pose of the tip determines only the sum of the
-offsets d along parallel axes, and only the sum of the angles theta about coinciding axes. In all rows of such
-axes except one, `steps_like` copies d or theta from the other table. The remaining row makes the sum correct.
-The two axes of a Hayati row do not determine d of this row either.
+Some numbers of a table can be chosen freely; `steps_like` chooses them as in another table (the reference).
+The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
+angles theta about coinciding axes. For parallel or coinciding axes, `steps_like` copies d or theta from the
+reference in all rows except one. It chooses d or theta of the remaining row so that the sum is correct. In a
+Hayati row, d can also be chosen freely, because the two axes do not determine it.
 """
 
 from __future__ import annotations
@@ -89,11 +90,11 @@ def step_between(
         A: (4, 4) pose of the next joint's frame in this joint's frame.
         reach: Length of the path (metres). A common normal is far away if its distance from a joint frame
             exceeds `reach`.
-        phi_free: Value of phi for coinciding axes, for which every phi is correct.
+        phi_free: Value of phi for coinciding axes, because they do not determine phi.
         hayati: Whether nearly parallel axes get a Hayati row instead of a row of four parameters.
         delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
-        noise: Limits for tilts and lengths; smaller values are set to zero. None: the limits for the origin
-            of a single URDF joint.
+        noise: Limits for tilts and lengths; smaller values are set to zero. If None, the limits for the
+            origin of a single URDF joint are used.
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
     sine = tilt_of(A)
@@ -108,7 +109,7 @@ def step_between(
 
 
 def _along_common_normal(A: FloatArray, sine: float, reach: float, noise: PoseTolerance) -> AxisTransform:
-    """Return the transform between two axes that are not parallel; x is along z cross z_next, and a >= 0."""
+    """Return the transform along the common normal of two axes that are not parallel, with a >= 0."""
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
     across = math.cos(phi) * A[1, 3] - math.sin(phi) * A[0, 3]
@@ -153,17 +154,17 @@ def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: flo
 
 
 def _phi_next(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return the remaining rotation of A about the next axis (rad), accurately for every tilt."""
+    """Return phi_next (rad) of the pose A, given phi, alpha and beta; it is accurate for every tilt."""
     Rz = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
     M = (Rz @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
 
 
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
-    """Return a length (metres) without the rounding error of numbers of the size `reach`.
+    """Remove rounding errors from a length (metres) that was computed from lengths of up to `reach`.
 
-    A length is replaced by 0 if it is at most `noise` or this rounding error. A length that differs from a
-    decimal number of twelve digits only by this rounding error is replaced by the decimal number.
+    The length becomes 0 if it is at most `noise` or within rounding errors. If only rounding errors separate
+    the length from a decimal number of twelve digits, this decimal number is returned.
 
         >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
         (0.0, 0.076, -5e-12)
@@ -176,7 +177,7 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """Two consecutive joint axes of a path, and the first joint's row in another table (the reference).
+    """Two consecutive joint axes of a path, and the row of the first joint in a reference table.
 
     `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
     """
@@ -193,12 +194,11 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether the offset d of the row can be chosen, so that the next row compensates the choice."""
+        """Whether d of the row can be chosen freely, because the next row can compensate for the choice."""
         return tilt_of(self.A) <= self.noise.radians or self._has_hayati_row
 
     @property
     def _has_hayati_row(self) -> bool:
-        """Whether the two axes get a Hayati row: always for a small tilt, else as in the reference."""
         sine = tilt_of(self.A)
         reference_is_strict = not self.row.beta and abs(math.sin(self.row.alpha)) >= NEARLY_PARALLEL
         return self.hayati and (
@@ -207,16 +207,18 @@ class PairWithReference:
 
     @property
     def normal_offset(self) -> float:
-        """Distance (metres) along the first axis, from the frame of its joint to the common normal."""
+        """Distance (metres) along the first axis from its joint's frame to the common normal of the axes."""
         return step_between(self.A, self.reach, hayati=False, noise=self.noise).delta
 
     @property
     def hayati_offset(self) -> float | None:
         """Distance (metres) along the first axis from the joint's frame to the x axis of a Hayati row.
 
-        The offset is chosen so that the cell a has the same component along the tilt as in the reference. A
-        small tilt determines this component only inaccurately. The component is then computed from the whole
-        cell a and from its component normal to the tilt. The result is None if it would exceed `reach`.
+        The tilt direction is the projection of the second axis onto the xy plane of the first joint's frame.
+        Let v be the vector of length a along the x axis of the row. The component of v in the tilt direction
+        is the same as in the reference. If the tilt is small, this component is inaccurate; it is then
+        computed from a and from the perpendicular component of v. The result is None for parallel axes, or if
+        it would exceed `reach`.
         """
         across, along = -math.sin(self.row.alpha) * math.cos(self.row.beta), math.sin(self.row.beta)
         sine, reference_tilt = tilt_of(self.A), math.hypot(along, across)
@@ -235,7 +237,7 @@ class PairWithReference:
         """Return the transform between the two axes.
 
         `carry` is the offset (metres) along the first axis from the DH frame to the joint's frame. `d` is the
-        offset of the row if it can be chosen.
+        offset for the row; it is ignored if the two axes determine the offset.
         """
         if not self.offset_is_free:
             A = shifted_along_z(self.A, carry)
@@ -248,18 +250,18 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, carry: float) -> float:
-        """Return this joint's `carry` (metres; see `step`) from the next joint's, for a row with d = 0."""
+        """Return this joint's `carry` (metres; see `step`) if d is 0, given `carry` of the next joint."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
 def steps_like(
     pairs: Sequence[PairWithReference], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Compute the transforms between consecutive axes of a path, and theta of each row, like a reference.
+    """Compute transforms between a path's axes, and theta of each row, as close to a reference as possible.
 
-    `phi_in` (rad) and `carry` (metres) are the angle about the first axis and the offset along it, from frame
-    0 to the first joint's frame. `tip` (metres) is the offset before the last row that makes d of this row
-    equal to d in the reference; None if these two offsets may differ.
+    `phi_in` (rad) is the angle about the first axis, and `carry` (metres) is the offset along it, from frame
+    0 to the first joint's frame. `tip` is the `carry` (metres) that the last row needs so that its d equals d
+    in the reference; None if d may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -289,8 +291,8 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # Any d is correct, because a later prismatic joint or the tool compensates it.
-        # A Hayati row in between determines d.
+        # Any d is possible, because a later prismatic joint or the tool compensates for it.
+        # If a row up to that joint is a Hayati row, the reference's cell a in this row determines d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -306,7 +308,7 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
 def _free_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Choose phi so that theta of this row, or of later prismatic rows, equals theta in the reference."""
+    """Choose phi so that theta of this row, or of later rows of prismatic joints, equals the reference."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -323,7 +325,7 @@ def _free_phi(
 
 
 def _closer_direction(step: AxisTransform, pair: PairWithReference, phi_in: float = 0.0) -> AxisTransform:
-    """Choose the direction of x with which the cells differ less from the reference; theta decides ties."""
+    """Choose the direction of x that gives cells closer to the reference; if equally close, compare theta."""
     row = pair.row
 
     def difference(step: AxisTransform) -> tuple[float, float]:
@@ -372,14 +374,14 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PoseTolerance:
-    """Largest angle (radians) and length (metres) that are treated as rounding errors in a constant pose."""
+    """Largest angle (radians) and length (metres) that are attributed to rounding in a constant pose."""
 
     radians: float
     metres: float
 
 
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
-    """Return the tolerance of a constant pose, which is the product of the origins of `joints` URDF joints.
+    """Return the tolerance for a constant pose that is the product of the origins of `joints` URDF joints.
 
     `length` is the sum of the offsets of these joints (metres), and `reach` is the length of the whole path.
     The tolerance covers angles that a program rounded to fifteen digits.
@@ -400,7 +402,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def left_out(chain: FrameChain) -> float:
-    """Return the sum (rad) of the tilts of z and x axes that a table replaces by zero as rounding errors."""
+    """Return the sum (rad) of the tilts of z and x axes that are so small that a table sets them to zero."""
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
         total += sum(tilt for tilt in (tilt_of(A), abs(float(A[2, 0]))) if tilt <= noise.radians)

@@ -5,13 +5,13 @@ The standard and the modified convention group the same factors S and X of `urdf
     standard   base . (S_1 X_1) (S_2 X_2) ... (S_n X_n) . tool
     modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
 
-The conversion to the modified convention moves X_n into the tool. The first modified row takes a and alpha
-from a base of the form Tx(a) Rx(alpha). The conversion to the standard convention does the opposite, so that
-the conversion to the other convention and back gives the original table.
+The conversion to the modified convention moves X_n into the tool. If the base has the form Tx(a) Rx(alpha), a
+and alpha move from the base into the first modified row. The conversion to the standard convention does the
+opposite, so that a conversion to the other convention and back gives the original table.
 
-In a tree, each joint's frame is a Denavit-Hartenberg frame: frame i - 1 of joint i in a standard table, where
-z_{i-1} is the joint's axis, and frame i in a modified table. The pose of frame i in frame i - 1 is S_i X_i or
-X_{i-1} S_i. With the joint at zero, the translation of S_i X_i is d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis: frame i - 1
+of a standard table, or frame i of a modified table. The pose of frame i in frame i - 1 is S_i X_i or X_{i-1}
+S_i. With the joint at zero, the translation of S_i X_i is d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=wanted, rows=rows, base=base, tool=tool)
 
 
-#: Limits in a URDF of a prismatic joint without limits: -1 km to 1 km, 1000 m/s and 1000 N.
+#: A prismatic joint without limits gets these limits in a URDF: -1 km to 1 km, 1000 m/s and 1000 N.
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 

@@ -1,6 +1,6 @@
 """Derive a Denavit-Hartenberg table from a chain of axes, in one pass from base to tip.
 
-The table has the canonical choices of docs/dh.md, unless `Choices` or another table requires others.
+Free choices are made as in docs/dh.md, unless `Choices` or a reference table specifies other choices.
 """
 
 from __future__ import annotations
@@ -40,11 +40,12 @@ from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Tolerance (rad) by which |theta| may exceed a right angle before x is reversed; it covers 1.571.
+#: Tolerance (rad) by which |theta| may exceed a right angle before x is reversed.
+#: The rounded right angle 1.571 is within this tolerance.
 RIGHT_ANGLE_SLACK = 1e-3
 
 
-#: Values of the options of a derivation, which `urdfkin.dh.make.dh_table` explains.
+#: Allowed values of the options of a derivation; `urdfkin.dh.make.dh_table` explains them.
 _OPTIONS = {
     "near_parallel": ("hayati", "strict"),
     "last": ("tip", "flange"),
@@ -80,10 +81,10 @@ class Choices:
 
 
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
-    """Return the table of a chain, which gives the pose of the chain's tip for every q, except for rounding.
+    """Return a table of a chain; it gives the pose of the chain's tip for every q, up to rounding errors.
 
-    With a standard table `like` of the same joints, the result has the same directions of x, offsets along
-    parallel axes, and zero positions of the first and the last joint. `like` has priority over `choices`.
+    `like` is a standard table of the same joints. The result copies its directions of x, its offsets along
+    parallel axes, and its zero positions of the first and the last joint. `like` has priority over `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -133,7 +134,7 @@ def _table(
         steps = [AxisTransform(a=a, alpha=alpha), *steps[:-1]]
     rows = []
     for joint, (own_theta, own_d), step in zip(chain.joints, theta_and_d, steps, strict=True):
-        # The sum with 0.0 makes a negative zero positive.
+        # Adding 0.0 converts -0.0 to 0.0.
         a, alpha, d, theta, beta = (x + 0.0 for x in (step.a, step.alpha, own_d, own_theta, step.beta))
         sense = -1 if joint.name in choices.flip else 1
         rows.append(DHRow(a, alpha, d, theta, joint.kind, joint.name, sense, beta, joint.mimic, joint.limit))
@@ -185,7 +186,7 @@ def _place_prismatic_axes(
 
 
 def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: list[bool]) -> bool:
-    """Shift joint k's line to the origin of the next joint, or else of the previous joint, if revolute."""
+    """Shift the axis of joint k to the origin of a neighbouring revolute joint, preferably the next joint."""
     if k + 1 < len(is_prismatic) and not is_prismatic[k + 1]:
         _shift(constants, k, constants[k + 1][:3, 3].copy())
         return True
@@ -196,7 +197,7 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift joint k's line to the origin of a neighbouring joint if the two axes are nearly parallel."""
+    """Shift the axis of joint k to the origin of a neighbouring joint if the two axes are nearly parallel."""
     if k > 0 and noise[k].radians < tilt_of(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
@@ -230,7 +231,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # Projection e - (e . z) z of the base's x axis e, without cancellation for z close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis, so x_0 is made from the y axis.
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis: project the y axis.
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -258,7 +259,7 @@ def _steps(
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
     """Return the transforms between consecutive axes, and theta of each row."""
-    # With "first", each row gets its own offset here, and `_sum_offsets_in_first_row` adds the offsets later.
+    # For "first", each row gets its own offset here; `_sum_offsets_in_first_row` adds the offsets later.
     each = choices.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -278,7 +279,7 @@ def _steps(
 def _offset_for_last_row(
     like: DHTable, A: FloatArray, choices: Choices, noise: PoseTolerance
 ) -> float | None:
-    """Return the offset before the last row that makes d of this row equal to d in `like`, or None."""
+    """Return the argument `tip` of `steps_like`."""
     row = like.rows[-1]
     if not row.kind.turns or not _has_no_tool(like) or not _representable(A, choices, noise):
         return None
@@ -292,7 +293,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta, and d if it is 0, from the first row of another table; change the base accordingly."""
+    """Copy theta from the first row of another table, and d if it is 0 there; change the base accordingly."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE * EPS or offset:
@@ -324,7 +325,8 @@ def _last_like(
 def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
     """Whether the rule `sign` requires the opposite direction of x.
 
-    If the cell a or alpha that the rule names is 0 (or alpha is pi), the other cell must not be negative.
+    The rules "a" and "alpha" require that the cell of this name is not negative. If the cell is 0 (or alpha
+    is pi), the other of the two cells must not be negative.
     """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign == "theta" or (not step.a and not by_alpha):

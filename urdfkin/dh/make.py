@@ -1,7 +1,8 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
-The frames can be those of a published table. Its author has chosen the positive direction of each joint. In
-Kinova's table, for example, the positive direction of the first joint is opposite to the URDF.
+The frames can be chosen as in a published table. The author of a published table has chosen the positive
+direction of each joint: in Kinova's table, for example, the positive direction of the first joint is opposite
+to that in the URDF.
 """
 
 from __future__ import annotations
@@ -23,16 +24,17 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: Largest difference between cells of two tables of the same robot (rad, or relative to the reach).
+#: If cells of two tables differ by more than this number, the tables describe different robots.
+#: The unit is rad for angles, and the reach for lengths.
 _SAME_ROBOT = 0.1
-#: Largest difference between equal zero positions (rad), and between entries of equal rotations.
+#: Largest difference at which zero positions (rad), and entries of rotations, are treated as equal.
 _SAME_ZERO = 1e-2
-#: Largest difference between two equal cells (rad, or relative to the reach).
+#: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """Return a chain's table with the frames of a reference; `choices.flip` is from `reversed_like`."""
+    """Return a chain's table with the frames of a reference; `reversed_like` gives `choices.flip`."""
     standard = replace(choices, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
 
@@ -63,21 +65,21 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
             "the table of `like` describes another robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"cells of the table that differ by {best[0]:.0%} of the reach, or by {best[0]:.2g} rad",
-            remedy="compare the table with the URDF by --compare, which reports the differences",
+            remedy="use --compare to see the differences between the table and the URDF",
             question=QuestionsSection.DH_AND_URDF_DISAGREE,
         )
     return best_flip
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key that ranks tables by their difference from a reference; the smallest key is the best.
+    """Return a key that ranks tables by their difference from a reference; the smallest key is best.
 
     The entries of the key are, in this order:
 
-    - the largest difference of the cells,
-    - the power of ten of the largest difference, with the cells that a shift of a prismatic axis changes,
+    - the largest difference of cells that do not depend on the position of a prismatic axis,
+    - the exponent of the next power of ten above the largest difference of all compared cells,
     - the number of rows with different zero positions, plus the number of rows with different signs of d,
-    - the number of poses that differ, among base and tool,
+    - the number of different rotations of base and tool,
     - the number of joints with reversed positive direction.
     """
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
@@ -123,26 +125,28 @@ def dh_table(
         tree: The robot.
         tip: Name of a link or joint frame.
         base: Name of a link or joint frame; the root link when None.
-        convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
+        convention: "standard" (distal, as in the textbook) or "modified" (proximal, as in Craig's book).
         near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses only the four
             parameters, and may give offsets of kilometres.
         snap: Tolerance in radians. An angle that differs by at most this tolerance from a multiple of 15
-            degrees becomes that multiple. The table's attribute `snap` reports the effect. 0: exact angles.
-        last: "tip": the last row reaches the tip if four parameters suffice. "flange": the tool contains the
-            transform from the last axis to the tip.
-        parallel_offset: For consecutive parallel axes: the row that contains the sum of the offsets along
-            them, "last" or "first". "each": every row contains the offset of its own link.
+            degrees becomes that multiple. The table's attribute `snap` reports the effect. With 0, all
+            angles are exact.
+        last: "tip": the last row ends at the tip if four parameters suffice for this. "flange": the tool
+            contains the transform from the last axis to the tip.
+        parallel_offset: For consecutive parallel axes. "last" or "first": this row contains the sum of the
+            offsets along the axes. "each": every row contains the offset of its own link.
         flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
         first: "base": the base is the identity if d_1 and theta_1 can contain the transform to the first
             axis. "joint": the base contains this transform, and d_1 and theta_1 are zero (Craig's frame 0).
         sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
             negative. "alpha": the cell alpha is not negative.
-        slide: Position of the axes of prismatic joints, which define only a direction. "drawn": the axis
-            passes through the joint's origin in the URDF. "minimal": the axis passes through the origin of
-            the next revolute joint, so that a is 0.
-        like: A published table. The result has its positive directions of the joints, its directions of x,
+        slide: Position of the axis of each prismatic joint; the joint itself defines only the axis's
+            direction. "drawn": the axis passes through the joint's origin in the URDF. "minimal": the axis
+            passes through the origin of the next revolute joint, so that a is 0.
+        like: A published table. The result copies its positive directions of the joints, its directions of x,
             its offsets along parallel axes, and its zero positions of the first and the last joint. All other
-            numbers come from the URDF. `flip`, `first`, `last`, `sign` and `parallel_offset` are ignored.
+            numbers come from the URDF. With `like`, the arguments `flip`, `first`, `last`, `sign` and
+            `parallel_offset` are ignored.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.

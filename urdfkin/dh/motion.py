@@ -1,8 +1,9 @@
-"""Compute velocity, Jacobian and acceleration of a table's tip by the textbook's recursion on its frames.
+"""Compute velocity, Jacobian and acceleration of a table's tip by a recursion over the table's frames.
 
-The recursion uses equations 7.85 and 7.127 to 7.130, with d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64), on a
-tree whose joint frames are the table's frames. Each row has its own coordinate in this tree. With mimic
-rules, the joint values are G q + g, and the Jacobian is J_rows G.
+The recursion uses equations 7.85 and 7.127 to 7.130 of the textbook, with d_{i-1,i} = d_i z_{i-1} + a_i x_i
+(7.64). It runs on a tree whose joint frames are the table's frames. In this tree, each row has its own
+coordinate. With mimic rules, the joint values are G q + g, and the Jacobian is J_rows G, where J_rows is the
+Jacobian of the tree.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def _compiled_tree(table: DHTable) -> CompiledTree:
 def jacobian(
     table: DHTable, q: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (7.85).
+    """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (equation 7.85).
 
     `q` (..., coordinates) is in the order of `joint_names` (rad or m), or a mapping by name. The world is the
     table's base frame. A wrong length of `q` raises InputError.
@@ -43,7 +44,7 @@ def jacobian(
 def velocity(
     table: DHTable, q: Given, v: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6) velocity of the tip, [linear; angular] (7.127, 7.128); batches broadcast.
+    """Return the (..., 6) velocity of the tip, [linear; angular] (equations 7.127, 7.128); batches broadcast.
 
     The arguments are as in `jacobian`, with `v` in rad/s or m/s.
     """
@@ -54,7 +55,7 @@ def velocity(
 def acceleration(
     table: DHTable, q: Given, v: Given, a: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6) classical acceleration of the tip, [linear; angular] (7.129, 7.130).
+    """Return the (..., 6) classical acceleration of the tip, [linear; angular] (equations 7.129, 7.130).
 
     The arguments are as in `velocity`, with `a` in rad/s^2 or m/s^2.
     """

@@ -1,4 +1,4 @@
-"""Read tables from TOML files, JSON files, and plain text that you copy from a document or web page.
+"""Read tables from TOML files, JSON files, and plain text copied from a document or web page.
 
 `urdfkin.dh.rows` defines the content of TOML and JSON files. A table in text has a line of headings that
 contains a, alpha, d and theta in any order, and below it a line for each joint. Commas, semicolons, tabs,
@@ -35,7 +35,7 @@ from urdfkin.system.resources import robots_dir
 
 #: Largest error of a rotation that is printed with six digits.
 _PRINTED = 1e-5
-#: Maximum number of lines from the heading of a pose to its third row, with blank lines and Markdown fences.
+#: Maximum number of lines from the heading of a pose to its third row, including blank lines and fences.
 _POSE_LINES = 6
 #: Pattern of a line that states a property, such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
@@ -78,7 +78,7 @@ def from_sheet(text: str) -> dict[str, Any]:
             break
     else:
         raise _no_header(lines)
-    # A title line states no property, even if the name of the robot is "robot".
+    # A title line is skipped, because a name such as "robot" would look like a property.
     without_title = [line for line in grid.around if not _TITLE.search(line)]
     data = _settings(without_title, _CSV_SETTING if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(grid)):
@@ -101,7 +101,7 @@ class _Column:
 
     Attributes:
         name: Name of the cells in `urdfkin.dh.rows`; "" for an unknown heading.
-        previous: Whether the heading contains i-1.
+        previous: Whether the heading has the index i-1, as in modified tables.
     """
 
     name: str
@@ -137,7 +137,7 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
         if columns is None:
             continue
         rows, end = list[list[str]](), k + 1
-        for end, below in enumerate(lines[k + 1 :], k + 1):  # noqa: B007  the code after the loop reads `end`
+        for end, below in enumerate(lines[k + 1 :], k + 1):  # noqa: B007  `end` is used after the loop
             if not below.strip() and rows:
                 break
             cells = split(below)
@@ -325,7 +325,7 @@ def _coordinate_names(lines: list[str]) -> list[str]:
 
 
 def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
-    """Return a row as a mapping from column names to cells with units, without optional empty cells."""
+    """Return a row as a mapping from column names to cells with units; omit empty optional cells."""
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _ROW_NUMBERS:
@@ -380,9 +380,9 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
-    """Make a mimic rule of each variable q1, q2, ... that is not the row's own.
+    """Make a mimic rule from each variable q1, q2, ... that belongs to another row.
 
-    `coordinates` are the joints of q1, q2, ...; [] stands for the joints of the rows.
+    `coordinates` contains the joints with the variables q1, q2, ...; [] means the joints of the rows.
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -528,7 +528,7 @@ def published(robot: str) -> list[str]:
 
 
 def reference_path(name: str) -> Path:
-    """Return the file of a table, given its path or the name in `references`; else raise UnknownNameError."""
+    """Return the file of a table with this path or published name; raise UnknownNameError if unknown."""
     path = Path(name)
     if path.suffix or exists(path):
         return path

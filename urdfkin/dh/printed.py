@@ -1,4 +1,4 @@
-"""Compute the tip error that the rounding of the numbers in a printed table causes."""
+"""Compute the tip error due to the rounding of numbers in a printed table."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ class PrintedPrecision:
 
     Attributes:
         digits: Number of printed significant digits.
-        metres: Largest distance between the tips of the printed and of the exact table on the samples.
-        bound: Guaranteed bound (metres) of this distance within the joint limits; None without a bound.
+        metres: Largest distance on the samples between the tip of the printed table and the tip of the exact
+            table.
+        bound: Guaranteed bound (metres) of this distance within the joint limits; None if no bound is known.
         samples: Number of sampled configurations.
     """
 
@@ -43,7 +44,7 @@ class PrintedPrecision:
 def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
     """Parse the printed form of a table, and compare the printed table with the exact table.
 
-    `pose_digits` is the number of significant digits of base and tool; None: as many digits as in `units`.
+    `pose_digits` is the number of significant digits of base and tool; None means `units.digits`.
     """
     rows = tuple(_printed_row(row, units) for row in table.rows)
     base, tool = (_printed_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
@@ -106,7 +107,7 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
 
 
 def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """Return the largest position error of any link with printed parameters, at `q` (n, coordinates)."""
+    """Return the largest position error of any link due to rounding in the table, at `q` (n, coordinates)."""
     again = replace(table, rows=tuple(_printed_tree_row(row, units) for row in table.rows))
     distances = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
     return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), None, len(q))

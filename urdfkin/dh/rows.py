@@ -57,7 +57,8 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys that describe a table, for example the source of the numbers, without changing it.
+#: Keys for information about a table, for example the source of its numbers.
+#: These keys do not change the table.
 _NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 _BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
@@ -113,14 +114,14 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
 
 
 def by_column(row: Sequence[Any]) -> dict[str, Any]:
-    """Return a row that is a list as a mapping."""
+    """Convert a row from a list to a mapping."""
     return dict(zip((*COLUMNS, "kind"), row, strict=False))
 
 
 def parse_row(row: Any, index: int, units: Units) -> DHRow:
     """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list; `index` counts from 0.
 
-    InputError names the row and the column.
+    The message of an InputError names the row and the column.
     """
     if isinstance(row, DHRow):
         return row
@@ -143,8 +144,9 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_order(rows: Sequence[Any]) -> None:
     """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles of a table are nearly always multiples of 15 degrees, and lengths hardly ever. Rows are rejected if
-    all numbers in the first and the fourth column are such multiples, but none in the second column.
+    Angles in a table are nearly always multiples of 15 degrees; lengths hardly ever look like such multiples.
+    The rows are rejected if all numbers in the first and the fourth column look like multiples of 15 degrees,
+    and no number in the second column does.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
@@ -445,7 +447,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy=f"name the joint that {row.mimic.leader!r} mimics; multiply the multipliers",
+                remedy=f"name the joint that {row.mimic.leader!r} mimics; use the product of the multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"

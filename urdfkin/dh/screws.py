@@ -2,10 +2,10 @@
 
     T(q) = exp([S_1] q_1) ... exp([S_n] q_n) M = M exp([B_1] q_1) ... exp([B_n] q_n)    (Modern Robotics, 4.1)
 
-M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in that
-book and in its code. For a revolute joint through p, w is the unit axis and v = p x w. For a prismatic joint,
-w = 0 and v is the unit direction. Space screws S are in the base frame, body screws B = Ad(M^-1) S in the tip
-frame.
+M is the tip's pose in the zero configuration. A screw is (w, v), with the **angular part first**, as in the
+book Modern Robotics and its code. For a revolute joint through p, w is the unit axis and v = p x w. For a
+prismatic joint, w = 0 and v is the unit direction. Space screws S are in the base frame; body screws B =
+Ad(M^-1) S are in the tip frame.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The product of exponentials as a path of rotations about, or translations along, z axes.
+        """The product of exponentials as a path of rotations about z axes and translations along z axes.
 
         For a revolute joint, exp([S] q) = A Rz(q) A^-1. For a prismatic joint, exp([S] q) = A Tz(q) A^-1. The
         z axis of the pose A is along the joint's axis. The constant pose between two motions is A_i^-1
@@ -162,7 +162,7 @@ class ProductOfExponentials(Displayable):
 
     @property
     def roundings(self) -> float:
-        """Bound of the rotation error that rounding causes in `placement`, in machine epsilons.
+        """Bound of the rotation error that rounding causes in `placement`, in units of the machine epsilon.
 
         The bound is twice the bound for a Denavit-Hartenberg table of the same path, and does not contain the
         effect of rounding in q.

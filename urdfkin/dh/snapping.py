@@ -1,9 +1,9 @@
-"""Snap angles to multiples of 15 degrees, and state the effect on the tip.
+"""Snap angles to multiples of 15 degrees, and compute the effect on the tip.
 
 Three kinds of angles are snapped:
 
 1. roll, pitch and yaw of each joint's origin in the URDF;
-2. the tilt between consecutive axes, and the rotations before and after it;
+2. the tilt between consecutive axes, and the rotations about these axes;
 3. theta of each row of the derived table.
 
 The positions of the joints' origins do not change. A changed angle therefore only rotates the rest of the
@@ -63,7 +63,7 @@ def check_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with snapped angles, and pairs of a constant pose's index and its change."""
+    """Return the chain with snapped angles, and pairs: the index of a constant pose, and its change."""
     exact = chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
     path = chain(snapped_tree, tip, base)
@@ -89,7 +89,7 @@ def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DH
         angle = abs(angle_difference(row.theta, theta))
         if 0.0 < angle <= tolerance:
             rows[i] = replace(row, theta=theta)
-            # The derivation may have shifted a prismatic axis to the previous joint's origin.
+            # A prismatic axis may have been shifted to the origin of the previous joint.
             pivot = i + 1 if row.kind.turns else i
             what = f"theta of {row.joint}: {row.theta:.9g} to {theta:.9g}"
             changes.append(replace(_change(exact, pivot, what, angle), row=i))
@@ -155,7 +155,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    if level <= tolerance:  # Roll and yaw are about the same axis.
+    if level <= tolerance:  # Gimbal lock: set roll to 0.
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -188,7 +188,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
         is_round = abs(angle - twelfth) <= max(tolerance, TURN * EPS)
         turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
         if is_round:
-            turn[np.abs(turn) < EPS] = 0.0  # The computed cosine of a right angle is not 0.
+            turn[np.abs(turn) < EPS] = 0.0  # In doubles, cos(pi/2) is not 0.
         R = R @ turn
     return R
 
@@ -199,7 +199,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
 def _changes_of_origins(
     steps: Sequence[tuple[Joint, bool]], rotations: Mapping[str, float]
 ) -> list[tuple[int, SnapChange]]:
-    """Return a change for each snapped origin; `lever` is the path length from it to the tip."""
+    """Return a `SnapChange` for each snapped joint origin; its `lever` is the path length to the tip."""
     changes, lever, sliders = list[tuple[int, SnapChange]](), 0.0, list[str]()
     moving = sum(joint.kind.has_axis for joint, _ in steps)
     for joint, backwards in reversed(steps):
@@ -218,7 +218,7 @@ def _changes_of_origins(
 
 
 def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
-    """Return a change that rotates the chain after joint k about its origin; joint 1 is the first joint."""
+    """Return a `SnapChange` that rotates the chain after joint k (from 1) about the joint's origin."""
     sliders = tuple(joint.name for joint in exact.joints[max(k - 1, 0) :] if not joint.kind.turns)
     return SnapChange(0, what, angle, float(exact.lengths[k:].sum()), sliders)
 
@@ -256,10 +256,11 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Return a line that recommends the tolerance with the fewest noisy cells; None if no tolerance helps.
+    """Recommend the tolerance with the fewest noisy cells, in one line; None if no tolerance helps.
 
-    A noisy cell is the effect of an angle that the file rounds: 1.5708 may cause a tilt of 5e-12 rad and
-    offsets of about 1e-12 m. `snapped` returns the table that is snapped with a tolerance (rad).
+    A noisy cell differs slightly from 0 or from a multiple of 15 degrees, because an angle in the file is
+    rounded. For example, 1.5708 may cause a tilt of 5e-12 rad and offsets of about 1e-12 m. `snapped` is
+    a function that returns the table for a snapping tolerance (rad).
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

@@ -10,7 +10,8 @@ al., 2014). An OPW arm is the standard table
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
 with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF with the frames of an OPW
-table, and reads the parameters from it. OPW has no parameter for the small tilts of a calibrated arm.
+table; the cells of the derived table give the parameters. OPW has no parameter for the small tilts of a
+calibrated arm.
 
 `axes_and_vectors` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
 
@@ -44,7 +45,7 @@ NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
 EXACT = 1e-9
 #: Singular value below which the Jacobian loses rank; rounding errors are far smaller.
 _RANK = 1e-6
-#: Number of random configurations from which the reach is estimated, within the limits, without mimic rules.
+#: Number of random configurations, within the limits and without mimic rules, to estimate the reach.
 _SAMPLES = 2000
 #: Default tolerance of `opw_of` (metres and rad).
 TOLERANCE = 1e-6
@@ -157,7 +158,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the point nearest to some axes in least squares, and its largest distance from them (m)."""
+    """Return the point with the least squared distances from some axes, and its largest distance (m)."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -236,7 +237,7 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
 def _origin(screws: ProductOfExponentials) -> FloatArray:
     """Return the point of the first axis that is nearest to the second axis.
 
-    If a joint is prismatic, or if the axes are nearly parallel, it is the first point in `screws.points`.
+    If a joint is prismatic, or if the axes are nearly parallel, return the first point in `screws.points`.
     """
     if not screws.joints:
         return np.zeros(3)
@@ -253,7 +254,8 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     """Return an upper bound of the tip's distance (metres) from `origin`, a point of the first axis.
 
-    The bound is the length of the polygon from `origin` through the nearest point of each next axis.
+    The bound is the length of the polygonal chain from `origin` to the tip. Each vertex is the point of the
+    next axis that is nearest to the previous vertex. Travel of prismatic joints is added.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
@@ -329,7 +331,7 @@ class Opw:
 def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     """Return the OPW parameters of a path of six revolute joints.
 
-    `tolerance` is the largest error of the tip on `SAMPLES` configurations, in metres and in radians.
+    `tolerance` is the largest allowed error of the tip on `SAMPLES` configurations, in metres and in radians.
 
     Raises:
         InputError: the path does not have exactly six revolute joints, or is not an OPW arm. The message
@@ -383,7 +385,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _parameters(table: DHTable) -> Opw:
-    """Return the OPW parameters of a table with the frames of the OPW table; other cells are ignored."""
+    """Return the OPW parameters of a table that has the frames of an OPW table; ignore all other cells."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -396,7 +398,7 @@ def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatAr
     """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) between points on these axes, in metres.
 
     All joints must be revolute. The first vector begins at the base, and the last vector ends at the tip. The
-    vector between two intersecting axes is zero, by which solvers detect the intersection.
+    vector between two intersecting axes is zero; solvers detect the intersection by this zero.
     """
     points = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
@@ -405,7 +407,8 @@ def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatAr
 def _points(screws: ProductOfExponentials) -> FloatArray:
     """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
 
-    Of several intersections of an axis, that of three axes has priority, and then that closest to the tip.
+    If an axis has several intersections, an intersection of three axes has priority over one of two axes.
+    Among intersections of equally many axes, the one closest to the tip has priority.
     """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):

@@ -120,10 +120,10 @@ class DHRow:
 
     @property
     def foot(self) -> float:
-        """Distance (metres) along the next axis to the common normal; 0 if `beta` is 0.
+        """Distance (metres) along the next axis from the row's x axis to the common normal; 0 if `beta` is 0.
 
         The x axis of a Hayati row intersects the next axis, but is not the common normal of the two axes. The
-        distance from this intersection to the common normal is |a sin(beta)| / sin^2(tilt).
+        distance is |a sin(beta)| / sin^2(tilt).
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].foot
@@ -201,7 +201,7 @@ def is_identity(T: FloatArray) -> bool:
 
 
 def angle_difference(first: float, second: float) -> float:
-    """Return first - second in [-pi, pi]: full turns are removed."""
+    """Return first - second without full turns, in [-pi, pi]."""
     return math.remainder(first - second, 2.0 * math.pi)
 
 
@@ -223,7 +223,7 @@ def cleaned_angle(angle: float) -> float:
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle is nearly a multiple of 15 degrees other than 0; `twelfth` is 15 degrees in its unit.
+    """Whether an angle is nearly a multiple of 15 degrees, but not 0; `twelfth` is 15 degrees in its unit.
 
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
@@ -296,7 +296,7 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the (...,) guaranteed bound (metres) of the tip's displacement.
+        """Return a guaranteed bound (...,) of the tip's displacement (metres).
 
         `values` contains the values of the prismatic joints by name.
         """
@@ -464,9 +464,9 @@ class DHTable(Displayable):
     def rounding(self, q: Given) -> FloatArray:
         """Return a bound (...,) in metres for the position error that rounding causes in `placement(q)`.
 
-        The bound is the length of the chain times the sum of the rounding errors of the rows and of their
-        angles (`urdfkin.kinematics.roundings`). The bound divided by `span` is a bound of the orientation
-        error in radians.
+        The bound is the length of the chain times the sum of all rounding errors of rows and angles
+        (`urdfkin.kinematics.roundings`). The bound divided by `span` is a bound of the orientation error in
+        radians.
 
         >>> import urdfkin
         >>> bool(urdfkin.load("planar_two_link").dh("tip", "base").rounding([0.0, 0.0]) < 1e-13)

@@ -85,8 +85,8 @@ class TreeParameters:
     Attributes:
         path_lengths: (joints,) sum of the URDF's offsets (metres) from the root to each joint.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        left_out: Largest sum (rad), over the paths from the root, of the tilts that are replaced by zero as
-            rounding errors (`urdfkin.dh.common_normals`).
+        left_out: Tilts within rounding errors are set to zero (`urdfkin.dh.common_normals`). This is the
+            largest sum (rad) of such tilts on a path from the root.
     """
 
     robot: str
@@ -200,7 +200,7 @@ class _LinkAxis:
         T_antecedent_axis: (4, 4) pose of this axis frame in the axis frame of the antecedent.
         T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
         noise: Rounding errors of `T_antecedent_axis`.
-        left_out: Sum (rad) of the tilts between the root and this link that are replaced by zero as rounding
+        left_out: Sum (rad) of the tilts between the root and this link that are set to zero as rounding
             errors.
     """
 
@@ -214,7 +214,7 @@ class _LinkAxis:
 def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_LinkAxis]()
-    # For each link: its antecedent, its pose in the antecedent's axis frame, the number of joints between.
+    # For each link: the antecedent, T_antecedent_link, and the number of joints between these links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -332,7 +332,7 @@ def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return CSV in metres and radians; each line contains a row, and T11 to T34 of T_frame_link."""
+    """Return CSV in metres and radians; each line has a row, and the entries T11 to T34 of T_frame_link."""
     entries = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *entries]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3], strict=True):

@@ -1,9 +1,10 @@
 r"""Convert a table's numbers from text and to text, with fractions of pi, degrees or millimetres.
 
-A table itself is always in metres and radians. Other units are used only when a table is read or written.
+A table object is always in metres and radians. Other units are used only when a table is read or written.
 
-The text of a cell, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`, is a sum. Each
-term is a number or a multiple of pi, with or without a unit, or the joint's variable, which may occur once.
+The text of a cell, such as `q1 + pi/2`, `90 deg`, `107 mm`, `-θ₂*`, `\frac{\pi}{2}` or `180°`, is a sum. A
+term of the sum is a number or a multiple of pi, with or without a unit, or the joint's variable. The variable
+may occur once.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Lengths(StrEnum):
     MILLIMETRES = "millimetres"
 
 
-#: Default order of the four columns, and order of the cells in a row that is a list.
+#: Default order of the four columns; a row that is a list has its cells in this order.
 #: The order in Craig's book is alpha, a, d, theta; in the Robotics Toolbox, theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
@@ -154,7 +155,7 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     return number if units.angles is Angles.RADIANS else in_radians(number)
 
 
-#: Plain text for characters that occur in web pages, PDFs and LaTeX.
+#: Plain-text replacements for characters that occur in web pages, PDFs and LaTeX.
 _PLAIN_TEXT = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),

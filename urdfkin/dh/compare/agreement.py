@@ -31,20 +31,21 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, is_bounded
 
-#: Default tolerance of the tip's position (metres), which covers one or two cells rounded to 0.1 mm.
+#: Default tolerance of the tip's position (metres).
+#: It covers the effect of one or two cells that are rounded to 0.1 mm.
 TOLERANCE = 2e-4
-#: Numbers of configurations for the fit and for its check.
+#: Number of sampled configurations for the fit, and for the check of the fit.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Largest tip error after a correction of the differing cells, relative to the tip error before it.
+#: Differing cells are reported only if their correction reduces the tip error to this fraction.
 _CORRECTED = 0.5
-#: Largest tip error after a correction of a single mistake, relative to the tip error before it.
+#: The correction of a reported single mistake reduces the tip error to this fraction or to the tolerance.
 _MISTAKE_CORRECTED = 0.05
 #: Smallest reported change of a cell, relative to the reach (a tenth of `EXPLAINED`).
 _LEAST_CHANGE = 1e-10
-#: Maximum number of cells that differ without a fit, in addition to the cells that differ after a fit.
+#: The cells that differ without a fit are reported if they are at most this many more than after a fit.
 _MORE_CELLS = 2
-#: Smallest spread of the tip's positions, relative to the path length, that is used as the reach.
+#: Smallest diameter of the tip's positions, relative to the path length, that is used as the reach.
 _FIXED_TIP = 1e-6
 #: Range of a prismatic joint without limits (metres).
 _SLIDE = (-0.5, 0.5)
@@ -72,7 +73,7 @@ def compare(
         digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
 
     Raises:
-        InputError: the joints of the table differ in number or kind from those of the path.
+        InputError: the table and the path differ in the number or in the kinds of their joints.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -125,8 +126,8 @@ def compare(
 def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
     """Return the largest tip error on samples (metres, radians) after a fast fit of the free parameters.
 
-    The fit tries only a few combinations of joint signs, and stops at the tip error `enough` (metres). If the
-    joints differ in number or kind, InputError is raised.
+    The fit tries only a few combinations of joint signs, and stops when the tip error is at most `enough`
+    (metres). If the joints differ in number or kind, InputError is raised.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -135,10 +136,11 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tup
 
 
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
-    """Return the robot's reach, which converts radians to metres: the spread of the tip's positions.
+    """Return the robot's reach (metres); angles are multiplied by it to compare them with lengths.
 
-    The path length is used only if it is shorter, or if the tip hardly moves. In a URDF that was made from a
-    table without Hayati rows, the path length may be kilometres.
+    The reach is twice the largest distance of a tip position from the mean position. If the path length is
+    shorter, or if the tip hardly moves, the reach is the path length. The path length is not always used,
+    because it may be kilometres in a URDF that was made from a table without Hayati rows.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -166,7 +168,7 @@ def check_joints(chain: FrameChain, reference: DHTable) -> None:
 
 
 def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
-    """Return the samples for a fit, and other samples for its check."""
+    """Return the tip's poses on samples for a fit, and on other samples that check the fit."""
     values, poses = _samples(chain, FIT_SAMPLES, _FIT_SEED)
     scale = _reach(chain, poses)
     return TargetPoses(values, poses, scale), TargetPoses(*_samples(chain, CHECK_SAMPLES, _CHECK_SEED), scale)
@@ -203,9 +205,9 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _reference_row(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the index of the reference row that contains a cell of the standard row i; None if no row does.
+    """Return the index of the reference row that contains a cell of row i of the standard table, or None.
 
-    In a modified table, a, alpha and beta are in row i + 1.
+    If the reference is modified, it contains a, alpha and beta in row i + 1.
     """
     at = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return at if at < len(reference.rows) else None
@@ -220,9 +222,9 @@ def _mask(reference: DHTable) -> FloatArray:
 def _hidden(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of the cells that have the same effect as base, tool or joint offsets.
+    """Return row and name of each cell with the same effect on the tip as base, tool or joint offsets.
 
-    A beta of 0 is left out.
+    Cells beta with the value 0 are not included.
     """
     hidden = []
     for i, k in hidden_cells(fitted, check_targets):
@@ -269,7 +271,7 @@ def _differences_without_fit(
     check_targets: TargetPoses,
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ if no free parameter is fitted, or () if they do not explain the error."""
+    """Return the cells that differ without a fit, or () if their correction does not remove the tip error."""
     corrected = fit_cells(written, targets, _mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > EXPLAINED * targets.scale or radians > EXPLAINED:
@@ -292,8 +294,9 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> 
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
     """Return an upper bound of a table's tip error (metres, radians) for every configuration.
 
-    The bound does not include rounding errors. Mimic rules are ignored. The path and the table become two
-    mechanisms with the same joints, whose difference is bounded as in `urdfkin same`.
+    The bound does not include rounding errors. Mimic rules are ignored. The path and the table are converted
+    to two mechanisms with the same joints, and the difference of the mechanisms is bounded as in `urdfkin
+    same`.
     """
     mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)

@@ -2,12 +2,13 @@
 
 The free parameters are base, tool and joint offsets. The tip's error at each sampled configuration is a
 twist. A small change of any number in the table also moves the tip by a twist, so least squares find the
-changes that remove the error. If different cells can remove the same error, a reweighted solution changes as
-few cells as possible.
+changes that remove the error. If changes of different cells can remove the same error, reweighted least
+squares change as few cells as possible.
 
-Two joints with nearly coinciding axes have nearly the same effect. An angle that is added to one joint offset
-and subtracted from the other hardly moves the tip, so a fit changes such offsets slowly. When the error no
-longer decreases, `fit_free_parameters` changes two such offsets by a large angle, and fits again.
+Two joints with nearly coinciding axes have nearly the same effect on the tip. An angle that is added to one
+joint offset and subtracted from the other hardly moves the tip, so a fit changes such offsets slowly. When
+the error no longer decreases, `fit_free_parameters` changes two such offsets by a large angle, and fits
+again.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, pose
 
-#: Motion of each cell of a row, in the order of the transforms.
+#: Elementary motion that each cell of a row describes, in the order of the transforms.
 _MOTIONS = {
     "theta": ElementaryMotion(2, True),
     "d": ElementaryMotion(2, False),
@@ -47,27 +48,27 @@ _MAX_STEPS = 40
 _LEAST_DECREASE = 1e-9
 #: Mean error, relative to the reach, at which the fit of the cells ends.
 _SOLVED = 1e-14
-#: Smallest singular value, relative to the largest, in the fit of the free parameters and of the cells.
+#: Relative cutoffs for singular values: in the fit of the free parameters, and in the fit of the cells.
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 #: Number of times that the weights of the cells are recomputed.
 _REWEIGHTINGS = 25
 #: Smallest weight of a cell, relative to the reach.
 _LEAST_WEIGHT = 1e-9
-#: First weight of the last cell; the first weight of the first cell is 1.
-#: Of two cells with the same effect on the tip, the fit therefore changes only one.
+#: Initial weight of the last cell; initial weights increase linearly from 1 at the first cell.
+#: Because these weights differ, the fit changes only one of two cells with the same effect on the tip.
 _LAST_WEIGHT = 1.2
-#: First weight of beta, and its factor at each reweighting.
+#: Initial weight of beta, and the factor that reduces it at each reweighting.
 #: With a small weight, beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 #: Largest relative difference between two effects on the tip that are treated as equal.
 _SAME_EFFECT = 1e-6
-#: Number of slow steps after which the fit of the free parameters ends.
+#: Number of consecutive steps with little improvement after which the fit of the free parameters ends.
 _PATIENCE = 4
-#: Mean error of a fit, relative to the reach, at which joint offsets are no longer changed by large angles.
+#: Below this mean error, relative to the reach, joint offsets are not changed by large angles.
 _ROUNDING = 1e-13
 #: Tip error, relative to the reach, below which no other joint signs are tried.
 _TIP_ROUNDING = 1e-12
-#: Largest tip error of a fit from other joint signs, relative to the fit from the written table.
+#: A fit with other joint signs is used only if its tip error is below this fraction of the best so far.
 _OTHER_START_ERROR = 0.5
 #: Angles (rad) that are added to a joint offset and subtracted from the next joint offset.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
@@ -162,7 +163,7 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the twists (6 s,) from a model's poses to the target poses, with angles times `scale`."""
+        """Return the twists (6 s,) from a model's poses to the target poses, angles multiplied by `scale`."""
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
@@ -170,11 +171,11 @@ class TargetPoses:
 def tip_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and their derivatives by the free parameters and by the cells, as twists.
+    """Return the tip's poses, and their derivatives (twists) by the free parameters and by the cells.
 
-    The derivatives have six rows for each sample. The columns of the free parameters are six numbers of the
-    base, six of the tool, and the variable of each row. The columns of the cells are in row order. Angles are
-    multiplied by the scale. `frames` are the poses of all frames at all samples; None: they are computed.
+    The derivatives have six rows for each sample. The free parameters have six columns for the base, six for
+    the tool, and one for the joint offset of each row. The columns of the cells are in row order. Angles are
+    multiplied by the scale. `frames` are the poses of all frames at all samples; if None, they are computed.
     """
     scale = targets.scale
     path, amounts = model.path_at(targets.values)
@@ -191,7 +192,7 @@ def tip_derivatives(
 
 
 def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the twists (6 s, 6) of the tip for translations and rotations of the chain after a frame.
+    """Return the twists (6 s, 6) of the tip if the chain after a frame is translated or rotated.
 
     The first three columns are translations along the axes of the frame, the last three rotations about them.
     """
@@ -206,14 +207,14 @@ def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatA
 def with_changes(
     model: TableArrays, free: FloatArray, scale: float, cells: FloatArray | None = None
 ) -> TableArrays:
-    """Return the model after small changes of its free parameters and cells; angles are times `scale`."""
+    """Return the model after small changes of free parameters and cells; angles are multiplied by `scale`."""
     units = np.where(_IS_ANGLE, 1.0 / scale, 1.0)
     new_cells = model.cells.copy() if cells is None else model.cells + cells.reshape(-1, len(CELLS)) * units
     for i, offset in enumerate(free[12:]):
         k = model.variables[i]
         new_cells[i, k] += offset * units[k]
-    # Base and tool are changed in the frame of the first or the last revolute joint.
-    # A rotation about the axis of that joint then exactly equals a change of the joint's offset.
+    # The base is changed in the frame of the first revolute joint, the tool in the frame of the last.
+    # A rotation about the axis of such a joint then exactly equals a change of the joint's offset.
     base = _with_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _with_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -230,8 +231,8 @@ def _with_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, free: bool) -> TableArrays:
     """Fit the table to the URDF with the fewest and smallest changes of cells.
 
-    `mask` (n, 5) is 1 for cells that may change, and 0 for all other cells. With `free`, base, tool and joint
-    offsets may change too.
+    `mask` (n, 5) is 1 for cells that may change, and 0 for all other cells. If `free` is true, base, tool and
+    joint offsets may change too.
     """
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
@@ -245,7 +246,7 @@ def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, fre
         by_cells = by_cells * mask.ravel()
         by_free = by_free if free else np.zeros_like(by_free)
         cells = _sparse_changes(model, start, by_free, by_cells, error, scale)
-        # With rcond, the offsets of nearly coinciding axes do not change by large opposite angles.
+        # The cutoff rcond prevents large opposite changes of two offsets whose axes nearly coincide.
         offsets = np.linalg.lstsq(by_free, error - by_cells @ cells, rcond=_RCOND_FREE)[0]
         shorten = min(1.0, _LONGEST_STEP * scale / max(float(np.abs(offsets).max()), NOT_ZERO))
         model = with_changes(model, np.asarray(offsets * shorten, np.float64), scale, cells * shorten)
@@ -260,9 +261,9 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes of cells that remove the error, so that few cells differ from `start`.
+    """Return changes of cells that remove the error; as few cells as possible then differ from `start`.
 
-    A cell does not change if free parameters, for example the joint offset of its row, have the same effect.
+    A cell does not change if a free parameter, for example the joint offset of its row, has the same effect.
     """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)
@@ -282,14 +283,14 @@ def _sparse_changes(
 
 
 def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the columns; no columns if all of them are zero."""
+    """Return an orthonormal basis of the column space; an empty basis if all columns are zero."""
     return np.linalg.qr(by_free)[0] if by_free.any() else np.zeros((len(by_free), 0))
 
 
 def hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
     """Return (row, cell index) of each cell that the tip's poses do not determine.
 
-    Some change of the free parameters has the same effect on the tip as a change of such a cell.
+    A change of such a cell moves the tip in the same way as some change of the free parameters.
     """
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
@@ -309,10 +310,10 @@ def fitted_model(
     *,
     fast: bool = False,
 ) -> TableArrays:
-    """Fit the free parameters, and return the best fit; `enough` (metres) is a sufficiently small tip error.
+    """Fit the free parameters, and return the best fit; stop at a tip error of at most `enough` (metres).
 
-    The fits start from the written table, and from tables with other joint signs or directions of x. Such a
-    table is used only if it halves the error.
+    The fits start from the written table, and from tables with other joint signs or directions of x. A fit
+    from one of the other tables is used only if it halves the smallest error so far.
     """
     written = TableArrays.of(standard)
 
@@ -336,7 +337,7 @@ def fitted_model(
 
 
 def with_end_offsets_in_base_and_tool(model: TableArrays, written: TableArrays) -> TableArrays:
-    """Move the fitted offset of the first joint into the base, and of the last joint into the tool."""
+    """Move the fitted offset of the first joint into the base, and that of the last joint into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
     X = between_axes(a, alpha, beta)
@@ -368,7 +369,7 @@ def fit_free_parameters(
 ) -> TableArrays:
     """Fit base, tool and joint offsets, or only base and tool.
 
-    With `large_angles`, two joint offsets change by a large angle when the error no longer decreases.
+    If `large_angles` is true, two joint offsets change by a large angle when the error stops decreasing.
     """
     for _ in range(2 * len(model.cells)):
         model, size = _least_squares_fit(model, targets, only_ends)

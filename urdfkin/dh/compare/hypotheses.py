@@ -1,8 +1,9 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
-An interpretation of a table consists of a convention, units and column names. In each interpretation, the
-table describes a robot with a different shape: the distances and angles of consecutive axes, and the offsets
-along them. `diagnose` fits only the few interpretations whose shapes are closest to the URDF's shape.
+An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
+robot a different shape; the shape consists of the distances and angles between consecutive axes, and the
+offsets along these axes. `diagnose` fits only the few interpretations whose shapes are closest to the URDF's
+shape.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ from urdfkin.model.tree import FloatArray
 _MOST_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL = 2e-2
-#: Cost of each difference from the file, relative to the smallest difference of the shapes.
+#: Cost of each change to the file's interpretation, relative to the smallest difference of the shapes.
 _DIFFERENCE_COST = 0.1
-#: Largest tip error of a better interpretation, relative to the original tip error and to the reach.
+#: Largest tip error of a better interpretation, as a fraction of the original tip error and of the reach.
 _BETTER = 0.05
 #: Keys of a row that `diagnose` uses; it ignores limits and mimic rules.
 _CELLS = ("joint", "kind", "sense", "beta", *COLUMNS)
@@ -48,7 +49,7 @@ class BetterInterpretation:
     """Another interpretation of a table, with which the table agrees with the URDF.
 
     Attributes:
-        stated: The interpretation that the table's file states.
+        stated: The interpretation that the file of the table states.
         metres, radians: Largest errors of the tip on the samples, after a fit of base, tool and offsets.
     """
 
@@ -117,7 +118,7 @@ def diagnose(
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> DHConvention:
-    """Find the convention of a table whose file names no convention, by a comparison with a path.
+    """Find the convention of a table that states no convention, by a comparison of the table with a path.
 
     `tolerance` is the tolerance at the tip (metres).
 
@@ -160,8 +161,8 @@ def shape(table: DHTable, scale: float) -> FloatArray:
     """Return offset, distance and angle (times `scale`) of each pair of consecutive axes.
 
     The offset is measured along the first of the two axes; offsets along parallel axes are summed. Joint
-    signs, joint offsets, base and tool do not change the result. A number is 0 if another choice could change
-    it: distances and offsets next to a prismatic axis, and the offset along the first axis of the path.
+    signs, joint offsets, base and tool do not change the result. Numbers that depend on free choices are set
+    to 0: distances and offsets next to a prismatic axis, and the offset along the first axis of the path.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False
@@ -186,7 +187,8 @@ class Interpretation:
 
     Attributes:
         convention: Standard or modified; None if the table names no convention.
-        columns: Quantities in the columns a, alpha, d and theta, or in the four columns without names.
+        columns: Quantities that the columns with the headings a, alpha, d and theta contain. If the table has
+            no headings: quantities that the four columns contain.
     """
 
     convention: DHConvention | None
@@ -262,7 +264,7 @@ def table_warnings(table: DHTable) -> list[str]:
         )
     elif lengths and max(lengths) < _SHORTEST * 2.0:
         warnings.append(
-            f"lengths of {max(lengths) * 1e3:.3g} mm at most look like metres:"
+            f"lengths of at most {max(lengths) * 1e3:.3g} mm look like metres:"
             " if they are metres, write lengths = 'metres'"
         )
     angles = [*columns["alpha"], *columns["theta"]]

@@ -2,7 +2,7 @@
 
 A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. After the
 correction of the cell, the table agrees with fewer fitted parameters, or without a fit. `MistakeSearch` tries
-each single correction, and reports those after which the fewest parameters must be fitted.
+each single correction, and reports the corrections that leave the fewest parameters to fit.
 """
 
 from __future__ import annotations
@@ -65,12 +65,13 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the mistakes after whose correction the fewest parameters must be fitted.
+        """Return the mistakes whose correction leaves the fewest parameters to fit.
 
-        The result is empty if no correction reduces the number of these parameters. With `fit`, base, tool,
-        joint offsets and joint signs may be fitted after a correction. `agrees` says whether the table agrees
-        after a fit of these parameters. Such a table may be right, with other frames than the URDF. Its
-        corrections are therefore reported only if they need a fit of only the base or the tool, or no fit.
+        The result is empty if no correction reduces the number of these parameters. If `fit` is true, base,
+        tool, joint offsets and joint signs may be fitted after a correction. `agrees` is true if the table
+        agrees after a fit of these parameters. A table that agrees may be correct and differ from the URDF
+        only in its frames. Therefore, its corrections are reported only if they need no fit, or a fit of only
+        the base or only the tool.
         """
         if self._as_written(reference) is not None:
             return ()
@@ -111,7 +112,7 @@ class MistakeSearch:
         return model if self._agrees(model) else None
 
     def _with_one_end(self, table: DHTable) -> TableArrays | None:
-        """Fit only the tool, or else only the base."""
+        """Fit only the tool; if the table then does not agree, fit only the base."""
         model = _model(table)
         poses, target_poses = model.poses(self.targets.values), self.targets.poses
         with_tool = replace(model, tool=_mean(model.tool @ np.linalg.inv(poses) @ target_poses))
@@ -142,7 +143,7 @@ class MistakeSearch:
         return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
 
     def _fitted(self, written: TableArrays, model: TableArrays) -> Fitted:
-        """Return the free parameters whose change is larger than the resolution of the fit."""
+        """Return the free parameters that the fit changed by more than its resolution."""
         metres, radians = self.check_targets.largest_errors(model)
         fine = resolution(metres / self.check_targets.scale, radians)
         rows = np.arange(len(model.cells))
@@ -191,7 +192,8 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    if len(reference.rows) > 3:  # Reversing three rows exchanges the first and the last.
+    # The reverse order of three rows is an exchange of the first and the last row, which is tried above.
+    if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
     for kind, indices, rows in orders:
@@ -211,7 +213,7 @@ def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean(poses: FloatArray) -> FloatArray:
-    """Return the (4, 4) mean of nearly equal poses; the first pose if the mean is not a rotation."""
+    """Return the (4, 4) mean of nearly equal poses, or the first pose if the mean is not a rotation."""
     mean = poses.mean(axis=0)
     R = polar_factor(mean[:3, :3])
     return pose(R, mean[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])

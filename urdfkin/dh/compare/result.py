@@ -20,11 +20,12 @@ Parts = list[str | Table | Matrix]
 
 #: Largest tip error that may remain after the differing cells are corrected.
 #: The unit is rad for angles, and metres per metre of reach for positions.
-#: The rounding errors of a fit are far smaller, and the last digits in data sheets are far larger.
+#: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
 EXPLAINED = 1e-9
 #: Finest resolution of printed fitted numbers (rad, or metres per metre of reach).
 _FINEST = 1e-12
-#: Largest difference due to rounding, in half units of the last digit; decimals are not exact doubles.
+#: Largest difference that rounding can cause, as a multiple of half a unit of the last digit.
+#: The number exceeds 1 because doubles cannot represent most decimal numbers exactly.
 _HALF = 1.0 + 1e-6
 
 
@@ -87,8 +88,8 @@ class Fitted:
     """The parameters that a fit must change so that a table agrees with the URDF.
 
     Attributes:
-        zeros: Number of changed zero positions of joints.
-        reversed: Number of changed positive directions of joints.
+        zeros: Number of joints whose zero position the fit changed.
+        reversed: Number of joints whose positive direction the fit changed.
     """
 
     base: bool = False
@@ -109,7 +110,7 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """A likely mistake in a table. After its correction, fewer parameters must be fitted.
+    """A likely mistake in a table: a correction of the mistake leaves fewer parameters to fit.
 
     Attributes:
         rows: Indices of the changed rows, from 0.
@@ -134,8 +135,8 @@ class TableComparison:
 
     Attributes:
         reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
-            offsets. The method `placement` of this table takes the URDF's coordinates.
-        reach: Reach of the robot (metres). An angle times the reach is compared with a length.
+            offsets. The method `placement` of this table accepts the coordinates of the URDF.
+        reach: Reach of the robot (metres). Angles are multiplied by the reach to compare them with lengths.
         fitted: Whether base, tool, joint signs and joint offsets were fitted.
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
@@ -144,13 +145,13 @@ class TableComparison:
         most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all joint
             values. The bounds do not include rounding errors.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
-        differences: The cells that differ, in descending order of their effect at the tip. If there is a
-            single mistake, this is the cell of the mistake.
+        differences: The cells that differ, in descending order of their effect at the tip. If exactly one
+            mistake is likely, the only entry is the cell of this mistake.
         instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
-            fitted; empty if no few cells remove the tip error.
+            fitted; empty if this would change too many cells, or would not remove the tip error.
         hidden: Row index and name of each cell whose value the tip's poses do not determine, because base,
             tool and joint offsets compensate for every change.
-        mistakes: The likely mistakes, whose correction leaves the smallest number of parameters to fit.
+        mistakes: The likely mistakes: a correction of any of them leaves the fewest parameters to fit.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
         tolerance: Tolerance at the tip (metres).
         samples: Number of configurations at which the fitted table was checked.
@@ -179,7 +180,7 @@ class TableComparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the tip error, with angles times the reach, is within `tolerance` on all samples."""
+        """Whether the tip error (angles multiplied by the reach) is within `tolerance` on all samples."""
         return self.metres <= self.tolerance and self.radians * self.reach <= self.tolerance
 
     @property
@@ -188,7 +189,7 @@ class TableComparison:
 
     @property
     def rounding(self) -> float:
-        """Limit below which errors are treated as rounding: radians, or metres per metre of reach."""
+        """Largest tip error that rounding can cause, in radians, or in metres per metre of reach."""
         return EPS * of_a_fit(len(self.reference.rows))
 
     @property
@@ -372,7 +373,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset with the resolution `fine`, or as a multiple of 15 degrees if `fine` allows it."""
+    """Format an offset with the resolution `fine`; write nearly exact multiples of 15 degrees exactly."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

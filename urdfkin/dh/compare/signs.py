@@ -34,11 +34,11 @@ BEAM = 128
 #: Cost (metres) of each reversed joint.
 #: Among equally good alignments, the search therefore selects the joint signs of the URDF.
 _REVERSAL_COST = 1e-9
-#: Weight of differences between lengths next to a prismatic axis, because this axis can be shifted.
+#: Weight of length differences next to a prismatic axis; it is small, because this axis can be shifted.
 _SLIDING_WEIGHT = 1e-3
 #: Distance (metres) below which two axes are treated as coinciding, so that x can have any direction.
 _NO_OFFSET = 1e-5
-#: Number of decimals (metres, radians) to which the numbers of equivalent alignments agree.
+#: Number of decimals (metres, radians) in which equivalent alignments agree.
 _DECIMALS = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -64,7 +64,7 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """An alignment of the first joints of the chain, which the search extends joint by joint.
+    """Joint signs and offsets for the first joints of the chain; the search extends them joint by joint.
 
     Attributes:
         cost: Sum of the differences between the cells of the two tables, in metres. Differences of angles are
@@ -73,10 +73,10 @@ class _PartialAlignment:
         offsets: Offsets of these joints except the last joint.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
         carry: Offset along z from the last joint's DH frame to its URDF frame (metres).
-        base: (4, 4) transform that becomes part of the base, instead of an offset in the first row.
-        free_offset: Row index and sign of a joint offset that can be chosen, because axes before the last
-            joint coincide and only the sum of their joint angles is defined. The sign is the direction in
-            which this offset rotates x. The index 0 is the base. None if no joint offset can be chosen.
+        base: (4, 4) transform that is multiplied with the base; it contains the offset of the first row.
+        free_offset: Row index and sign of a joint offset that can be chosen freely; None if no offset can. If
+            axes before the last joint coincide, only the sum of their joint angles is determined. The sign is
+            the direction in which this offset rotates x. If the index is 0, the offset is part of the base.
     """
 
     cost: float
@@ -91,8 +91,8 @@ class _PartialAlignment:
 def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[SignFit]:
     """Return up to `count` alignments of a path with a reference table, the closest first.
 
-    The reference table must be standard and have the same kinds of joints. With prismatic joints, several
-    combinations of signs may give equal tables, and only a fit can distinguish them.
+    The reference table must be standard and have the same kinds of joints as the path. With prismatic joints,
+    several combinations of signs may give equal tables, and only a fit can distinguish them.
     """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -153,7 +153,7 @@ def _extend(
         elif i > 0:
             cost += reach * abs(theta_error)
         offset, base = theta_error if turns[i] else d - row.d, candidate.base
-        if i == 0:  # The base contains the first row's offset.
+        if i == 0:  # The first row's offset becomes part of the base.
             base, offset = along_axis(step.phi - row.theta, step.delta - row.d), 0.0
         senses, offsets = (*candidate.senses, sense), (*candidate.offsets, offset)
         free_offset = _free_offset(candidate, step, i, turns[i])
@@ -175,7 +175,7 @@ def _free_offset(
 
 
 def _with_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
-    """Change the free joint offset so that the next row, of a prismatic joint, has the given theta."""
+    """Change the free joint offset so that the row of the next joint, a prismatic joint, has this theta."""
     if partial.free_offset is None:
         return partial
     excess = partial.phi_in + step.phi - theta
@@ -193,9 +193,9 @@ def _steps(
 ) -> Iterator[AxisTransform]:
     """Yield the possible transforms between two axes, with both directions of x.
 
-    If the axes are nearly parallel in the URDF and in the reference, the transform of a Hayati row is
-    possible; its x axis is at the offset d of the reference. The transform along the common normal is
-    possible unless the reference has a Hayati row. A shift of a prismatic axis can give x any direction.
+    A Hayati row is possible if the axes are nearly parallel in the URDF and in the reference; its offset d is
+    that of the reference. The transform along the common normal is possible unless the reference has a Hayati
+    row. Next to a prismatic joint, x can have any direction, because the axis of this joint can be shifted.
     """
     steps = []
     sine = tilt_of(A)

@@ -12,10 +12,10 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: Module of the formats that have units
+#: Module of the formats in which units can be chosen.
 _TEXT = "urdfkin.dh.export.text"
-#: For each format: the module of its function `write_NAME`, and a summary.
-#: The module is "" for a language of `urdfkin export`.
+#: For each format: the module that contains its function `write_NAME`, and a description.
+#: The module is "" if the module `urdfkin.export` writes the format.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT, "aligned text"),
     "markdown": (_TEXT, "a Markdown table"),
@@ -24,15 +24,15 @@ FORMATS: dict[str, tuple[str, str]] = {
     "csv": ("urdfkin.dh.export.data", "comma-separated, read back by urdfkin"),
     "json": ("urdfkin.dh.export.data", "JSON, read back by urdfkin"),
     "toml": ("urdfkin.dh.export.data", "TOML, read back by urdfkin"),
-    "numpy": ("", "Python code on NumPy, with its check"),
-    "matlab": ("", "MATLAB and Octave code, with its check"),
+    "numpy": ("", "Python code for NumPy, with a self-test"),
+    "matlab": ("", "MATLAB and Octave code, with a self-test"),
     "sympy": ("urdfkin.dh.export.code", "Python code for SymPy, exact"),
-    "casadi": ("", "Python code for CasADi, with its check"),
+    "casadi": ("", "Python code for CasADi, with a self-test"),
     "matlab-symbolic": ("urdfkin.dh.export.code", "MATLAB code for the Symbolic Math Toolbox"),
     "matlab-rst": ("urdfkin.dh.export.toolboxes", "MATLAB code for the Robotics System Toolbox"),
     "roboticstoolbox": ("urdfkin.dh.export.toolboxes", "Python code for roboticstoolbox's DHRobot"),
     "ets": ("urdfkin.dh.export.toolboxes", "elementary transforms, Python code for roboticstoolbox"),
-    "c": ("", "C99 code, with its check"),
+    "c": ("", "C99 code, with a self-test"),
 }
 
 
@@ -45,7 +45,7 @@ def export(table: DHTable, format: str, units: Units | None = None, *, verify: b
 
     Raises:
         UnknownNameError: an unknown format.
-        InputError: the format cannot express this table (a mimic joint in roboticstoolbox).
+        InputError: the format cannot express this table; for example, roboticstoolbox has no mimic joints.
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)

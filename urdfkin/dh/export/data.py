@@ -20,7 +20,7 @@ from urdfkin.errors.escape import csv_cell, escape
 
 
 def to_mapping(table: DHTable) -> dict[str, Any]:
-    """Return the table as plain data, in metres and radians; `snap` reports the snapped angles."""
+    """Return the table as plain data, in metres and radians; the key `snap` lists the snapped angles."""
     data: dict[str, Any] = {
         "convention": str(table.convention),
         "angles": "radians",

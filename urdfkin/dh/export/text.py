@@ -49,7 +49,7 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return for example "with q1 = left, q2 = right"; "" if the coordinates are the joints of the rows."""
+    """Return text such as "with q1 = left, q2 = right"; "" if the coordinates are the joints of the rows."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))

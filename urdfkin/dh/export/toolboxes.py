@@ -86,7 +86,7 @@ def write_matlab_rst(table: DHTable) -> str:
 
 
 def write_ets(table: DHTable) -> str:
-    """Return a module with `ets`, and `robot` of these transforms; raise InputError for a mimic joint."""
+    """Return a module with the transforms `ets` and the `robot`; raise InputError for a mimic joint."""
     check_no_mimic(table, "a sequence of elementary transforms")
     lines = docstring(table)
     lines += ["import numpy as np", "import roboticstoolbox as rtb", "from roboticstoolbox import ET", ""]
@@ -158,7 +158,7 @@ def _numpy(screws: ProductOfExponentials) -> str:
         lines += [
             "",
             "# EAIK's HPRobot(H, P), ik-geo: p = P0 + R(h1, q1) (P1 + R(h2, q2) (P2 + ...)).",
-            "# Give them the rotation R @ R6T.T, where R is the rotation of the tip.",
+            "# Give these solvers the rotation R @ R6T.T, where R is the rotation of the tip.",
         ]
         for name, rows in (("H", H), ("P", P)):
             lines += _array(name, rows, ").reshape(-1, 3)")
@@ -179,7 +179,7 @@ def _matlab(screws: ProductOfExponentials) -> str:
     return "\n".join([*lines, "end"]) + "\n"
 
 
-#: Functions of the forms with exact numbers
+#: Functions that write the screws with unrounded numbers, by format.
 _EXACT_FORMS: dict[str, Callable[[ProductOfExponentials], str]] = {
     "toml": lambda screws: "".join(f"{key} = {json.dumps(x)}\n" for key, x in screws.as_mapping().items()),
     "json": lambda screws: json.dumps(screws.as_mapping(), indent=2) + "\n",
