@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: Bound on coordinates, velocities, lengths and multipliers below which no result overflows.
+#: If coordinates, velocities, lengths and multipliers are below this bound, no result overflows.
 #: For N joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2.
 #: An angular velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
 LARGE = 1e45
@@ -200,7 +200,7 @@ def one() -> Known:
 
 
 def nothing() -> Known:
-    """Return the object that stands for a number that no output needs; every result of it is `nothing()`."""
+    """Return the object that stands for a number that no output needs; a result from it is `nothing()`."""
     return _NOTHING
 
 

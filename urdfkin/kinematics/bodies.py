@@ -30,9 +30,10 @@ x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scala
 is (..., 7, n).
 
 Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
-raise it for an axis that is not of unit length and for a matrix that is not a rotation. An unknown
-`representation` raises UnknownNameError. If Euler angles are within `nearest` of their singularity, where
-Omega cannot be inverted, functions with this argument raise RepresentationSingularityError.
+raise InputError for an axis that is not of unit length and for a matrix that is not a rotation. An unknown
+`representation` raises UnknownNameError. At the singularity of Euler angles, Omega cannot be inverted.
+Functions with the argument `nearest` raise RepresentationSingularityError if the distance from the
+singularity is at most `nearest`.
 """
 
 from __future__ import annotations
@@ -299,7 +300,7 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles or the quaternion of a rotation, the textbook's orientation in x."""
+    """Return the Euler angles or the quaternion of a rotation, which are the orientation part of x."""
     return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
 
 

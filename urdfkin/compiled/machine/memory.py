@@ -301,9 +301,9 @@ def add_squares(total, x, at, count):
     """Add the squares of `count` numbers from `x[at]` on to `total`, and load later numbers into the cache.
 
     The function adds eight numbers at once. If `count` is not a multiple of eight, each remaining number is
-    added eight times.
+    added eight times. This has no effect, because the sum is only compared with a very large bound.
     """
-    # Four independent sums take a quarter of the time of one sum.
+    # Four independent sums take a quarter of the time of one sum, whose additions wait for each other.
     second, third, fourth = same(0.0), same(0.0), same(0.0)
     end = at + count
     while at + 4 * LANES <= end:
@@ -334,7 +334,7 @@ def ordinary(total):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy a cache line of `x` to a cache line of `to` in memory, without the caches."""
+    """Copy a cache line of `x` to a cache line of `to` in memory, bypassing the caches."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments
