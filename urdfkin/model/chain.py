@@ -240,7 +240,7 @@ class FrameChain(Displayable):
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     """Return the path from the link or joint frame `base` (by default the root) to the frame `tip`.
 
-    A planar or floating joint on the path raises InputError; an unknown name UnknownNameError.
+    A planar or floating joint on the path raises InputError; an unknown name raises UnknownNameError.
     """
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0

@@ -38,7 +38,7 @@ class Reference(IntEnum):
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:
-        """Return the member with a name, in upper or lower case; return a member unchanged.
+        """Return the member with the given name, in upper or lower case; return a given member unchanged.
 
         An unknown name raises UnknownNameError.
 

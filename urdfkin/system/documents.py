@@ -91,7 +91,7 @@ class DocumentKind(Generic[_T]):
     is_open: bool = False
 
     def schema(self) -> dict[str, Any]:
-        """Return the JSON Schema (draft 2020-12), with the entries in the order of the types."""
+        """Return the JSON Schema (draft 2020-12), with the entries in the order of the `TypedDict`s."""
         parts: dict[str, Any] = msgspec.json.schema(self.type)["$defs"]
         for name, part in parts.items():
             entries = getattr(sys.modules[self.type.__module__], name).__annotations__

@@ -216,7 +216,7 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
                 return piece
         except BlockingIOError:  # a writer is connected
             return b""
-        # After POLLHUP, a writer has connected and closed the pipe.
+        # POLLHUP means that a writer has connected and then closed the pipe.
         if any(event & select.POLLHUP for _, event in events.poll(0)):
             return b""
         time.sleep(0.01)

@@ -62,7 +62,8 @@ class _ImportLock:
             return
         with self._lock:
             if not self._registered:
-                import logging  # noqa: F401  a file in the current folder could replace `logging`
+                # This import registers `logging`'s lock before `_before_fork`, see the docstring.
+                import logging  # noqa: F401
 
                 os.register_at_fork(
                     before=_before_fork, after_in_parent=_after_fork, after_in_child=_after_fork
