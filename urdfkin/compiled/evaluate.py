@@ -343,7 +343,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
-    `compute` computes the rows of a slice. For an empty batch, it is called once, with an empty slice.
+    `compute` computes the rows of a slice. For an empty batch, `compute` is called once, with an empty slice.
     `threads` has the same meaning as in `in_blocks`.
     """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)

@@ -45,7 +45,7 @@ _listeners: list[Listener] = [_log]
 
 @contextmanager
 def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """Send the events of compilations to `listener` only, while the context is open."""
+    """While the context is open, send compilation events only to `listener`."""
     _listeners.append(listener)
     try:
         yield

@@ -17,7 +17,7 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: Scratch memory rows with the 16 numbers of a pose, and with the six of a velocity or acceleration.
+#: Scratch memory rows with the 16 numbers of a pose, and with the six numbers of a velocity or acceleration.
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 

@@ -169,7 +169,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Return the compiled tree of the joints that move the given links, in the order of the results."""
+    """Return the compiled tree of the joints that move the given links; results have the links' order."""
     depths = _depths(tree, links)
     tilts = {0: 0.0}
     for link in depths:

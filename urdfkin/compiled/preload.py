@@ -56,7 +56,7 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """Always compute in one way while the context is open, so that a test can compare both ways."""
+    """Compute only in the given way while the context is open; tests compare the two ways."""
     _only.append(way)
     try:
         yield
@@ -111,7 +111,7 @@ def load(name: str, home: str = RECURSIONS) -> Any:
 
 
 def _on_disk(name: str) -> bool:
-    """Return whether a kernel is on disk; a missing kernel is searched again after `_AGAIN` seconds."""
+    """Return whether a kernel is on disk; if it is missing, search for it again after `_AGAIN` seconds."""
     folder = cache_folder()
     if folder is None or time.monotonic() < _absent.get((folder, name), 0.0):
         return False

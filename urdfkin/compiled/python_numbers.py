@@ -200,7 +200,7 @@ def one() -> Known:
 
 
 def nothing() -> Known:
-    """Return the object that stands for a number that no output needs; a result from it is `nothing()`."""
+    """Return the object for a number that no output needs; an operation with `nothing()` gives `nothing()`."""
     return _NOTHING
 
 
@@ -262,7 +262,7 @@ def write_rows(
 
 
 def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Number:
-    """Add the squares of `count` numbers from `x[at]` on to `total`."""
+    """Add to `total` the squares of `count` numbers that begin at `x[at]`."""
     return Number(total.x + sum(y * y for y in x[at : at + count]))
 
 

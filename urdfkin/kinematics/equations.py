@@ -112,7 +112,7 @@ def tangential(w, d):
 
 
 def point_velocity(vel, w, d):
-    """7.59, 7.115, 7.128: velocity of the point P + d of a link, whose point P has the velocity vel."""
+    """7.59, 7.115, 7.128: velocity of a link's point P + d, if the link's point P has the velocity vel."""
     return plus(vel, tangential(w, d))
 
 
@@ -122,7 +122,7 @@ def sliding_velocity(vel, z, v):
 
 
 def moving_point_velocity(vel, w, p, u):
-    """7.61, 7.124: velocity of a point p that moves in a rotating frame with velocity u."""
+    """7.61, 7.124: velocity of a point p that moves with velocity u in a rotating frame."""
     return plus(point_velocity(vel, w, p), u)
 
 
@@ -140,17 +140,17 @@ def centripetal(w, d):
 
 
 def coriolis(w, u):
-    """7.125: Coriolis acceleration of a point that moves in a rotating frame with velocity u."""
+    """7.125: Coriolis acceleration of a point that moves with velocity u in a rotating frame."""
     return times(2, cross(w, u))
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration of the link after a joint; w and alpha: of the link before it."""
+    """7.129, rotary: angular acceleration of the link after a joint; w, alpha: those of the link before."""
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 
 def point_acceleration(acc, alpha, w, d):
-    """7.123, 7.130: acceleration of the point P + d of a link, whose point P has the acceleration acc."""
+    """7.123, 7.130: acceleration of a link's point P + d, if the link's point P has the acceleration acc."""
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
 
@@ -160,7 +160,7 @@ def sliding_acceleration(acc, w, z, v, a):
 
 
 def moving_point_acceleration(acc, alpha, w, p, u, b):
-    """7.125: acceleration of a point p that moves in a rotating frame with velocity u and acceleration b."""
+    """7.125: acceleration of a point p that moves with velocity u and acceleration b in a rotating frame."""
     return plus(plus(point_acceleration(acc, alpha, w, p), coriolis(w, u)), b)
 
 
@@ -181,7 +181,7 @@ def free_acceleration(acc, w, o, u, b):
 
 
 def turning_column(z, d):
-    """7.80, 7.85: column [z x d; z] of a rotary joint; d leads from its axis to the frame's origin."""
+    """7.80, 7.85: column [z x d; z] of a rotary joint; d leads from the joint to the frame's origin."""
     return cross(z, d), z
 
 

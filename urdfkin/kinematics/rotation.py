@@ -411,7 +411,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = sine < 1e-150  # The square of a tiny component loses digits; there, phi k = 2 `vector`.
+    small = sine < 1e-150  # Squares of tiny components lose digits; phi k is then 2 `vector`.
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 

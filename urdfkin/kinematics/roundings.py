@@ -83,9 +83,9 @@ same as for urdfkin. In a comparison of an export with true values (test vectors
 which is within `ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
-2^-23. For each operation and each constant, `urdfkin.export.single` multiplies the error by the derivative of
-the result with respect to this value. The bound is the sum of the absolute values of all these products. The
-error of one operation is
+2^-23. For each operation and each constant, `urdfkin.export.single` multiplies the error of its value by the
+derivative of the result with respect to this value. The bound is the sum of the absolute values of all these
+products. The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -194,7 +194,7 @@ NOT_ZERO = 1e-300
 ROUNDINGS = 24.0
 #: Allowed difference (in eps) from MuJoCo, for each joint and each factor of a term.
 MUJOCO = 30.0
-#: Allowed error (in eps) of an MJCF file's mimic rule between urdfkin's tree and MuJoCo.
+#: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW = 8.0

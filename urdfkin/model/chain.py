@@ -33,7 +33,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Least size (m) of a robot in a comparison, even if all its frames coincide.
+#: Smallest size (m) that a comparison assumes for a robot, even if all its frames coincide.
 LEAST_SIZE = 1e-9
 
 

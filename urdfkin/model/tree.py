@@ -196,7 +196,7 @@ class Joint:
 
     @property
     def length(self) -> float:
-        """Length (m) of the offset from the parent link, plus the displacement of a locked prismatic joint."""
+        """Length (m) of the offset from the parent link, plus a locked prismatic joint's displacement."""
         # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids squares.
         length = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
@@ -228,7 +228,7 @@ class Lock:
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
-        elif np.count_nonzero(axis) == 1:  # A coordinate axis gives exact zeros and ones.
+        elif np.count_nonzero(axis) == 1:  # A rotation about a coordinate axis has exact zeros and ones.
             k = int(np.flatnonzero(axis)[0])
             T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
         else:

@@ -66,7 +66,7 @@ class Header(TypedDict):
     command: Annotated[
         str | None,
         says(
-            "Command that makes the document again; null: unknown. It has a line for each set of options, "
+            "Command that makes the document again; null: unknown. The text has a line for each set of options, "
             "and a line for each robot that was given as text (`-`: standard input)."
         ),
     ]

@@ -6,10 +6,10 @@ cache files have no digest: a truncated file makes every later run fail, and Num
 changed bit. This module therefore writes a digest into each cache file. If a cache file is damaged, its
 kernel is compiled again. If no folder is writable, nothing is cached.
 
-Inlined functions. Only kernels call an inlined function; Python never calls it. The compiler inserts its code
-into each kernel. An inlined function therefore needs no machine code of its own, and no separate
-optimization. It has no closures and no array expressions, so the compiler passes for these features are
-skipped too. Skipping these steps halves the compile time.
+Inlined functions. Only kernels call an inlined function; Python never calls it. The compiler inserts the
+function's code into each kernel. An inlined function therefore needs no machine code of its own, and no
+separate optimization. It has no closures and no array expressions, so the compiler passes for these features
+are skipped too. Skipping these steps halves the compile time.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class KernelCache(_Null):  # type: ignore[misc]
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # Even an undamaged file can cause any error, because another version may have written the file.
+            # An undamaged file may come from another version of Numba; reading it can cause any error.
             except Exception as error:
                 report_damaged(place, f"{type(error).__name__}: {error}")
         self._begin()
@@ -80,7 +80,7 @@ class KernelCache(_Null):  # type: ignore[misc]
 
 
 def function_name(function: Callable[..., int]) -> str:
-    """Return the last part of a function's module's name, followed by the function's name."""
+    """Return the last part of the name of a function's module, followed by the function's name."""
     return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
 
@@ -114,7 +114,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba identifies a compiled function by its entry point for Python; an inlined function has none.
+        # Numba needs a Python entry point as the key of a compiled function; this empty one is never called.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -165,7 +165,7 @@ _INLINED: dict[str, Any] = {
 
 @contextmanager
 def compiling_allowed() -> Iterator[None]:
-    """Allow compilation even if NUMBA_DISABLE_JIT is set; Python cannot run these functions uncompiled."""
+    """Ignore NUMBA_DISABLE_JIT, because Python cannot run these functions without compilation."""
     before, _config.DISABLE_JIT = _config.DISABLE_JIT, 0
     try:
         yield
@@ -287,6 +287,6 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
     """Return a decorator for a kernel with these argument types (Numba's).
 
     The kernel is compiled at the first call and cached on disk. `nogil` says whether a call releases Python's
-    global interpreter lock. Releasing the lock costs more time than a call of a microsecond takes.
+    global interpreter lock. Releasing the lock takes longer than a short call (one microsecond).
     """
     return lambda function: Kernel(function, arguments, nogil)

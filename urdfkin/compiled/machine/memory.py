@@ -270,7 +270,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 
 @compiled
 def fetch(x, at, count):
-    """Load `count` numbers from `x[at]` on, inputs of the next block of configurations, into the cache."""
+    """Load `count` inputs of the next block of configurations, which begin at `x[at]`, into the cache."""
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
@@ -298,12 +298,12 @@ def _plus_squares(total, x, at):
 
 @compiled
 def add_squares(total, x, at, count):
-    """Add the squares of `count` numbers from `x[at]` on to `total`, and load later numbers into the cache.
+    """Add to `total` the squares of `count` numbers that begin at `x[at]`; load later numbers into the cache.
 
     The function adds eight numbers at once. If `count` is not a multiple of eight, each remaining number is
     added eight times. This has no effect, because the sum is only compared with a very large bound.
     """
-    # Four independent sums take a quarter of the time of one sum, whose additions wait for each other.
+    # Four independent sums take a quarter of the time, because additions to one sum wait for each other.
     second, third, fourth = same(0.0), same(0.0), same(0.0)
     end = at + count
     while at + 4 * LANES <= end:

@@ -56,7 +56,7 @@ class _FreeJoint:
         q: Index of the joint's first number in urdfkin's q.
         v: Index of the joint's first number in urdfkin's v.
         rows: Indices of the joint's numbers in the target program's v.
-        point: (3,) point of the linear velocity, in the joint's frame.
+        point: (3,) point whose velocity is the linear velocity, in the joint's frame.
     """
 
     joint: Joint
