@@ -66,8 +66,8 @@ class Header(TypedDict):
     command: Annotated[
         str | None,
         says(
-            "Command that makes the document again; null: unknown. The text has a line for each set of options, "
-            "and a line for each robot that was given as text (`-`: standard input)."
+            "Command that makes the document again; null: unknown. The text has a line for each set of "
+            "options, and a line for each robot that was given as text (`-`: standard input)."
         ),
     ]
 
