@@ -1,8 +1,8 @@
 """Number types for one configuration, with which the recursion runs in Python without compilation.
 
 Results are exactly the same doubles as those of compiled kernels; `urdfkin.compiled.machine.numbers` explains
-the types. Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel
-takes addresses.
+the types. Scratch memory is a list with one number for each row. These functions take lists; compiled kernels
+take memory addresses instead.
 """
 
 from __future__ import annotations

@@ -204,12 +204,12 @@ def rate_in_turning_axes(rate, w, x):
 
 
 def turned_along(w, linear, angular):
-    """Return the time derivative of a Jacobian column (7.85) if an earlier joint turns z and d with w."""
+    """Return the derivative of a Jacobian column (7.85) if an earlier joint turns z and d with velocity w."""
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the time derivative of z x d (7.85) if a later joint moves the frame's origin with `linear`."""
+    """Return the derivative of z x d (7.85) if a later joint moves the end of d with velocity `linear`."""
     return cross(z, linear)
 
 

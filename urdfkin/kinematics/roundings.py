@@ -211,7 +211,7 @@ SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Allowed difference (in eps), for each joint, of the constant poses that two programs read from one file.
+#: Allowed difference (in eps per joint) between the constant poses that two programs read from one file.
 #: The worst case is 18.9: the sum of the docstring's first table without the rotation about the axis.
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7

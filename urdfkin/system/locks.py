@@ -1,8 +1,8 @@
 """Locks that are unlocked in a child process after a fork.
 
-A fork copies all locks, but only the thread that calls `fork`. A lock that another thread holds would stay
-locked in the child for ever. `import urdfkin` imports this module first, so this module imports nothing that
-an untrusted current folder could replace.
+A fork copies all locks, but it copies only the thread that calls `fork`. A lock that another thread holds
+would stay locked in the child for ever. `import urdfkin` imports this module first, so this module imports
+nothing that an untrusted current folder could replace.
 """
 
 from __future__ import annotations
