@@ -337,7 +337,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         _pool().submit(compute, [x[part] if len(x) == n else x for x in inputs], out[part])
         for part in _parts(n, threads)
     ]
-    return max([future.result() for future in work])  # This waits until all threads have finished.
+    return max([future.result() for future in work])  # Each `result()` waits for a thread.
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:

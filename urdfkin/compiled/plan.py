@@ -169,7 +169,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Return the compiled tree of the joints that move the given links; results are in the order of `links`."""
+    """Return the compiled tree of the joints that move the given links; results are in this order."""
     depths = _depths(tree, links)
     tilts = {0: 0.0}
     for link in depths:

@@ -200,7 +200,7 @@ def one() -> Known:
 
 
 def nothing() -> Known:
-    """Return the object for a number that no output needs; a result of `nothing()` is `nothing()`."""
+    """Return the object for a number that no output needs; every operation with this object returns it."""
     return _NOTHING
 
 

@@ -229,7 +229,7 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all, through a temporary file in the folder that is then renamed.
+    """Write a file completely or not at all: write a temporary file in the same folder, and rename it.
 
     A link is followed. A device or a pipe, such as `/dev/null`, is written directly.
 

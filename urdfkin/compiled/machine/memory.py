@@ -136,7 +136,7 @@ def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
 
     For example, four vectors of eight numbers contain two blocks of 4 by 4 numbers. The function transposes
     blocks of 2 by 2 numbers first, then, for enough vectors, blocks of 4 by 4 and of 8 by 8. To transpose a
-    larger block, it exchanges the block's upper right quarter with the lower left quarter.
+    larger block, the function exchanges the block's upper right quarter with the lower left quarter.
     """
     x, w = list(vectors), 1
     while w < len(x):
