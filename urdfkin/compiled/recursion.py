@@ -119,7 +119,7 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of a link after only the axes of the link's frame are rotated by S."""
+    """Return a link's state after a rotation S of the axes of the link's frame; the link does not move."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),

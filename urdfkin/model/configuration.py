@@ -691,9 +691,9 @@ def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special:
     """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
 
     The samples cover the own range of each joint, even if a mimic joint then exceeds its limits, because the
-    equations are valid beyond the limits too. Joint velocities and accelerations are standard normal. Every
-    eighth sample has a hundred times larger velocities and accelerations, so that the quadratic terms of eq.
-    7.129 and 7.130 dominate.
+    equations are valid beyond the limits too. Joint velocities and accelerations have the standard normal
+    distribution. Every eighth sample has a hundred times larger velocities and accelerations, so that the
+    quadratic terms of eq. 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:

@@ -1,9 +1,9 @@
 """The robot model: a tree of links and joints, with the joint limits and mimic rules of the URDF.
 
 `KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order: depth
-first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. The
-frame of a link or a joint has its name; the prefix `link:` or `joint:` is needed if a link and a joint have
-equal names.
+first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. A frame
+has the name of its link or joint; the prefix `link:` or `joint:` is needed if a link and a joint have equal
+names.
 """
 
 from __future__ import annotations
