@@ -392,7 +392,7 @@ def test_all_findings_of_a_xacro_file_are_reported_if_a_possible_include_changed
 @pytest.mark.parametrize("version", ["nowhere", "--help", "HEAD:arm.urdf", ""])
 def test_an_unknown_git_version_is_an_error_with_a_remedy(repository: Path, version: str) -> None:
     err = refused("check", f"--changed-since={version}")
-    assert "git finds no common version of this commit and HEAD" in err
+    assert "git finds no common ancestor of this commit and HEAD" in err
     assert "fetch-depth: 0" in err
 
 

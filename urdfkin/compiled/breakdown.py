@@ -127,16 +127,17 @@ def acceleration_breakdown(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> AccelerationBreakdown:
-    """Return the contributions to the classical acceleration of a link's frame, with one leading axis n.
+    """Return the contributions to the classical acceleration of a link's frame, for n configurations.
 
     `base` is the state of the base (1 or n, 24), see `BaseMotion.state`; `out` (n, joints, 4, 6) is an array
-    for the terms; `threads` is the largest number of threads. A number of q, v or a that is not finite raises
-    NotFiniteError; a contribution beyond the range of double precision raises RangeError.
+    to which the contributions are written; `threads` is the largest number of threads. An infinite or NaN
+    value in q, v or a raises NotFiniteError; a contribution beyond the range of double precision raises
+    RangeError.
     """
-    if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
+    if not np.isfinite(a).all():  # `placements` and `velocities` check q and v later.
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # All links on the path are frames.
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # frames: all links on the path
     n = len(q)
     terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
@@ -252,7 +253,7 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 
 
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration of a point that is fixed to the base (7.123), at d from the base's origin."""
+    """Return the acceleration (7.123) of a point fixed to the base; d leads from the base's origin to it."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

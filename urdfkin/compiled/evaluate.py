@@ -41,7 +41,7 @@ from urdfkin.model.tree import FloatArray
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _PLACES = KernelArgs.BASE, KernelArgs.Q, KernelArgs.V, KernelArgs.A
-#: Least number of bytes of results that bypass the caches, because the caches are too small.
+#: Results of at least this many bytes do not fit into the caches and are written directly to memory.
 _STREAMED = 2 << 20
 #: Maximum number of doubles in the buffer of results; they fill half of the first-level cache.
 _MOST_STAGED = 3072
@@ -54,9 +54,10 @@ class EvaluateOptions(TypedDict, total=False):
 
     Attributes:
         base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
-        out: C-contiguous float64 array of the result's size, for the result.
+        out: C-contiguous float64 array of the result's size, to which the result is written.
         threads: Largest number of threads; None uses all processors for large batches.
-        read: Whether the caller reads the results immediately, so that they stay in the processor's caches.
+        read: True if the caller reads the results immediately; the results then stay in the processor's
+            caches.
     """
 
     base: FloatArray
@@ -121,7 +122,7 @@ def jacobian_rates(
 def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[EvaluateOptions]
 ) -> FloatArray:
-    """Return Hessians (n, frames, 6, nv, nv); [..., i, j]: derivative of column i by joint coordinate j."""
+    """Return Hessians (n, frames, 6, nv, nv); [..., i, j] is the derivative of column i by coordinate j."""
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 
@@ -181,10 +182,10 @@ def _interpreted(
     out: FloatArray,
     threads: int | None,
 ) -> int | None:
-    """Compute a batch with Python numbers; return None, without a result, if a kernel is faster.
+    """Compute a batch with Python numbers; stop and return None if a kernel is faster.
 
-    After a computation, return 1 if an input is nan, infinite or too large, and 0 otherwise. The measured
-    processor time of each configuration decides whether a kernel is faster.
+    If the computation finishes, return 1 if an input is nan, infinite or too large, and 0 otherwise. The
+    measured processor time of each configuration decides whether a kernel is faster.
     """
     if preload.kernel(name) is not None:
         return None
@@ -198,7 +199,7 @@ def _interpreted(
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
         preload.spend(name, took)
-        # The first configuration takes longer than the others.
+        # The first configuration takes longer than later ones, so its time alone decides nothing.
         if i and (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
             return None
     return odd
@@ -261,8 +262,9 @@ def task_of(
 ) -> tuple[NDArray[np.int64], object]:
     """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished.
 
-    `inputs` are the base's state, q and, if needed, v and a; each has one row, or one row for each
-    configuration. If `staged`, the kernel writes results to a buffer first (see `is_staged`).
+    `inputs` are the base's state, q and, if needed, v and a; each has either one row for all configurations,
+    or one row for each configuration. If `staged`, the kernel writes results to a buffer first (see
+    `is_staged`).
     """
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
@@ -294,7 +296,7 @@ def _check_finite(inputs: Sequence[FloatArray], out: FloatArray) -> None:
         )
 
 
-#: Least number of configurations for several threads; starting a thread takes about ten microseconds.
+#: Smaller batches use one thread, because starting a thread takes about ten microseconds.
 _WORTH_THREADS = 4096
 
 #: Number of configurations that NumPy computes at a time, so that intermediate results fit into the cache.
@@ -320,8 +322,8 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
     """Compute `out` (n, ...) with several threads; each array of `inputs` is (n, ...) or (1, ...).
 
     The result is 1 if an input is nan, infinite or too large, else 0. All arrays are C-contiguous. `compute`
-    must release Python's global interpreter lock. `threads` is the largest number of threads; None stands for
-    `default_threads`, and anything but an integer of at least 1 raises InputError.
+    must release Python's global interpreter lock. `threads` is the largest number of threads; None means the
+    number from `default_threads`. Any other value that is not an integer of at least 1 raises InputError.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
@@ -335,14 +337,14 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
         _pool().submit(compute, [x[part] if len(x) == n else x for x in inputs], out[part])
         for part in _parts(n, threads)
     ]
-    return max([future.result() for future in work])  # This waits until all threads have finished.
+    return max([future.result() for future in work])  # Each `result()` waits for a thread.
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
     """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
 
-    `compute` computes the rows of a slice; for an empty batch, its only slice is empty. `threads` has the
-    same meaning as in `in_blocks`.
+    `compute` computes the rows of a slice. For an empty batch, `compute` is called once, with an empty slice.
+    `threads` has the same meaning as in `in_blocks`.
     """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]

@@ -1,7 +1,7 @@
 """Find the cache folder of compiled kernels, and report compilations to listeners, without importing Numba.
 
-Compiling a kernel takes seconds, and reading it from disk takes almost no time. Functions called listeners
-receive an event for each compilation that this process waits for.
+Compiling a kernel takes seconds, and reading it from disk takes almost no time. A listener is a function that
+receives an event for each compilation that this process waits for.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from urdfkin.kinematics import equations
 from urdfkin.system.lazy_import import installed_version
 from urdfkin.system.locks import importing, lock_over_forks
 
-#: Lock of the import of Numba and of compilations.
-#: A fork of the process waits for this lock, because the child could not finish an import or a compilation.
+#: Lock that a thread holds while it imports Numba or compiles a kernel.
+#: A fork waits for this lock, because the child could not finish an import or a compilation of the parent.
 #: Before a fork, Python acquires the locks in the reverse order of their creation.
-#: The import of Numba uses the lock of the module `logging`, so `compiling` must be created after that lock.
+#: The import of Numba acquires this lock first and then `logging`'s lock, so `logging`'s lock must be older.
 compiling = lock_over_forks()
 
-#: A function of the kernel's name and the duration in seconds (None when the compilation begins).
+#: A function with two arguments: the kernel's name, and the duration (s), or None when compilation begins.
 Listener = Callable[[str, float | None], None]
 
 
@@ -45,7 +45,7 @@ _listeners: list[Listener] = [_log]
 
 @contextmanager
 def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """Send the events of compilations to `listener` only, while the context is open."""
+    """While the context is open, send compilation events only to `listener`."""
     _listeners.append(listener)
     try:
         yield

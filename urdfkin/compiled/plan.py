@@ -6,9 +6,9 @@ this rotation). Each revolute joint is then Rz, and each prismatic joint is Tz. 
 the constant offsets between moving joints. A compiled tree contains only the joints that move one of its
 frames.
 
-The program consists of the instructions for each block of configurations. The instructions are chosen once
-for each robot. Instructions for a translation along, or a rotation about, a coordinate axis take a third of
-the time of the general instructions. A translation by zero needs no instruction. The state of a link stays in
+A kernel executes the program once for each block of configurations. The instructions are chosen once for each
+robot. Instructions for a translation along, or a rotation about, a coordinate axis take a third of the time
+of the general instructions. A translation by zero needs no instruction. The state of a link stays in
 registers until the next link is computed. At a branch of the tree, the state is saved to memory and read
 again later.
 
@@ -94,7 +94,7 @@ _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
 class CompiledTree:
     """The moving joints and the frames that a computation needs, stored in arrays.
 
-    A joint comes after all joints between it and the base.
+    The joints are sorted: each joint comes after all joints between it and the base.
 
     Attributes:
         nq: Length of `q`.
@@ -110,17 +110,18 @@ class CompiledTree:
         columns: (columns, 4) integers, columns `ColumnField`. A planar joint has three Jacobian columns, and
             a floating joint has six.
         multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
-        leaders: (frames, columns) index of the column to which a column is added. The columns of a joint and
-            of its mimic joints are added, because these joints have the same joint velocity. Their sum is
-            stored in the first of these columns on the path to the frame. The index is -1 if the column's
-            joint does not move the frame.
+        leaders: (frames, columns) for each column, the index of the column to which it is added. The columns
+            of a joint and of its mimic joints are added, because these joints have the same joint velocity.
+            Their sum is stored in the first of these columns on the path to the frame. The index is -1 if the
+            column's joint does not move the frame.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
-            fixed joints: from the previous moving joint to each moving joint, then from the last moving joint
-            to each frame, in the order of `frames`.
+            fixed joints. The first entries are from the previous moving joint to each moving joint. The other
+            entries are from the last moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) sum of the angles `Joint.tilt`, rad, of these joints, in output order.
+        tilts: (frames,) sum of `Joint.tilt` (rad) over the joints between the root and each frame, in output
+            order.
     """
 
     nq: int
@@ -168,7 +169,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Return the compiled tree of the joints that move the given links, in the order of the results."""
+    """Return the compiled tree of the joints that move the given links; results are in this order."""
     depths = _depths(tree, links)
     tilts = {0: 0.0}
     for link in depths:
@@ -248,7 +249,7 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 
 def turned(joint: Joint) -> FloatArray:
-    """Return the pose (4, 4) of a frame whose z axis is the joint's axis, in the joint's URDF frame."""
+    """Return the pose (4, 4), in the joint's URDF frame, of a frame whose z axis is the joint's axis."""
     return pose(axis_aligning(joint.axis) if joint.kind.has_axis else None)
 
 
@@ -303,7 +304,7 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 
 
 class Op(IntEnum):
-    """Instructions of a program; the suffix is the axis, and without a suffix the axis is arbitrary."""
+    """Instructions of a program. The suffix X, Y or Z is the axis; CARRY and TURN allow any axis."""
 
     END = 0
     CARRY_X = 1  # translation along a rigid link
@@ -346,14 +347,14 @@ class Head(IntEnum):
 #: Number of doubles in a row of scratch memory, one for each of eight configurations.
 #: A row fills one AVX-512 register or two AVX2 registers.
 LANES = 8
-#: Number of integers of an instruction: the operation, three operands, and the index of its constants.
+#: Number of integers for an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers of a joint angle: scratch row, scratch row of the sine, mimic rule, whether it mimics.
+#: Number of integers for a joint angle: scratch row, scratch row of the sine, mimic rule, whether it mimics.
 ANGLE_WIDTH = 4
 #: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, STORED_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers of a Jacobian column of a Hessian: scratch row, joint, index in v, row of the sum.
+#: Number of integers for a Jacobian column of a Hessian: scratch row, joint, index in v, row of the sum.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -394,7 +395,7 @@ class KernelProgram:
 def program_of(
     plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False
 ) -> KernelProgram:
-    """Return the program for the frames of a compiled tree, which stores the program for later calls.
+    """Return the program for the frames of a compiled tree. The tree stores the program for later calls.
 
     Args:
         plan: The compiled tree.
@@ -496,7 +497,7 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write the instructions for a translation by p and a rotation by R; return whether any is needed."""
+        """Write the instructions for a translation by p and a rotation by R; return whether there are any."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -590,14 +591,14 @@ def _blocks(places: Sequence[int]) -> list[int]:
 
 #: Number of bytes in a cache line; access to a vector in two cache lines takes twice as long.
 _LINE = 64
-#: Integers of the reference frames in a kernel; another frame raises a KeyError.
+#: The integer of each reference frame in a kernel; any other frame raises a KeyError.
 REFERENCES = {
     known: int(known) for known in (Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_ALIGNED)
 }
 
 
 class KernelArgs(IntEnum):
-    """Indices of the integers of a kernel; those from CORE on are only for calls with one configuration."""
+    """Indices of a kernel's arguments. Only calls with one configuration use the arguments from CORE on."""
 
     PROGRAM = 0
     CONSTANTS = auto()

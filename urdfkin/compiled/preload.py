@@ -28,7 +28,7 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Times (s) without a kernel after which the actions in the table of the module docstring follow.
+#: Thresholds (s) of the time without a kernel, for the actions in the table of the module docstring.
 LOADING, BESIDE, COMPILING = 0.3, 1.0, 3.0
 #: Time (s) that replaces `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03
@@ -56,7 +56,7 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """Always compute in one way while the context is open, so that a test can compare both ways."""
+    """Compute only in the given way while the context is open; tests compare the two ways."""
     _only.append(way)
     try:
         yield
@@ -111,7 +111,7 @@ def load(name: str, home: str = RECURSIONS) -> Any:
 
 
 def _on_disk(name: str) -> bool:
-    """Return whether a kernel is on disk; a missing kernel is searched again after `_AGAIN` seconds."""
+    """Return whether a kernel is on disk; if it is missing, search for it again after `_AGAIN` seconds."""
     folder = cache_folder()
     if folder is None or time.monotonic() < _absent.get((folder, name), 0.0):
         return False
@@ -134,8 +134,8 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 def _compile_beside(name: str, home: str) -> bool:
     """Start a second process that compiles a kernel, and return whether a second process runs.
 
-    At most one second process runs at a time, and each kernel gets at most one. If the second process
-    compiles another kernel, the function also returns True.
+    At most one such process runs at a time, and at most one is started for each kernel. The function also
+    returns True if a running second process compiles another kernel.
     """
     if cache_folder() is None:
         return False
@@ -197,7 +197,7 @@ def are_on_disk() -> bool:
 
 
 def load_kernels() -> None:
-    """Load every kernel before several processes start, because each of them would compile it.
+    """Load every kernel before several processes start; otherwise, each process would compile every kernel.
 
     A process compiles on one processor only, so a second process compiles half of the kernels, and this
     process reads them from disk.

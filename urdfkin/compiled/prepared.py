@@ -52,7 +52,7 @@ class PreparedFrame:
     Results are exactly the same numbers as those of `Robot`. With `verify=True`, urdfkin compares each result
     with Pinocchio's result and allows the same difference as `Robot`. With `verify=False`, results are not
     checked, and `Robot.certificate` reports them as unchecked. Contiguous float64 arrays are used directly.
-    For other arguments `Robot` computes the result, or raises the error, as usual. Several threads may share
+    For arguments of other types, `Robot` computes the result or raises the error. Several threads may share
     one object, also on free-threaded Python.
 
     Attributes:
@@ -164,7 +164,7 @@ class PreparedFrame:
         )
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Create the fast function of a quantity and call it; return None if the call does not save time."""
+        """Create and call a quantity's fast function; return None if it cannot be used or saves no time."""
         # Only `Robot` normalises quaternions and checks for overflow.
         needs_robot = self._robot.tree.floating_joints or self._plan.is_large
         if needs_robot or not (isinstance(q, np.ndarray) and q.ndim == 1):

@@ -1,8 +1,8 @@
 """Number types for one configuration, with which the recursion runs in Python without compilation.
 
 Results are exactly the same doubles as those of compiled kernels; `urdfkin.compiled.machine.numbers` explains
-the types. Scratch memory is a list with one number for each row. Functions take lists where a compiled kernel
-takes addresses.
+the types. Scratch memory is a list with one number for each row. These functions take lists; compiled kernels
+take memory addresses instead.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-#: Bound on coordinates, velocities, lengths and multipliers below which no result overflows.
+#: If coordinates, velocities, lengths and multipliers are below this bound, no result overflows.
 #: For N joints, the velocity of a joint is below LARGE^2, and the length d of a path is below N LARGE^2.
 #: An angular velocity w is below N LARGE^2, so the largest product w^2 d is below N^3 LARGE^6.
 LARGE = 1e45
@@ -200,7 +200,7 @@ def one() -> Known:
 
 
 def nothing() -> Known:
-    """Return the object that stands for a number that no output needs; every result of it is `nothing()`."""
+    """Return the object for a number that no output needs; every operation with this object returns it."""
     return _NOTHING
 
 
@@ -262,7 +262,7 @@ def write_rows(
 
 
 def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Number:
-    """Add the squares of `count` numbers from `x[at]` on to `total`."""
+    """Add to `total` the squares of `count` numbers that begin at `x[at]`."""
     return Number(total.x + sum(y * y for y in x[at : at + count]))
 
 

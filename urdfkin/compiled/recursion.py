@@ -119,7 +119,7 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return the state of a link after only the axes of the link's frame are rotated by S."""
+    """Return a link's state after a rotation S of the axes of the link's frame; the link does not move."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -298,7 +298,7 @@ def _start(axes, m, s, task, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Compute the sines and cosines of all joint angles first: the recursion needs all registers."""
+    """Compute the sines and cosines of all joint angles before the recursion, which needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)

@@ -93,7 +93,7 @@ class DegreesWarning(UserWarning):
 
 
 def warn_caller(message: str, category: type[Warning]) -> None:
-    """Issue a warning at the line that called the package."""
+    """Issue a warning whose location is the line outside urdfkin that called urdfkin."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith("urdfkin."):
         level, frame = level + 1, frame.f_back
@@ -242,7 +242,7 @@ class RepresentationSingularityError(InputError):
 
     Attributes:
         sequence: Name of the sequence of Euler angles.
-        distance: Difference between the middle angle and the middle angle at the singularity, rad.
+        distance: Distance (rad) of the middle angle from its value at the singularity.
         sample: Index of the worst sample of a batch; () for a single sample.
     """
 

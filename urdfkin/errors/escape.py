@@ -112,7 +112,7 @@ def json_text(data: Any) -> str:
 
 
 def escape(c: str) -> str:
-    """Return the escape sequence of a character in Python and TOML, and up to U+FFFF also in JSON."""
+    """Return a character's escape sequence for Python and TOML; up to U+FFFF, it is also valid in JSON."""
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 
@@ -139,5 +139,5 @@ def csv_value(text: str) -> str:
 
 
 def from_csv_cell(cell: str) -> str:
-    """Return the name that `csv_cell` wrote, except for escaped characters."""
+    """Return the name from a cell that `csv_cell` wrote; escaped characters stay escaped."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("' ").startswith(FORMULA) else cell

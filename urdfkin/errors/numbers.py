@@ -58,7 +58,7 @@ def remedy(text: str) -> str | None:
     return next(found, None)
 
 
-#: Short name of a unit, by each accepted name.
+#: The short name of a unit for each accepted name of the unit.
 UNITS = {
     **dict.fromkeys(("rad", "radian", "radians"), "rad"),
     **dict.fromkeys(("deg", "degs", "degree", "degrees"), "deg"),

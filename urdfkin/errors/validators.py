@@ -65,7 +65,7 @@ def as_choice(value: str | None, default: str, name: str) -> str:
 
 
 def as_names(value: Any, name: str) -> tuple[str, ...]:
-    """Return `value` as a tuple; the caller looks up the entries in the robot."""
+    """Return `value` as a tuple; the caller must check that the robot has the names."""
     if isinstance(value, str):
         raise InputError(
             f"{name} must be a list of names", found=safe_repr(value), remedy=f"write [{safe_repr(value)}]"

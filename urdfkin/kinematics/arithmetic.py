@@ -19,7 +19,7 @@ VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "pr
 def bound(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Return a namespace with a copy of each function of `equations` that uses other basic operations.
+    """Return a namespace with copies of all functions of `equations`; the copies use other basic operations.
 
     The function `decorate` is applied to each copy. `vectors` are the basic operations by name.
 
@@ -35,9 +35,9 @@ def rebound(
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls other copies instead of the original functions. An object of `others` replaces each function
-    or module of the same name. The function `decorate`, for example a compiler, is applied to each copy. A
-    module may use functions of the modules that are listed before it.
+    A copy calls other copies instead of the original functions. If a function or module has the same name as
+    an entry of `others`, the entry replaces it. The function `decorate`, for example a compiler, is applied
+    to each copy. A module may use functions of the modules that are listed before it.
     """
     copies: dict[str, Any] = {}
     for module in modules:

@@ -29,10 +29,11 @@ derivatives of x = (position, orientation). For three Euler angles in any sequen
 x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J
 is (..., 7, n).
 
-Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. They also
-raise it for an axis that is not of unit length and for a matrix that is not a rotation. An unknown
-`representation` raises UnknownNameError. If Euler angles are within `nearest` of their singularity, where
-Omega cannot be inverted, functions with this argument raise RepresentationSingularityError.
+Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. These
+functions also raise InputError for an axis that is not of unit length and for a matrix that is not a
+rotation. An unknown `representation` raises UnknownNameError. At the singularity of Euler angles, Omega
+cannot be inverted. Functions with the argument `nearest` raise RepresentationSingularityError if the distance
+from the singularity is at most `nearest`.
 """
 
 from __future__ import annotations
@@ -265,7 +266,7 @@ def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
     """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7).
 
-    The velocity is tangential to the endpoint's circle, and its size is v = r w.
+    The velocity is tangential to the endpoint's circle, and its magnitude is v = r w.
 
     >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
     array([0., 6.])
@@ -299,7 +300,7 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles or the quaternion of a rotation, the textbook's orientation in x."""
+    """Return the Euler angles or the quaternion of a rotation, which are the orientation part of x."""
     return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
 
 

@@ -112,7 +112,7 @@ def tangential(w, d):
 
 
 def point_velocity(vel, w, d):
-    """7.59, 7.115, 7.128: velocity of the point P + d of a link, whose point P has the velocity vel."""
+    """7.59, 7.115, 7.128: velocity of a link's point P + d, if the link's point P has the velocity vel."""
     return plus(vel, tangential(w, d))
 
 
@@ -122,7 +122,7 @@ def sliding_velocity(vel, z, v):
 
 
 def moving_point_velocity(vel, w, p, u):
-    """7.61, 7.124: velocity of a point p that moves in a rotating frame with velocity u."""
+    """7.61, 7.124: velocity of a point p that moves with velocity u in a rotating frame."""
     return plus(point_velocity(vel, w, p), u)
 
 
@@ -140,40 +140,40 @@ def centripetal(w, d):
 
 
 def coriolis(w, u):
-    """7.125: Coriolis acceleration of a point that moves in a rotating frame with velocity u."""
+    """7.125: Coriolis acceleration of a point that moves with velocity u in a rotating frame."""
     return times(2, cross(w, u))
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration of the link after a joint; the link before has w and alpha."""
+    """7.129, rotary: angular acceleration of the link after a joint; w, alpha: those of the link before."""
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 
 def point_acceleration(acc, alpha, w, d):
-    """7.123, 7.130: acceleration of the point P + d of a link, whose point P has the acceleration acc."""
+    """7.123, 7.130: acceleration of a link's point P + d, if the link's point P has the acceleration acc."""
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
 
 def sliding_acceleration(acc, w, z, v, a):
-    """7.130, prismatic: acceleration of the link after a joint; the axis z turns with the link before it."""
+    """7.130, prismatic: acceleration of the link after a joint; z is fixed to the link before it."""
     return plus(plus(acc, times(a, z)), coriolis(w, times(v, z)))
 
 
 def moving_point_acceleration(acc, alpha, w, p, u, b):
-    """7.125: acceleration of a point p that moves in a rotating frame with velocity u and acceleration b."""
+    """7.125: acceleration of a point p that moves with velocity u and acceleration b in a rotating frame."""
     return plus(plus(point_acceleration(acc, alpha, w, p), coriolis(w, u)), b)
 
 
-# -- planar and floating joints: they slide and turn along the axes of the moved frame ------------------
+# -- planar and floating joints: b contains derivatives of components in axes that turn with w + o -----
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration after a joint with angular velocity o; b: rate of o in the moved frame."""
+    """7.129: angular acceleration after a joint with angular velocity o; b: derivative of o's components."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration after a joint with velocities u, o; b: rate of u in axes that turn with w + o."""
+    """7.130: acceleration after a joint with velocities u and o; b: derivative of u's components."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 
@@ -181,12 +181,12 @@ def free_acceleration(acc, w, o, u, b):
 
 
 def turning_column(z, d):
-    """7.80, 7.85: column [z x d; z] of a rotary joint; d leads from its axis to the frame's origin."""
+    """7.80, 7.85: column [z x d; z] of a rotary joint; d leads from the joint to the frame's origin."""
     return cross(z, d), z
 
 
 def axis_rate(w, z):
-    """Return the rate of an axis that is fixed to a link with angular velocity w (7.37)."""
+    """Return the time derivative of an axis that is fixed to a link with angular velocity w (7.37)."""
     return cross(w, z)
 
 
@@ -196,7 +196,7 @@ def turning_column_rate(z, z_rate, d, d_rate):
 
 
 def rate_in_turning_axes(rate, w, x):
-    """Return the rate of the components of x in axes that turn with w."""
+    """Return the time derivatives of the components of x in axes that turn with w."""
     return minus(rate, cross(w, x))
 
 
@@ -204,15 +204,15 @@ def rate_in_turning_axes(rate, w, x):
 
 
 def turned_along(w, linear, angular):
-    """Return the rate of a Jacobian column (7.85) if an earlier joint rotates z and d with velocity w."""
+    """Return the derivative of a Jacobian column (7.85) if an earlier joint turns z and d with velocity w."""
     return cross(w, linear), cross(w, angular)
 
 
 def end_moved(z, linear):
-    """Return the rate of z x d (7.85) if a later joint moves the frame's origin with velocity `linear`."""
+    """Return the derivative of z x d (7.85) if a later joint moves the end of d with velocity `linear`."""
     return cross(z, linear)
 
 
 def motion_product(linear_1, angular_1, linear_2, angular_2):
-    """Return the rate of Jacobian column 2 if the joint of column 1 moves: their spatial cross product."""
+    """Return the derivative of Jacobian column 2 if the joint of column 1 moves: a spatial cross product."""
     return plus(cross(angular_1, linear_2), cross(linear_1, angular_2)), cross(angular_1, angular_2)

@@ -30,7 +30,7 @@ _DOUBLE = np.dtype(np.float64)
 
 
 def floats(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as float64 of any shape, where NaN and inf are allowed; else raise InputError."""
+    """Return `value` as a float64 array; NaN and inf are allowed; other values raise InputError."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE:
         return value
     if _is_masked(value):
@@ -55,7 +55,7 @@ def _is_masked(value: object) -> bool:
 
 
 def scalars(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as finite float64 of any shape; else raise InputError."""
+    """Return `value` as a float64 array of any shape; raise InputError if it is not numeric and finite."""
     array = floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
@@ -63,7 +63,7 @@ def scalars(value: ArrayLike, name: str) -> FloatArray:
 
 
 def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """Return `value` as a finite float64 array (..., size); else raise InputError."""
+    """Return `value` as a finite float64 array (..., size); raise InputError for any other value."""
     array = scalars(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
@@ -71,7 +71,7 @@ def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
 
 
 def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
-    """Return `value` as a finite float64 array (..., rows, columns); else raise InputError."""
+    """Return `value` as a finite float64 array (..., rows, columns); raise InputError for any other value."""
     array = scalars(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
@@ -79,7 +79,10 @@ def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> Fl
 
 
 def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as (..., 3) unit vectors, without normalisation, which would hide a user's mistake."""
+    """Return `value` as unit vectors (..., 3); a vector with another norm raises InputError.
+
+    Normalising such a vector would hide a user's mistake.
+    """
     array = vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))
     if (np.abs(norms - 1.0) > UNIT_TOLERANCE).any():

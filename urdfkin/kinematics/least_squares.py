@@ -21,7 +21,7 @@ _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
 _EASIER, _HARDER = 0.03, 10.0
 #: A step is slow if the error after the step is more than this fraction of the error before the step.
 _SLOW = 0.99
-#: Least fraction by which a full step must be able to reduce the squared error; else the iteration ends.
+#: The iteration ends if a full step would reduce the squared error by at most this fraction.
 _LEAST_REDUCTION = 1e-13
 #: Relative rounding error (in eps) of the norm of n residuals, divided by n.
 _NORM_ROUNDING = 4.0

@@ -102,7 +102,7 @@ def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
 
-#: Largest difference (per entry) from the nearest rotation at which a matrix is used unchanged.
+#: A matrix is used unchanged if no entry differs from the nearest rotation by more than this number.
 ROUNDED = 1e-15
 
 
@@ -311,8 +311,9 @@ def integrate_orientation(
     halved, the truncation error is divided by about 16.
 
     Args:
-        w: Returns the angular velocity (..., 3) at a time. It must be smooth within a step, so add a time to
-            `times` at each jump. At the start and the end of a step, w is evaluated slightly inside the step.
+        w: Returns the angular velocity (..., 3) at a time. The angular velocity must be smooth within a step,
+            so add a time to `times` at each jump. At the start and the end of a step, w is evaluated slightly
+            inside the step.
         quat: (..., 4) orientation at the first time.
         times: (n,) increasing times, s.
         frame: Frame of the angular velocity.
@@ -345,7 +346,7 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Return the rates of a quaternion of any length: 7.57 is linear in the quaternion."""
+    """Return the rates of a quaternion of any length, because 7.57 is linear in the quaternion."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
@@ -410,7 +411,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = sine < 1e-150  # For a small angle phi, phi = 2 sine; the quotient phi / sine would lose digits.
+    small = sine < 1e-150  # Squares of tiny components lose digits; phi k is then 2 `vector`.
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 
@@ -482,7 +483,7 @@ def _sequence(name: str) -> Sequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return the rotation Rx, Ry or Rz (axis 0, 1 or 2); entries without the angle are exactly 0 and 1."""
+    """Return the rotation Rx, Ry or Rz (axis 0, 1 or 2); the constant entries are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -506,7 +507,7 @@ def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_of(name: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles of a rotation. Up to rounding, it is the inverse of `rotation_from_euler`.
+    """Return the Euler angles of a rotation. Up to rounding, this is the inverse of `rotation_from_euler`.
 
     The middle angle is in [0, pi] for a proper sequence such as ZYZ and in [-pi/2, pi/2] for the others. At
     the representational singularity, only the sum or the difference of the first and the third angle is

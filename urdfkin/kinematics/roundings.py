@@ -6,8 +6,8 @@ eps. Errors are counted to first order. A tolerance is `count * eps * scale`. Th
 the scales for tables.
 
 **A joint.** For each joint, the recursion multiplies the rotation so far by the joint's constant rotation and
-by its rotation about its axis. If *all* roundings add up, the error of a component of a rotated vector grows
-for each joint by
+by its rotation about its axis. If *all* rounding errors have the same sign, the error of a component of a
+rotated vector grows for each joint by
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -23,10 +23,10 @@ that record each of their roundings.
 
 The acceleration of a frame, for example, is a sum of terms such as w x (w x d); w, w and d are the three
 factors of this term. The sum of the terms over the joints and the cross products in a term have rounding
-errors too. In each implementation, these errors are together at most 2 eps for all two or three factors of a
-term (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count is for one joint more than
-the path has, which covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24 instead of
-22.5, which covers the other sums.
+errors too. In each implementation, the sum of these errors is at most 2 eps for each term, which has two or
+three factors (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count includes one more
+joint than the path has; this covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24
+instead of 22.5, which covers the other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
 axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
@@ -38,9 +38,10 @@ joints of the path. In the world's axes, the number of rotations is the same.
 If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix products for this joint. Let
 A be the rotation that turns z to the joint's axis. urdfkin multiplies the joint's constant rotation by A, and
 by the inverse of the previous joint's A. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
-result depends on the length of the axis. If all 340 roundings add up, the error is 41. `ROUNDINGS` does not
-cover this worst case. If each rounding error is uniformly distributed over its range, the standard deviation
-of the sum is 3.3. For a single joint, `ROUNDINGS` is seven times this standard deviation.
+result depends on the length of the axis. If all 340 rounding errors have the same sign, the total error is
+41. `ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over its
+range, the standard deviation of the sum is 3.3. For a single joint, `ROUNDINGS` is seven times this standard
+deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
@@ -50,11 +51,11 @@ the tilt t, the count of each factor is larger by 2 t / eps. If a tilt is larger
 finding URDF514.
 
 **An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. An export also omits
-small constants. A number of a constant rotation is small if it is less than half an eps of the largest number
-in its row. A component of an offset is small if it is less than half an eps of the largest component. Each
-omission causes an error of half an eps, but the rounding errors of one product and one sum disappear. The
-compiler decides whether products and sums are fused. An export uses the sine and cosine of a library. Only
-batches in C use polynomials with an error of one eps; three subtractions reduce the polynomials' angle.
+small constants. An entry of a constant rotation matrix is small if it is less than half an eps of the largest
+entry in its row. A component of an offset is small if it is less than half an eps of the largest component.
+Each omission causes an error of half an eps, but the rounding errors of one product and one sum disappear.
+The compiler decides whether products and sums are fused. An export uses the sine and cosine of a library.
+Only batches in C use polynomials with an error of one eps; three subtractions reduce the polynomials' angle.
 
 | Roundings of the polynomials, with r the reduced angle | |
 |---|---|
@@ -75,16 +76,16 @@ The counts of an export's joint are
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
 offset's length. The products with an omitted component, in a matrix row or in a cross product, are omitted
-too. These products would have an error of 1.5, which is larger. Without fused multiply-adds, an export and
-Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the errors of the sums over the joints.
-`ROUNDINGS` is 24.0 and does not cover these sums. The standard deviation is the same as for urdfkin. In a
-comparison of an export with true values (test vectors), the error is at most 7.2, which is within
-`ROUNDINGS`.
+too. The error of these products, 1.5, would be larger than the error of the omission. Without fused
+multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the errors
+of the sums over the joints. `ROUNDINGS` is 24.0 and does not cover these sums. The standard deviation is the
+same as for urdfkin. In a comparison of an export with true values (test vectors), the error is at most 7.2,
+which is within `ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
-2^-23. For each operation and each constant, `urdfkin.export.single` multiplies the error by the derivative of
-the result with respect to this value. The bound is the sum of the absolute values of all these products. The
-error of one operation is
+2^-23. For each operation and each constant, `urdfkin.export.single` multiplies the error of its value by the
+derivative of the result with respect to this value. The bound is the sum of the absolute values of all these
+products. The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -94,7 +95,7 @@ error of one operation is
 | sine and cosine of a library: 3.5 units in the last place (SLEEF, used by PyTorch); CUDA has 2 | 3.5 |
 | sine and cosine by the polynomials of C's batches, in eps of 1 | 1.0 |
 
-A change of sign has no error. A test vector contains its inputs as single-precision numbers, so the inputs
+A change of sign has no error. The inputs of a test vector are stored as single-precision numbers, so they
 have no rounding error. A number below the smallest normal number, 2^-126, has an error of 2^-126 at most,
 because GPUs and some compilers replace such a number by 0. The constants also have the rounding errors of the
 export in double precision. Therefore, the double-precision bound, multiplied by 2^-52 / 2^-23, is added to
@@ -103,7 +104,7 @@ the single-precision bound. An export has no other operations, so there are no o
 **MuJoCo**, the optional second oracle, computes the orientation as a unit quaternion. For each joint, MuJoCo
 multiplies this quaternion by the quaternion of the constant rotation and by the quaternion of the joint's
 rotation. MuJoCo normalises the joint's axis first. At each link, MuJoCo normalises the quaternion and
-converts it to a matrix. If all roundings add up, the error is
+converts it to a matrix. If all rounding errors have the same sign, the error is
 
 | | MuJoCo |
 |---|---|
@@ -113,11 +114,11 @@ With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2, which
 joints too. MuJoCo does not replace the file's axes by coordinate axes.
 
 **A mimic joint** adds no rounding. urdfkin and the oracle compute a mimic joint's angle m q + c from the same
-doubles m and c. Both round the multiplication and then the addition, so IEEE 754 defines the result to the
-last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the same
-order, from the mimicked joint outwards. The errors of sine and cosine are counted above. The functions sine
-and cosine first subtract multiples of pi/2 from the angle; this subtraction is exact for every angle, also
-for 1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
+doubles m and c. Both programs round the multiplication and then the addition, so IEEE 754 defines the result
+to the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the
+same order, from the mimicked joint outwards. The errors of sine and cosine are counted above. The functions
+sine and cosine first subtract multiples of pi/2 from the angle; this subtraction is exact for every angle,
+also for 1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
 
 **A base** with a rotation M adds one joint to the count. A base without a rotation adds no rounding. The
 user's matrix M has nine correct digits. Each of the two programs replaces M by the nearest rotation, with a
@@ -157,7 +158,7 @@ that is not zero is therefore at least the smallest normal number (`urdfkin.kine
 tolerance `count * eps * scale` is then larger than the error 2^-1075, even if the product is multiplied by
 large numbers later. The smallest unit is eps times the smallest normal number, 2^-1074.
 
-**A row** of a Denavit-Hartenberg table has 8 roundings at most:
+**A row** of a Denavit-Hartenberg table has an error of at most 8:
 
 | | |
 |---|---|
@@ -193,9 +194,9 @@ NOT_ZERO = 1e-300
 ROUNDINGS = 24.0
 #: Allowed difference (in eps) from MuJoCo, for each joint and each factor of a term.
 MUJOCO = 30.0
-#: Allowed error (in eps) of an MJCF file's mimic rule between urdfkin's tree and MuJoCo.
+#: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE = 8.0
-#: Rounding errors (in eps) of each row of a Denavit-Hartenberg table.
+#: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW = 8.0
 
 # Exports in single precision (`urdfkin.export.single`); the docstring of this module derives the numbers.
@@ -210,20 +211,20 @@ SINGLE_POLYNOMIAL = 1.0
 
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
-#: Allowed difference (in eps), for each joint, of the constant poses that two programs read from one file.
+#: Allowed difference (in eps per joint) between the constant poses that two programs read from one file.
 #: The worst case is 18.9: the sum of the docstring's first table without the rotation about the axis.
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
 #: Error (in eps) of the directions of two joint axes.
 #: Dividing an axis by its length has an error of 0.5; rotating an axis by Rodrigues' formula has one of 2.0.
 AXES = 5.0
-#: Error (in eps), for each joint, that the program that wrote the file causes.
+#: Error (in eps) of each joint that is caused by the program that wrote the file.
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
 #: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
 #: Roll and pitch both tilt an axis, so the error 22.5 counts twice; yaw does not tilt the axis.
 WRITTEN = 45.0
 #: Error of a length along an axis, in units of eps times the length of the path.
-#: A dot product has an error of 2.4, and each sum of lengths has an error of 0.5 of its own value.
+#: A dot product has an error of 2.4, and each sum of lengths has an error of 0.5 eps of this sum.
 #: Only a few sums of lengths are nearly as large as the path's length.
 SUMMED = 4.0
 
@@ -252,7 +253,7 @@ MIMIC_LIMIT = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference (in eps) of two programs with the same URDF, for each factor of a term.
+    """Return the allowed difference (in eps), for each factor of a term, of two programs that read one URDF.
 
     `joints` is the number of joints on the path. `tilt` is the sum over these joints of the angle (radians)
     between Pinocchio's axis and the file's axis.
@@ -264,7 +265,7 @@ def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
 
 
 def of_rows(rows: int) -> float:
-    """Return the number of roundings of a pose that is computed from a table with `rows` rows and a tool.
+    """Return the rounding error (in eps) of a pose that is computed from a table with `rows` rows and a tool.
 
     The rounding of the joint values, half an eps, is not included.
     """
@@ -272,17 +273,17 @@ def of_rows(rows: int) -> float:
 
 
 def of_rows_read_back(rows: int) -> float:
-    """Return the number of roundings in a comparison of a table with the URDF that was written from it.
+    """Return the allowed difference (in eps) between a table and the URDF that was written from the table.
 
-    The pose from the table and Pinocchio's pose from the URDF have `of_rows(rows)` roundings each. The
-    conversion to roll, pitch and yaw has twice as many.
+    The pose from the table and Pinocchio's pose from the URDF have the error `of_rows(rows)` each. The
+    conversion to roll, pitch and yaw has twice this error.
     """
     return 4.0 * of_rows(rows)
 
 
 def of_a_fit(rows: int) -> float:
-    """Return the number of roundings in a comparison of a URDF with a table that was fitted to it.
+    """Return the allowed difference (in eps) between a URDF and a table that was fitted to the URDF.
 
-    The fit is iterative. After its last iteration, the error can be up to 12.5 times `of_rows(rows)`.
+    The fit is iterative. After the last iteration, the error can be up to 12.5 times `of_rows(rows)`.
     """
     return 12.5 * of_rows(rows)

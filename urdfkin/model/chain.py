@@ -33,7 +33,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Least size (m) of a robot in a comparison, even if all its frames coincide.
+#: Smallest size (m) that a comparison assumes for a robot, even if all its frames coincide.
 LEAST_SIZE = 1e-9
 
 
@@ -240,7 +240,7 @@ class FrameChain(Displayable):
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     """Return the path from the link or joint frame `base` (by default the root) to the frame `tip`.
 
-    A planar or floating joint on the path raises InputError; an unknown name UnknownNameError.
+    A planar or floating joint on the path raises InputError; an unknown name raises UnknownNameError.
     """
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0

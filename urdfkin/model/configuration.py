@@ -51,7 +51,8 @@ class NarrowedRange:
     Attributes:
         joint: Name of the mimicked joint.
         own: The range from the limits of the mimicked joint.
-        allowed: The part of `own` in which all mimic joints are within their limits; None if there is none.
+        allowed: The part of `own` in which all mimic joints are within their limits; None if no value is
+            allowed.
         by: Names of the mimic joints whose limits make the range smaller.
         unit: "rad" or "m".
     """
@@ -151,7 +152,7 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
     def is_allowed(leader: float) -> bool:
         return least <= rule.multiplier * leader + rule.offset <= most
 
-    if is_allowed(lower) and is_allowed(upper):  # All values between the ends are allowed too.
+    if is_allowed(lower) and is_allowed(upper):  # All values between two allowed ends are allowed.
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
@@ -225,7 +226,7 @@ def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def coordinate_layout(tree: KinematicTree, what: str) -> CoordinateLayout:
-    """Return the names and units of the numbers of q, v or a, with which values are parsed."""
+    """Return the names and units of the numbers of q, v or a, for the parsing of values."""
     is_q = what == "q"
     spans = {
         joint.name: (at, joint.nq if is_q else joint.nv)
@@ -326,8 +327,8 @@ def locked_values(
         joints: Names of the joints that stay movable. Every other joint is locked at its value in `lock`, or
             at 0 if `lock` has no value for the joint.
 
-    An unknown joint or pose raises UnknownNameError. A joint to lock that is fixed, mimics another joint, has
-    several coordinates or is named twice raises InputError, and so does a value outside the joint's limits.
+    An unknown joint or pose raises UnknownNameError. InputError is raised if a joint to lock is fixed, mimics
+    another joint, has several coordinates or is named twice, or if a value is outside the joint's limits.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.named(lock, "lock")
@@ -459,7 +460,7 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a message for each joint, mimic joints too, outside its limits in a configuration of `q`."""
+    """Return a message for each joint, also for each mimic joint, that exceeds its limits anywhere in `q`."""
     return [words for _, words in _violations(tree, q)]
 
 
@@ -633,9 +634,9 @@ def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
     """Return random configurations (n, nq), uniform within the limits.
 
     Continuous joints take any angle. Planar and floating joints take any orientation and positions within
-    +-2 m. A missing limit, or a limit beyond 10 (rad or m), counts as 10. The limits of mimic joints restrict
-    the mimicked joint too. If no value is within the limits of the mimicked joint and of the mimic joint,
-    only the limits of the mimicked joint apply, and `limit_violations` names the mimic joint.
+    +-2 m. A missing limit, or a limit beyond +-10 (rad or m), is replaced by +-10. The limits of mimic joints
+    restrict the mimicked joint too. If no value is within the limits of the mimicked joint and of the mimic
+    joint, only the limits of the mimicked joint apply, and `limit_violations` names the mimic joint.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
@@ -690,9 +691,9 @@ def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special:
     """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
 
     The samples cover the own range of each joint, even if a mimic joint then exceeds its limits, because the
-    equations are valid beyond the limits too. Joint velocities and accelerations are standard normal. Every
-    eighth sample has a hundred times larger velocities and accelerations, so that the quadratic terms of eq.
-    7.129 and 7.130 dominate.
+    equations are valid beyond the limits too. Joint velocities and accelerations have the standard normal
+    distribution. Every eighth sample has a hundred times larger velocities and accelerations, so that the
+    quadratic terms of eq. 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:

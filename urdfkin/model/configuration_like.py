@@ -53,7 +53,7 @@ class CoordinateLayout:
         what: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and their count.
-        poses: Returns the named poses. An input that needs no pose does not call this function.
+        poses: Returns the named poses. The function is called only for an input that needs a pose.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
         lengths: Returns a hint for each wrong length that users often pass, such as the length of q in
             Pinocchio.
@@ -93,7 +93,7 @@ class CoordinateLayout:
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
         """Return the values of a text or mapping by name, and the pose with which the text begins, or None.
 
-        Numbers without names, or a repeated name, raise InputError; an unknown pose UnknownNameError.
+        Numbers without names, or a repeated name, raise InputError; an unknown pose raises UnknownNameError.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).named("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)
@@ -215,7 +215,7 @@ class CoordinateLayout:
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return a text or a mapping unchanged, and a table with labels as a mapping; else None.
+    """Return a text or a mapping unchanged, a table with labels as a mapping, and None for other values.
 
     A label that occurs twice, or a list of tables with labels, raises InputError.
 
@@ -243,7 +243,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
 
 
 def _labels(value: object) -> list[Any]:
-    """Return a table's `keys()`, `columns` or `column_names`; nothing if they are 0, 1, 2, ..."""
+    """Return a table's `keys()`, `columns` or `column_names`; an empty list if they are 0, 1, 2, ..."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []

@@ -76,7 +76,8 @@ class Coupling:
     def values(self, q: Given) -> FloatArray:
         """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates).
 
-        A wrong length of the last axis or a missing name raises InputError; an unknown name UnknownNameError.
+        A wrong length of the last axis or a missing name raises InputError; an unknown name raises
+        UnknownNameError.
         """
         coordinates = self.checked(q, "q")
         # Each row of G contains only one number that is not zero, so no matrix product is needed.

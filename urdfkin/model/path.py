@@ -75,7 +75,8 @@ class Path:
         """Return the pose (..., 4, 4) at the end of the path, for amounts (..., motions) in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
-        for T in self._after_each_step(amounts):  # noqa: B007  the last pose is the result
+        # After the loop, T is the pose at the end of the path.
+        for T in self._after_each_step(amounts):  # noqa: B007
             pass
         return np.array(T)
 

@@ -24,7 +24,7 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
-    #: Whether the results describe the body point that is now at the world's origin, not the frame's origin.
+    #: True: the results describe the body point that is now at the world's origin. False: the frame's origin.
     at_world: bool
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:
@@ -38,7 +38,7 @@ class Reference(IntEnum):
 
     @classmethod
     def of(cls, value: Reference | str) -> Reference:
-        """Return the member with a name, in upper or lower case; return a member unchanged.
+        """Return the member with the given name, in upper or lower case; return a given member unchanged.
 
         An unknown name raises UnknownNameError.
 

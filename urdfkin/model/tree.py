@@ -1,9 +1,9 @@
 """The robot model: a tree of links and joints, with the joint limits and mimic rules of the URDF.
 
 `KinematicTree` depends neither on XML nor on Pinocchio. Its links and joints are in Pinocchio's order: depth
-first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. The
-frame of a link or a joint has its name; the prefix `link:` or `joint:` is needed if a link and a joint have
-equal names.
+first, sibling joints by name. Therefore, `q` and `v` have the same order in urdfkin and in Pinocchio. A frame
+has the name of its link or joint; the prefix `link:` or `joint:` is needed if a link and a joint have equal
+names.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: Least distance from the limits of a value far outside: in rad or m, and as a fraction of the joint's range.
+#: A value is far outside if it exceeds a limit by this many rad or m, and by this fraction of the range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
@@ -196,7 +196,7 @@ class Joint:
 
     @property
     def length(self) -> float:
-        """Length (m) of the offset from the parent link, with a locked prismatic joint's displacement."""
+        """Length (m) of the offset from the parent link, plus a locked prismatic joint's displacement."""
         # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids squares.
         length = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
@@ -228,7 +228,7 @@ class Lock:
         T, axis, value = np.eye(4), self.joint.axis, self.value
         if not self.joint.kind.turns:
             T[:3, 3] = value * axis
-        elif np.count_nonzero(axis) == 1:  # About a coordinate axis, zeros and ones are exact.
+        elif np.count_nonzero(axis) == 1:  # A rotation about a coordinate axis has exact zeros and ones.
             k = int(np.flatnonzero(axis)[0])
             T[:3, :3] = coordinate_rotation(k, np.array(axis[k] * value))
         else:
@@ -373,7 +373,7 @@ class KinematicTree:
     def frame_link(self, name: str) -> int:
         """Return the index of the link that carries the frame `name`.
 
-        A link or joint with exactly this name is found first. Otherwise `link:NAME` selects the link and
+        A link or joint with exactly this name has priority. Otherwise `link:NAME` selects the link and
         `joint:NAME` the joint. An unknown name raises UnknownNameError; a name of a link and of a joint at
         different places raises InputError.
         """
@@ -418,7 +418,7 @@ class KinematicTree:
         return None
 
     def _unambiguous(self, *names: FrameName) -> list[str]:
-        """Return a list with the first of `names` that no link or joint has; empty if there is none."""
+        """Return a list with the first of `names` that no link or joint has; an empty list if all exist."""
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]
 

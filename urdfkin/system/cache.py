@@ -63,7 +63,7 @@ def cache_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | N
         reason = getattr(error, "strerror", None) or str(error)
         say_once(f"the cache cannot be written in {root}: {reason}; set XDG_CACHE_HOME to another folder")
         return None
-    with contextlib.suppress(OSError):  # existing files of a full or read-only disk are still readable
+    with contextlib.suppress(OSError):  # files that exist on a full or read-only disk are still readable
         (folder / _USED).touch()
         _delete_unused(root, kind)
     return folder

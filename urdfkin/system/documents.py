@@ -66,8 +66,8 @@ class Header(TypedDict):
     command: Annotated[
         str | None,
         says(
-            "Command that makes the document again; null: unknown. It has a line for each set of options, "
-            "and a line for each robot that was given as text (`-`: standard input)."
+            "Command that makes the document again; null: unknown. The text has a line for each set of "
+            "options, and a line for each robot that was given as text (`-`: standard input)."
         ),
     ]
 
@@ -91,7 +91,7 @@ class DocumentKind(Generic[_T]):
     is_open: bool = False
 
     def schema(self) -> dict[str, Any]:
-        """Return the JSON Schema (draft 2020-12), with the entries in the order of the types."""
+        """Return the JSON Schema (draft 2020-12), with the entries in the order of the `TypedDict`s."""
         parts: dict[str, Any] = msgspec.json.schema(self.type)["$defs"]
         for name, part in parts.items():
             entries = getattr(sys.modules[self.type.__module__], name).__annotations__

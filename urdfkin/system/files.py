@@ -216,7 +216,7 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
                 return piece
         except BlockingIOError:  # a writer is connected
             return b""
-        # After POLLHUP, a writer has connected and closed the pipe.
+        # POLLHUP means that a writer has connected and then closed the pipe.
         if any(event & select.POLLHUP for _, event in events.poll(0)):
             return b""
         time.sleep(0.01)
@@ -229,7 +229,7 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all, through a temporary file in the folder that is then renamed.
+    """Write a file completely or not at all: write a temporary file in the same folder, and rename it.
 
     A link is followed. A device or a pipe, such as `/dev/null`, is written directly.
 

@@ -82,7 +82,7 @@ def version_before(reference: str, folder: Path) -> Version:
         merge_base = _text("merge-base", commit, "HEAD", cwd=root)
     except SourceError as error:
         raise SourceError(
-            "git finds no common version of this commit and HEAD",
+            "git finds no common ancestor of this commit and HEAD",
             where=reference,
             found=error.found,
             remedy="fetch this commit first, with its history; in GitHub's actions/checkout set"

@@ -1,8 +1,8 @@
 """Locks that are unlocked in a child process after a fork.
 
-A fork copies all locks, but only the thread that calls `fork`. A lock that another thread holds would stay
-locked in the child for ever. `import urdfkin` imports this module first, so this module imports nothing that
-an untrusted current folder could replace.
+A fork copies all locks, but it copies only the thread that calls `fork`. A lock that another thread holds
+would stay locked in the child for ever. `import urdfkin` imports this module first, so this module imports
+nothing that an untrusted current folder could replace.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class _ImportLock:
             return
         with self._lock:
             if not self._registered:
-                import logging  # noqa: F401  a file in the current folder could replace `logging`
+                # This import registers `logging`'s lock before `_before_fork`, see the docstring.
+                import logging  # noqa: F401
 
                 os.register_at_fork(
                     before=_before_fork, after_in_parent=_after_fork, after_in_child=_after_fork

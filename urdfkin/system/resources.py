@@ -21,7 +21,7 @@ def questions_page() -> Path:
 
 
 def _file(what: str, *paths: str) -> Path:
-    """Return a file in an installation or a checkout; paths begin in the folder above the package."""
+    """Return the first of `paths` that exists; they are relative to the folder that contains the package."""
     here = Path(__file__).resolve().parents[2]
     if (file := next((path for path in map(here.joinpath, paths) if path.is_file()), None)) is None:
         raise SourceError(

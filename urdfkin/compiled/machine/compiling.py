@@ -2,14 +2,14 @@
 
 Cache. Each computer compiles a kernel once. The name of the cache folder contains a digest of all source
 files of `compiled` and `kinematics`, because a kernel may use functions of any of these files. Numba's own
-cache files have no digest: a truncated file makes every later run fail, and a changed bit is executed. In
-this module each cache file has a digest. If a cache file is damaged, its kernel is compiled again. If no
-folder is writable, nothing is cached.
+cache files have no digest: a truncated file makes every later run fail, and Numba executes a file with a
+changed bit. This module therefore writes a digest into each cache file. If a cache file is damaged, its
+kernel is compiled again. If no folder is writable, nothing is cached.
 
-Inlined functions. Only kernels call an inlined function, never Python, and the compiler inlines it into each
-kernel. An inlined function therefore needs no machine code of its own, and no separate optimization. It has
-no closures and no array expressions, so the compiler passes for these features are skipped too. Skipping
-these steps halves the compile time.
+Inlined functions. Only kernels call an inlined function; Python never calls it. The compiler inserts the
+function's code into each kernel. An inlined function therefore needs no machine code of its own, and no
+separate optimization. It has no closures and no array expressions, so the compiler passes for these features
+are skipped too. Skipping these steps halves the compile time.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class KernelCache(_Null):  # type: ignore[misc]
 
     The folder's name contains a digest of the source files that all kernels share. A file's name depends on
     the function, its source file, its argument types and the processor. The source file may be in another
-    package. The function `begin` is called if the cache has no usable file, before the compilation.
+    package. If the cache has no usable file, the function `begin` is called before the compilation.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
@@ -63,7 +63,7 @@ class KernelCache(_Null):  # type: ignore[misc]
         if (content := get(place)) is not None:
             try:
                 return _Result._rebuild(target_context, *pickle.loads(content))
-            # An undamaged file can cause any error too, if another version wrote the file.
+            # An undamaged file may come from another version of Numba; reading it can cause any error.
             except Exception as error:
                 report_damaged(place, f"{type(error).__name__}: {error}")
         self._begin()
@@ -80,7 +80,7 @@ class KernelCache(_Null):  # type: ignore[misc]
 
 
 def function_name(function: Callable[..., int]) -> str:
-    """Return the last part of a function's module's name, followed by the function's name."""
+    """Return the last part of the name of a function's module, followed by the function's name."""
     return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
 
@@ -114,7 +114,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba identifies a compiled function by the C pointer for Python, which an inlined function lacks.
+        # Numba needs a Python entry point as the key of a compiled function; this empty one is never called.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -165,7 +165,7 @@ _INLINED: dict[str, Any] = {
 
 @contextmanager
 def compiling_allowed() -> Iterator[None]:
-    """Allow compilation even if NUMBA_DISABLE_JIT is set; Python cannot run these functions uncompiled."""
+    """Ignore NUMBA_DISABLE_JIT, because Python cannot run these functions without compilation."""
     before, _config.DISABLE_JIT = _config.DISABLE_JIT, 0
     try:
         yield
@@ -174,7 +174,7 @@ def compiling_allowed() -> Iterator[None]:
 
 
 def _skip_blas_check() -> None:
-    """Prevent Numba from importing SciPy's linear algebra for a check.
+    """Prevent Numba from importing SciPy only to check that its linear algebra is available.
 
     The import takes a fifth of the running time of a command, and no kernel calls linear algebra. For other
     compiled functions that call linear algebra, Numba still imports and checks SciPy. If a version of Numba
@@ -227,7 +227,7 @@ class Kernel:
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
-        # `compiled` is not a cached property, whose lock (before Python 3.12) could stay locked after a fork.
+        # No `cached_property` is used, because before Python 3.12 its lock could stay locked after a fork.
         if name != "compiled":
             raise AttributeError(name)
         with compiling:
@@ -287,6 +287,6 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
     """Return a decorator for a kernel with these argument types (Numba's).
 
     The kernel is compiled at the first call and cached on disk. `nogil` says whether a call releases Python's
-    global interpreter lock. Releasing the lock costs more time than a call of a microsecond takes.
+    global interpreter lock. Releasing the lock takes longer than a short call (one microsecond).
     """
     return lambda function: Kernel(function, arguments, nogil)

@@ -136,7 +136,7 @@ def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
 
     For example, four vectors of eight numbers contain two blocks of 4 by 4 numbers. The function transposes
     blocks of 2 by 2 numbers first, then, for enough vectors, blocks of 4 by 4 and of 8 by 8. To transpose a
-    larger block, it exchanges the block's upper right quarter with the lower left quarter.
+    larger block, the function exchanges the block's upper right quarter with the lower left quarter.
     """
     x, w = list(vectors), 1
     while w < len(x):
@@ -270,7 +270,7 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 
 @compiled
 def fetch(x, at, count):
-    """Load `count` numbers from `x[at]` on, inputs of the next block of configurations, into the cache."""
+    """Load `count` inputs of the next block of configurations, which begin at `x[at]`, into the cache."""
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
@@ -298,12 +298,12 @@ def _plus_squares(total, x, at):
 
 @compiled
 def add_squares(total, x, at, count):
-    """Add the squares of `count` numbers from `x[at]` on to `total`, and load later numbers into the cache.
+    """Add to `total` the squares of `count` numbers that begin at `x[at]`; load later numbers into the cache.
 
     The function adds eight numbers at once. If `count` is not a multiple of eight, each remaining number is
-    added eight times.
+    added eight times. This has no effect, because the sum is only compared with a very large bound.
     """
-    # Four independent sums take a quarter of the time of one sum.
+    # Four independent sums take a quarter of the time, because additions to one sum wait for each other.
     second, third, fourth = same(0.0), same(0.0), same(0.0)
     end = at + count
     while at + 4 * LANES <= end:
@@ -334,7 +334,7 @@ def ordinary(total):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy a cache line of `x` to a cache line of `to` in memory, without the caches."""
+    """Copy a cache line of `x` to a cache line of `to` in memory, bypassing the caches."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments

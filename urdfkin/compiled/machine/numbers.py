@@ -140,7 +140,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether each type is a number type of this module or an integer type, but not all are integers.
+    """Return whether all types are number types of this module or integers, and at least one is no integer.
 
     Equations contain integers as factors, for example the 2 in 2 (w x u).
     """

@@ -39,12 +39,12 @@ _ORDERS, _AXES, _ROWS, _COLUMNS = map(
 
 #: Number of 8-byte words in the header of a Python object.
 _OWN = object.__basicsize__ // 8
-#: Indices of the 8-byte words with an object's type, and with the first item of a tuple.
+#: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
 #: The number of axes and the flags are numbers of four bytes.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
-#: Index of the word with byte order and type number in the C structure PyArray_Descr, and their values.
+#: Index of the word with the byte order and the type number of an array's elements (PyArray_Descr in C).
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
 _HALF, _BYTE = 0xFFFFFFFF, 0xFF
 #: NumPy's flags of a C-contiguous and aligned input array, and of an output array, which is also writable.

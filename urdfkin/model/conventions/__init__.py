@@ -1,4 +1,4 @@
-"""Conventions of other programs: joint order, quaternions, row order, base velocities, units and zeros."""
+"""Conventions of other programs: orders of joints and rows, quaternions, base velocities, units and zeros."""
 
 from urdfkin.model.conventions.convention import BUILT_IN, Convention, JointRule, as_toml, find_convention
 from urdfkin.model.conventions.conversion import Conversion, Reordering, reordering

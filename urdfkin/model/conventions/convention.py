@@ -147,8 +147,8 @@ BUILT_IN = (
 def find_convention(name: str | Path | Convention) -> Convention:
     """Find a convention by its name or read it from a TOML file. Return a `Convention` unchanged.
 
-    An unknown name raises UnknownNameError, an unreadable file SourceError, and an invalid file the errors of
-    `read_convention`.
+    An unknown name raises UnknownNameError, and an unreadable file raises SourceError. An invalid file raises
+    the errors of `read_convention`.
     """
     if isinstance(name, Convention):
         return name
@@ -272,7 +272,7 @@ def as_toml(how: Convention) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Return a text as a quoted string of TOML: JSON's escapes, and an escape of DEL."""
+    """Return a text as a quoted TOML string, with JSON's escapes and an escape of DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -280,7 +280,7 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: Smallest base-62 digit after which a number in a transcoded name continues.
+#: In a transcoded name, a base-62 digit of at least this value is not the last digit of its number.
 _CONTINUES = 31
 
 

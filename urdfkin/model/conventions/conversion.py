@@ -56,7 +56,7 @@ class _FreeJoint:
         q: Index of the joint's first number in urdfkin's q.
         v: Index of the joint's first number in urdfkin's v.
         rows: Indices of the joint's numbers in the target program's v.
-        point: (3,) point of the linear velocity, in the joint's frame.
+        point: (3,) point whose velocity is the linear velocity, in the joint's frame.
     """
 
     joint: Joint
@@ -189,7 +189,7 @@ class Conversion:
 
         def below(link: int) -> list[int]:
             found, links = list[int](), [link]
-            for parent in links:  # The loop extends this list by links of fixed joints.
+            for parent in links:  # The loop appends the child links of fixed joints.
                 for i in children.get(parent, []):
                     # A locked joint is still a moving joint in the target program.
                     if self.tree.joints[i].unlocked.kind.nv or not merged:
@@ -371,8 +371,8 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
-        The conversion of v may depend on q, and that of a on q and v. If the target program has the same q,
-        the same array is returned. A wrong length or a number that is not finite raises InputError.
+        The conversion of v may depend on q, and the conversion of a on q and v. If the target program has the
+        same q, the same array is returned. A wrong length or a number that is not finite raises InputError.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -396,7 +396,7 @@ class Conversion:
     def from_(
         self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's: inverse of `to`.
+        """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's; inverse of `to`.
 
         A wrong length, a number that is not finite, or a mimic joint's value that differs from its mimic rule
         raises InputError.
@@ -605,8 +605,8 @@ class Conversion:
         """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
         The rows of J are derivatives of quantities that are the same in both conventions, such as Euler
-        angles. If a column of J belongs to several joints of the target program, because one mimics the
-        other, InputError is raised.
+        angles. If a column of J belongs to several joints of the target program, because one of them mimics
+        another, InputError is raised.
         """
         self._demand_own_columns()
         array = np.asarray(J, dtype=np.float64)
@@ -690,7 +690,7 @@ class Conversion:
 
 @dataclass(frozen=True, slots=True)
 class Reordering:
-    """Formula that computes one program's numbers from another's: `x[..., index] * factor + zero`."""
+    """Formula that computes one program's numbers from another program's: `x[..., index] * factor + zero`."""
 
     index: tuple[int, ...]
     factor: tuple[float, ...]
@@ -712,7 +712,7 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that converts "q" or "v" from convention `start` to convention `end`, or None.
+    """Return the formula that converts "q" or "v" from convention `start` to `end`; None if there is none.
 
     There is no formula if one convention stores the cosine and the sine of an angle, or if the two
     conventions express a base velocity in different frames.
@@ -752,7 +752,7 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """Return the index in `numbers` from which each of urdfkin's numbers is computed.
+    """For each of urdfkin's numbers, return the index of the entry of `numbers` that determines it.
 
     A mimic joint's number is used only if no other number is available.
     """
@@ -771,7 +771,7 @@ def _inverse(B: FloatArray) -> FloatArray:
 
 
 def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
-    """Return `array` with `part` in the slice `where` of the last axis; all other axes broadcast."""
+    """Write `part` to the slice `where` of the last axis, and return the array; all other axes broadcast."""
     shape = np.broadcast_shapes(array.shape[:-1], part.shape[:-1])
     if array.shape[:-1] != shape:
         array = np.broadcast_to(array, (*shape, array.shape[-1])).copy()
