@@ -46,7 +46,7 @@ _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Difference of joint values (rad, m) below which two configurations count as one.
 _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is compared with a limit.
-#: This excludes uncertain changes, such as the tilt of an axis near the target.
+#: Changes that the data determine poorly, such as the tilt of an axis near the target, then pass.
 _UNCERTAIN = 5.0
 #: Largest error after a correction, divided by the error before it: for accepted fits, and for refused fits.
 _BETTER, _NOT_WORSE = 0.25, 1.5

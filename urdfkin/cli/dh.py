@@ -104,8 +104,8 @@ choice_options = combine(
     _choice(
         "--sign",
         ("theta", "a", "alpha"),
-        "Direction of the x axes. theta: |theta| is smallest. a: a is not negative. alpha: alpha is not"
-        " negative.",
+        "How to choose the directions of the x axes: smallest |theta| (theta), a not negative (a), or alpha"
+        " not negative (alpha).",
     ),
     _choice(
         "--slide",

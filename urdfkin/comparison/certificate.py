@@ -400,7 +400,7 @@ def _as_written_errors(
     written = comparator.as_written(alignment)
     if claim is None:
         if written.frames:
-            yield "`as_written`: the largest distance without changes of B is missing"
+            yield "`as_written` is missing: the largest distance if B is not changed"
         return
     variables = variables_of(written, comparator.tolerance)
     links = [tree.links for tree in comparator.trees]

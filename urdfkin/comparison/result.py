@@ -666,7 +666,7 @@ def changes_of_b(
 
 
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """For each changed tool, yield the kind "tools" and a line of text.
+    """For each changed tool, yield the string "tools" and a line that describes the change.
 
     A frame that differs counts as a tool if it has no children, or if it describes how the robot is mounted.
     """

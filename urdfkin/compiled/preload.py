@@ -91,7 +91,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 def single_pays(name: str) -> bool:
     """Return whether to load the fast function (`SINGLE`) that calls the kernel `name` for one configuration.
 
-    Each call adds up the time that the fast function would have saved.
+    Each call adds the time that the fast function would have saved to a total.
     """
     if _only:
         return _only[-1] == "compiled"

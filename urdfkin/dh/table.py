@@ -245,9 +245,9 @@ class SnapChange:
             tool.
         what: The joint and the snapped quantity, as text.
         angle: Angle (rad) by which the change rotates the rest of the chain.
-        lever: Largest distance (metres) of the tip from the origin about which the chain rotates, with the
-            prismatic joints at zero.
-        sliders: Names of the prismatic joints between this origin and the tip; their travel increases the
+        lever: Largest distance (metres) from the centre of this rotation to the tip, with all prismatic
+            joints at zero.
+        sliders: Names of the prismatic joints between this centre and the tip; their travel increases the
             distance.
     """
 

@@ -127,7 +127,7 @@ def _product(factors: str) -> float | None:
 
 
 def in_radians(degrees: float) -> float:
-    """Convert degrees to radians. The result for k * 15 degrees equals the double k * pi / 12.
+    """Convert degrees to radians. For k * 15 degrees, the result is exactly k * pi / 12 in floating point.
 
     >>> in_radians(90.0) == math.pi / 2
     True

@@ -23,7 +23,7 @@ _PLACEHOLDER = re.compile(r"@(\w+)@")
 
 
 def write(code: FrameCode, to: str = "c") -> str:
-    """Return the text of a C file, which only declares its functions if `NAME_DECLARATIONS` is defined."""
+    """Return the text of a C file; if `NAME_DECLARATIONS` is defined, the file contains declarations only."""
     return c_file(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 

@@ -206,7 +206,7 @@ def _vectors(
 
 
 def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
-    """Return the error bounds k * scale of a function's results (n, numbers), in eps, and the scales."""
+    """Return the bounds k * scale (n, numbers) on a function's results, in eps, and the scales."""
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)

@@ -242,7 +242,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module(code: FrameCode) -> str:
-    """Return the code of a `torch.nn.Module` with the functions, and of a check of their derivatives."""
+    """Return code for PyTorch: a `torch.nn.Module` with the functions, and a check of their derivatives."""
     # The method `forward` computes the function with the fewest inputs, usually a function of q.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(

@@ -261,7 +261,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return a hint for each length that q, v or a has in Pinocchio, but not in urdfkin."""
+    """Return hints for the lengths of q, v and a that differ between Pinocchio and urdfkin."""
     has_mimic_joints = any(joint.mimic for joint in tree.joints)
     leave_out = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",

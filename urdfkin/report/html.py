@@ -55,7 +55,7 @@ _FAILURES_OPEN = 20
 #: If a report has more robots than this number, only robots that are not verified have histograms.
 #: The reason is computing time: the histograms of one robot take a second.
 _DRAWN = 100
-#: Maximum number of characters of all details in one page; otherwise, each robot has a separate file.
+#: Maximum number of characters of details in one page; with more, each robot has a separate file.
 MOST = 5_000_000
 
 

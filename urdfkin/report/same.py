@@ -331,7 +331,8 @@ def as_html(
 ) -> str:
     """Return an HTML page with the answer; the template escapes all names.
 
-    `options` are further options of the command line on the page. `started` is the date and time on the page.
+    `options` are further options for the command line that the page shows. `started` is the date and time on
+    the page.
     """
     from urdfkin.report.html import rendered, when
     from urdfkin.verify.oracles import versions

@@ -78,8 +78,8 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     """Return the robot names that `load` accepts.
 
     Args:
-        family: The family of the robots: arm, biped, gripper, hand, humanoid, quadruped, text, ... None for
-            all robots.
+        family: The family of the robots: arm, biped, gripper, hand, humanoid, quadruped, ...; text: robots of
+            the textbook. None: all robots.
 
     Raises:
         UnknownNameError: there is no such family.

@@ -252,7 +252,7 @@ def _place(link: _MovingJoint, state: State, q: Any) -> State:
 
 
 def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, ...]:
-    """Return the lengths of a planar or floating joint's displacement, velocities and accelerations."""
+    """Return the norms of a planar or floating joint's displacement, velocities and accelerations."""
     at, (slides, turns) = link.v, _FREE_PARTS[link.kind]
     (u, o), (u_rate, o_rate) = (
         (_norm(x[at : at + slides]), _norm(x[at + slides : at + slides + turns])) for x in (v, a)
@@ -523,8 +523,8 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
     An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
-    column of the mimicked joint, so the scale of an entry can be a sum over several pairs. A lever arm d is
-    never longer than the path.
+    column of the mimicked joint. An entry can therefore be a sum over several pairs, and so can its scale. A
+    lever arm d is never longer than the path.
 
     Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
     contains the numbers of products that these steps add:

@@ -94,7 +94,7 @@ def parse_answers(
         patience: Time limit, s.
 
     Raises:
-        InputError: an answer of the process is an error.
+        InputError: the process reports an error.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]

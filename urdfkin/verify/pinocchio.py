@@ -111,7 +111,7 @@ def _project_of(file: Path) -> tuple[str, str] | None:
 
 #: Bytes of stack for each link; Pinocchio 4.1.0, which is recursive, needs less than 4 kB for each link.
 _STACK_FOR_A_LINK = 16_384
-#: Chains with fewer links than this number fit into any stack.
+#: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
 _SHALLOW = 100
 #: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MOST_RATES = 315
@@ -123,7 +123,7 @@ _Next = Callable[[int], list[FloatArray]]
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
-#: Prefix of link names while Pinocchio reduces a model; no XML text can contain this character.
+#: Character before link names while Pinocchio reduces a model; XML does not allow it in names.
 _LINK_MARK = "\x01"
 
 

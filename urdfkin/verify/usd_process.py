@@ -39,7 +39,7 @@ def serve() -> None:
 
 
 def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the answer to a request, with the data of OpenUSD's readers."""
+    """Answer a request with the data that OpenUSD reads from the stage."""
     read = read_usd(
         request["path"],
         request["name"],

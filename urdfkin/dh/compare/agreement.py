@@ -271,7 +271,7 @@ def _differences_without_fit(
     check_targets: TargetPoses,
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ without a fit, or () if their correction does not remove the tip error."""
+    """Return the cells that differ without a fit; () if their correction does not remove the tip error."""
     corrected = fit_cells(written, targets, _mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > EXPLAINED * targets.scale or radians > EXPLAINED:

@@ -160,7 +160,8 @@ def find_convention(name: str | Path | Convention) -> Convention:
     if path.suffix == ".toml" or exists(path):
         return read_convention(read_text(path), shortened(path), path.stem)
     error = UnknownNameError("convention", str(name), BUILT_IN)
-    error.remedy = f"{error.remedy} `urdfkin order ROBOT` lists all; a file's name ends with .toml"
+    names = "`urdfkin order ROBOT` lists all conventions; the name of a convention file ends with .toml"
+    error.remedy = f"{error.remedy} {names}"
     raise error
 
 
@@ -324,9 +325,9 @@ def transcoded(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
     Different names give different results. The result consists of "tn__", the allowed characters of the name,
-    "_", and a number in base 62 for each other character, sorted by code point. As in Punycode, the number is
-    d n + p for a character at position p in the name. Here d is the character's code point minus that of the
-    previous character, and n is the number of possible positions. Source:
+    "_", and a number in base 62 for each other character, sorted by code point. As in Punycode, the number
+    d n + p encodes a character and its position p in the name: d is the character's code point minus that of
+    the previous character, and n is the number of possible positions. Source:
     github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")

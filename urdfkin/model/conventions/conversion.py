@@ -541,7 +541,7 @@ class Conversion:
         return found
 
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
-        """Return the matrix M^-1 with v = M^-1 v_tool; the column of a mimic joint is 0."""
+        """Return M^-1 for joint velocities of the other tool: v = M^-1 v_tool; 0 for mimic joints."""
         if not self._blocks:
             found = np.zeros((self.tree.nv, self.nv))
             found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]

@@ -315,7 +315,7 @@ def later_axes(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align a first joint axis of B with a first joint axis of A.
+    """Yield poses of B's root in which an axis of B's root body coincides with an axis of A's.
 
     After this alignment, B may still rotate about the first axis and translate along the axis. The function
     chooses this rotation and this translation so that later axes coincide too. If no axes follow the first
