@@ -327,7 +327,8 @@ def locked_values(
             at 0 if `lock` has no value for the joint.
 
     An unknown joint or pose raises UnknownNameError. A joint to lock that is fixed, mimics another joint, has
-    several coordinates or is named twice raises InputError, and so does a value outside the joint's limits.
+    several coordinates or is named twice raises InputError. So does a value that is no finite number, or that
+    is outside the joint's limits.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.named(lock, "lock")
