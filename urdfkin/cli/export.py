@@ -52,7 +52,7 @@ from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
 )
 @click.option("--check", "file", type=FILE, help="Run the test vectors of this exported file.")
 @verify_option
-@output_option
+@output_option("Write the code to this file.")
 @click.pass_context
 def command(
     context: click.Context,

@@ -59,7 +59,7 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes into which joint space is divided to compute bounds; 0: no bounds.",
+    help="Maximum number of boxes of joint space in memory while bounds are computed; 0: no bounds.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")

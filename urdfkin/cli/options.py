@@ -288,7 +288,7 @@ digits_option = click.option(
     "--digits", type=WholeNumber(3, 17), default=10, help="Number of significant digits in printed tables."
 )
 markdown_option = click.option(
-    "--markdown", type=FILE, help="Also write the result to this file as Markdown for a pull request comment."
+    "--markdown", type=FILE, help="Write the result to this file as Markdown for a pull request comment."
 )
 
 

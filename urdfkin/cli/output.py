@@ -42,14 +42,16 @@ _SUFFIXES = {
 #: Without this limit, one very long name could fill the memory: all cells of a column have the same width.
 _MAX_WIDTH = 10_000
 
-output_option = click.option(
-    "--output",
-    "-o",
-    type=FILE,
-    callback=lambda _context, _parameter, path: None if path == Path("-") else path,
-    help="Write the output to this file; its suffix selects the format.",
-    show_default="standard output",
-)
+
+def output_option(help_: str = "Write the output to this file; its suffix selects the format.") -> Any:
+    return click.option(
+        "--output",
+        "-o",
+        type=FILE,
+        callback=lambda _context, _parameter, path: None if path == Path("-") else path,
+        help=help_,
+        show_default="standard output",
+    )
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ def writes_answer(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = 
             context.exit(answer.code)
 
         wrapped = click.pass_context(update_wrapper(command, function))
-        return combine(format_option(*forms), output_option)(wrapped)
+        return combine(format_option(*forms), output_option())(wrapped)
 
     return decorate
 

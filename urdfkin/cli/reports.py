@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 #: Options that name an output file of a report
 FILES = ("json_", "html", "junit", "markdown")
 report_options = combine(
-    click.option("--json", "json_", type=FILE, help="Also write the report to this file as JSON."),
+    click.option("--json", "json_", type=FILE, help="Write the report to this file as JSON."),
     click.option(
-        "--html", type=FILE, help="Also write the report to this file as an HTML page that works offline."
+        "--html", type=FILE, help="Write the report to this file as an HTML page that works offline."
     ),
     click.option(
         "--junit",
         type=FILE,
-        help="Also write JUnit XML to this file, with a test case for each robot and quantity.",
+        help="Write JUnit XML to this file, with a test case for each robot and quantity.",
     ),
     markdown_option,
     click.option(

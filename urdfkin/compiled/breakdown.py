@@ -130,9 +130,9 @@ def acceleration_breakdown(
     """Return the contributions to the classical acceleration of a link's frame, for n configurations.
 
     `base` is the state of the base (1 or n, 24), see `BaseMotion.state`; `out` (n, joints, 4, 6) is an array
-    to which the contributions are written; `threads` is the largest number of threads. An infinite or NaN
-    value in q, v or a raises NotFiniteError; a contribution beyond the range of double precision raises
-    RangeError.
+    for the terms; `threads` is the largest number of threads, None for `evaluate.default_threads`. A number
+    of q, v or a that is not finite raises NotFiniteError. A contribution beyond the range of double precision
+    raises RangeError.
     """
     if not np.isfinite(a).all():  # `placements` and `velocities` check q and v later.
         raise NotFiniteError("q, v and a must be finite")

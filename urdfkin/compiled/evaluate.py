@@ -122,7 +122,10 @@ def jacobian_rates(
 def hessians(
     plan: CompiledTree, q: FloatArray, reference: Reference = _ALIGNED, **how: Unpack[EvaluateOptions]
 ) -> FloatArray:
-    """Return Hessians (n, frames, 6, nv, nv); [..., i, j] is the derivative of column i by coordinate j."""
+    """Return Hessians (n, frames, 6, nv, nv).
+
+    [..., i, j] is the derivative of column i in the direction of the joint velocity j.
+    """
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
 

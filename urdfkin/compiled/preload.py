@@ -9,6 +9,9 @@ measures how long Python has computed without each kernel.
 | more than `LOADING` | read the kernel from disk |
 | more than `BESIDE`, no kernel on disk | compile the kernel in a second process; Python still computes |
 | more than `COMPILING`, no kernel on disk | compile the kernel in this process |
+
+The time includes an estimate for the next computations. If no second process can compile the kernel, this
+process compiles it after `BESIDE`.
 """
 
 from __future__ import annotations

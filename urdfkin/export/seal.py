@@ -21,7 +21,7 @@ def seal(text: str) -> str:
 
 
 def is_sealed(text: str) -> bool | None:
-    """Return whether the digest in a file's header is correct; None if the header has no digest."""
+    """Return whether the digest in a file's header is correct, for any line ends; None without a digest."""
     text = text.replace("\r\n", "\n")
     if (found := _LINE.search(text)) is None:
         return None

@@ -23,7 +23,8 @@
 
 The dots are a batch shape: arrays of any leading shape are accepted, and results have the same leading shape.
 Functions that take an `ArrayLike` raise InputError for a wrong shape, for a value that is not finite, and for
-a matrix that is not a rotation. An axis or a quaternion whose length is not 1 raises InputError too.
+a matrix that is not a rotation. An axis or a quaternion whose length is not 1 raises InputError too, and so
+does an unknown `frame`.
 
 A user's matrix often has only a few digits, so its columns are only approximately orthogonal. A conversion to
 a quaternion, a conversion to Euler angles, and Gram-Schmidt on the columns give rotations that differ in the

@@ -16,10 +16,11 @@ rotated vector grows for each joint by
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-The worst cases of the first three rows do not occur together, so the last row is smaller than their sum. The
-errors of urdfkin and of Pinocchio may have opposite signs, so the bound for the difference is 5.7 + 16.8 =
-22.5. `tests/kinematics/test_roundings.py` computes the counts of the table: it runs the equations on numbers
-that record each of their roundings.
+The last row is computed for the whole joint; it is not the sum of the first three rows. It may be smaller,
+because their worst cases do not occur together. It may be larger, because a rotation adds the errors of
+several components. The errors of urdfkin and of Pinocchio may have opposite signs, so the bound for the
+difference is 5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes the counts of the table: it
+runs the equations on numbers that record each of their roundings.
 
 The acceleration of a frame, for example, is a sum of terms such as w x (w x d); w, w and d are the three
 factors of this term. The sum of the terms over the joints and the cross products in a term have rounding

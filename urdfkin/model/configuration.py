@@ -327,8 +327,9 @@ def locked_values(
         joints: Names of the joints that stay movable. Every other joint is locked at its value in `lock`, or
             at 0 if `lock` has no value for the joint.
 
-    An unknown joint or pose raises UnknownNameError. InputError is raised if a joint to lock is fixed, mimics
-    another joint, has several coordinates or is named twice, or if a value is outside the joint's limits.
+    An unknown joint or pose raises UnknownNameError. A joint to lock that is fixed, mimics another joint, has
+    several coordinates or is named twice raises InputError. So does a value that is no finite number, or that
+    is outside the joint's limits.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.named(lock, "lock")

@@ -105,7 +105,8 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside if it exceeds a limit by this many rad or m, and by this fraction of the range.
+#: A value is far outside the limits if its distance from them exceeds the larger of two numbers:
+#: `_OUTSIDE` (rad or m), and the fraction `_OF_RANGE` of the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 

@@ -83,7 +83,7 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # the axis may contain no power of ten
+    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # fewer than two powers of ten
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylabel(f"singular values\n[{unit}] at |v| = 1")

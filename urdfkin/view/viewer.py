@@ -419,7 +419,8 @@ class Viewer:
 
     def set_q(self, q: Given) -> None:
         """Move the robot and all sliders to a configuration, or raise InputError."""
-        self.set_state(checked(self.robot.tree, q, "q"), self.v, self.a)
+        with self._lock:
+            self.set_state(checked(self.robot.tree, q, "q"), self.v, self.a)
 
     def set_rates(self, v: FloatArray, a: FloatArray) -> None:
         with self._lock:

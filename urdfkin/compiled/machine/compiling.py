@@ -287,6 +287,6 @@ def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]]
     """Return a decorator for a kernel with these argument types (Numba's).
 
     The kernel is compiled at the first call and cached on disk. `nogil` says whether a call releases Python's
-    global interpreter lock. Releasing the lock takes longer than a short call (one microsecond).
+    global interpreter lock. For a call of a microsecond, releasing the lock costs more time than it saves.
     """
     return lambda function: Kernel(function, arguments, nogil)

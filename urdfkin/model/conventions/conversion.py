@@ -515,7 +515,10 @@ class Conversion:
     # -- matrices ------------------------------------------------------------------------------------
 
     def matrix(self, q: Given | None = None) -> FloatArray:
-        """Return the matrix M (..., program's nv, nv) with v_tool = M v, which may depend on q."""
+        """Return the matrix M (..., program's nv, nv) with v_tool = M v.
+
+        M may depend on q; if q is then missing, InputError is raised.
+        """
         M = np.zeros((self.nv, self.tree.nv))
         M[np.arange(self.nv), self._v_index] = self._v_factor
         if not self._blocks:

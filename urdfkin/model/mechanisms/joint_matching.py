@@ -5,8 +5,9 @@ Joints at two matched bodies are paired by the names that the user gives, by equ
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other subtree. The value of the joint before a subtree does not matter, because the joint's zero offset
-can compensate any value. Therefore, the result depends only on the two joints before the subtrees. The search
-stores the result for each pair of joints, so it is fast even for long chains.
+can compensate any value. Therefore, the result depends only on the two joints before the subtrees, and on the
+pose of one joint's axis relative to the other. The search stores the results of each pair of joints, so it is
+fast even for long chains.
 """
 
 from __future__ import annotations
