@@ -1,4 +1,4 @@
-"""Test with random hostile files that urdfkin never crashes, hangs or returns an unreported wrong number.
+"""Test urdfkin with random hostile files: no crash, no hang, and no wrong number without an error.
 
     python scripts/fuzz.py --mutants 20000 --robots 10000 --seed 0 --jobs 2
     python scripts/fuzz.py --family names --family followers --robots 5000

@@ -170,7 +170,7 @@ class MeasuredMotion:
         return linear_first | other
 
     def acceleration_readings(self, *, flipped: bool) -> dict[str, FloatArray]:
-        """Return candidate accelerations in world axes: classical or spatial, with or without gravity."""
+        """Return the accelerations by four definitions: classical or spatial, with or without gravity."""
         _, _, v, w, a, alpha = self.motion()
         up, spatial = np.array([0.0, 0.0, 9.81]), a - np.cross(w, v)
         linear = {

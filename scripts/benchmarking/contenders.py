@@ -34,7 +34,7 @@ PROCESSES = f"Pinocchio, {PROCESSORS} processes"
 
 @dataclass(frozen=True)
 class Contender:
-    """A library and its functions for a quantity."""
+    """A library, and the functions that time its computation of a quantity."""
 
     library: str  # name of the distribution
     module: str  # name of the module

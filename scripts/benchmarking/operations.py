@@ -16,7 +16,7 @@ from urdfkin.compiled import outputs, recursion
 from urdfkin.compiled.plan import STORED_ROWS, WIDTH, CompiledTree, Head, Op, program_of
 from urdfkin.kinematics.arithmetic import bound
 
-#: Number of operations of a sine and a cosine (`compiled.python_numbers`).
+#: Number of operations that compute the sine and the cosine of one angle (`compiled.python_numbers`).
 #: Reduction of the angle: 10; z and 1 - z/2 with their errors: 8; polynomials: 20; last steps: 13.
 _SINE_COSINE = 51
 

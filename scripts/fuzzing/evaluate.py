@@ -101,7 +101,7 @@ def _computed(robot: Robot, findings: list[Finding], warned: list[warnings.Warni
         return Outcome(next(word for kind, word in words.items() if isinstance(error, kind)), str(error))
     if verified:
         return Outcome("verified")
-    # Results without a check are good only if a finding states the reason.
+    # Unchecked results are acceptable only if a finding states why they are unchecked.
     for finding in findings:
         if finding.oracle is not None:
             return Outcome("not verified, with a finding that states the reason", finding.code)

@@ -167,7 +167,7 @@ def first_names(names: Iterable[str], most: int) -> str:
 
 #: A fit can be checked if its total redundancy is at least this number; without rounding, it is an integer.
 _ONE_OR_MORE = 0.5
-#: Eigenvalues of 1 - H_ii below this fraction of the largest eigenvalue are replaced by zero.
+#: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
 #: The residuals do not show pose errors along the eigenvectors of these eigenvalues.
 _UNOBSERVED = 1e-9
 #: Maximum number of estimates of the noise.

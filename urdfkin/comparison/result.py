@@ -711,7 +711,7 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return two sets of links of the root body: links before the robot, and links beside the robot.
+    """Return the links of the root body that lie before the moving part, and those that lie beside it.
 
     A link before the robot, such as a pedestal, has a fixed child link that carries all moving joints. A link
     beside the robot, such as a table, carries no moving joint. If the robot has no moving joint, both sets

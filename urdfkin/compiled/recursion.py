@@ -105,7 +105,7 @@ def seen_after(axes, S, x):
 
 
 def carried(axes, state, d):
-    """Return the state of the link's point at d (7.58, 7.128, 7.130); d is given in the link's axes."""
+    """Return the state of the link's point at offset d, in the link's axes; equations 7.58, 7.128, 7.130."""
     R, p, w, vel, alpha, acc = state
     lever = seen(axes, R, d)
     return (
@@ -365,7 +365,7 @@ def _read_inputs(m, task, program, s, b, orders):
 
 
 def _squares(total, m, task, program, b, orders):
-    """Add the squares of all inputs of a block, also those that the recursion does not need, to `total`."""
+    """Add to `total` the squares of all inputs of a block, also of unused inputs."""
     total = _added(total, m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
         total = _added(total, m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])

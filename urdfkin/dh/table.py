@@ -120,10 +120,10 @@ class DHRow:
 
     @property
     def foot(self) -> float:
-        """Distance (metres) along the next axis from the row's x axis to the common normal; 0 if `beta` is 0.
+        """Offset (m) between the feet of the row's x axis and of the common normal on the next axis.
 
         The x axis of a Hayati row intersects the next axis, but is not the common normal of the two axes. The
-        distance is |a sin(beta)| / sin^2(tilt).
+        offset is |a sin(beta)| / sin^2(tilt); it is 0 if `beta` is 0.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").dh("tip", "base").rows[0].foot

@@ -142,7 +142,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` whose code stacks all numbers, for libraries with immutable arrays."""
+    """Return a writer of results as a stack of their entries, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function

@@ -97,7 +97,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
-    """Return R S(w) R^T = S(R w), the skew-symmetric matrix of a vector w of frame 1 in frame 0 (7.46)."""
+    """Return S(R w) = R S(w) R^T: change the frame of a skew-symmetric matrix from 1 to 0 (7.46)."""
     R_0_1 = rotations(R_0_1, "R_0_1")
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 

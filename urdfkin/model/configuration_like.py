@@ -232,7 +232,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
                 "a list of tables with labels is not accepted",
                 where=where,
                 found=f"{len(value)} of them",
-                remedy="give one table, or numbers without names in order",
+                remedy="give one table, or numbers without names in the order of the coordinates",
             )
         return None
     labels = _labels(value)

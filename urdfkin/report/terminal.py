@@ -53,7 +53,7 @@ def print_report(document: Document, out: Console, *, cases: bool = False) -> No
     robots = document["robots"]
     out.print(
         f"worst disagreement with Pinocchio {pinocchio(document)}, in eps*scale"
-        " (rounding errors give 1 to 10)",
+        " (rounding gives 1 to 10)",
         style="bold",
     )
     if len(robots) == 1 and robots[0]["checks"]:

@@ -344,9 +344,9 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of central differences by comparing them with those of half of the samples.
+    """Estimate the largest error of central differences from the differences of every second sample.
 
-    With half of the samples, the error is larger by the factor 2^`order`.
+    With every second sample, the step doubles, and the error is larger by the factor 2^`order`.
     """
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 

@@ -45,8 +45,8 @@ class CacheWarning(UserWarning):
 def cache_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | None = None) -> Path | None:
     """Return a cache folder to which only this user can write; None, with a warning, if impossible.
 
-    The folder's name is `kind` and a digest of the contents of the files `sources` and of `texts`, such as
-    options. `root` is the parent folder; None: the user's cache folder. Missing folders are created.
+    The folder's name is `kind`, followed by a digest of the files `sources` and of the strings `texts`, for
+    example options. `root` is the parent folder; None: the user's cache folder. Missing folders are created.
     """
     digest = hashlib.sha256("\n".join([_CHECKSUM_VERSION, *texts]).encode())
     for source in sources:

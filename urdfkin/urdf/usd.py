@@ -298,7 +298,7 @@ def read_usd(
 
 
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select variants in the session layer, so that no file changes; return the paths of expanded instances.
+    """Select USD variants in the temporary session layer; return the paths of expanded instances.
 
     OpenUSD cannot select a variant inside an instance. An instance that contains the variant set is therefore
     expanded: in the session layer, its prim becomes non-instanceable. Raise UnknownNameError for an unknown

@@ -236,8 +236,8 @@ class Sizes:
     Attributes:
         reach: (n,) length of the path from the root to the table's base plus length of the path from the root
             to the table's tip, m.
-        turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves,
-            on the path from the root to the table's base or tip.
+        turning: (columns,) for each coordinate of the table, the sum of |multiplier| over the revolute joints
+            that the coordinate moves. Only joints from the root to the table's base or tip count.
         sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate of the table
             moves.
         rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.

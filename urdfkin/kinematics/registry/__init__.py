@@ -195,7 +195,7 @@ def explain(number: str) -> str | None:
     if match[1] in LOST:
         return (
             f"Equation {match[1]}\n\nThe chapter's page 2, with equations {', '.join(LOST)}, is lost."
-            "\nEvery other equation up to 7.130 is known."
+            "\nAll remaining equations up to 7.130 are available."
         )
     return _page(equations()[match[1]])
 

@@ -497,7 +497,7 @@ class Conversion:
         return found
 
     def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return M^-1 x, or M^-1 (x - M' v) if v is given; M is `matrix` at q."""
+        """Return M^-1 x or, if v is given, M^-1 (x - (dM/dt) v), with M = `matrix(q)`."""
         if self._same_v:
             return x
         found: FloatArray = x[..., self._v_source]

@@ -76,7 +76,7 @@ def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, 
 
 
 def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
-    """Return a finding for each remark about a USD stage. The name of the finding is the path of the prim."""
+    """Return a finding for each remark about a USD stage; the finding names the path of the prim."""
     found = tuple(remarks)
     rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
     is_text = data.startswith(b"#usda") and any(one.where for one in found)
