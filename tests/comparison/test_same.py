@@ -288,7 +288,7 @@ FORGED: dict[str, Any] = {
         checked=confirmed(state="not verified", by="", configurations=0, metres=0.0)),
     "nor a reason for its absence": lambda d: d.update(checked=confirmed(by="")),
     "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
-    "`orders`: the order joint_2, joint_1": lambda d: d["orders"].append(["joint_2", "joint_1"]),
+    "`orders`: the joints joint_2, joint_1": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }  # fmt: skip
 
 

@@ -119,8 +119,20 @@ class FrameEntry(TypedDict):
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
     lower: Annotated[Size, says("Lower bound of the largest distance, metres: the distance at `q_a`, `q_b`.")]
-    upper: Annotated[Size | None, says("Proven upper bound of the distance, metres; null if none is proven.")]
-    radians: Annotated[Size | None, says("Proven upper bound of the angle, radians; null if none is proven.")]
+    upper: Annotated[
+        Size | None,
+        says(
+            "Proven upper bound of the distance in all configurations within limits, metres; null if none is"
+            " proven."
+        ),
+    ]
+    radians: Annotated[
+        Size | None,
+        says(
+            "Proven upper bound of the angle in all configurations within limits, radians; null if none is"
+            " proven."
+        ),
+    ]
     radians_seen: Annotated[Size, says("Angle between the orientations at `q_a` and `q_b`, radians.")]
     q_a: Annotated[list[float], says("Configuration of A; empty if the frame does not differ.")]
     q_b: Annotated[list[float], says("Configuration of B that corresponds to `q_a`.")]
@@ -369,7 +381,8 @@ def _choices_error(
             return f"joint {name}: its conversion is not possible for a joint of this kind"
     for names in choices.orders:
         if not b.allows_order(names, comparator.tolerance):
-            return f"`orders`: the order {', '.join(names)} would change the motion"
+            order = ", ".join(names)
+            return f"`orders`: the joints {order} are not consecutive, or this order changes the motion"
         b = b.reordered(names)
     return None
 
@@ -466,7 +479,11 @@ def _interval_errors(
 def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Yield errors if `q_a` and `q_b` do not correspond, or attain less than the stated distance or angle."""
+    """Yield the errors of a lower bound.
+
+    An error is yielded if `q_a` and `q_b` do not correspond or exceed the limits. An error is also yielded if
+    the distance or the angle there is smaller than stated.
+    """
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.correspond(q_a, q_b):

@@ -45,6 +45,7 @@ class ReaderDifference:
     """A joint that a library reads differently, and the element of the file that explains the difference.
 
     `size` is the largest difference between entries of the child link's pose relative to the parent link.
+    The entries are coordinates (m) or entries of a rotation matrix.
     """
 
     joint: str

@@ -61,7 +61,8 @@ from urdfkin.verify.verifier import as_verify
 
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: Maximum number of frames that are searched thoroughly for the largest distance.
+#: Maximum number of frames that are searched for the largest distance between the unchanged models.
+#: At most this number of upper bounds is computed on the finer grid.
 FARTHEST = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 LONGEST = 1e150

@@ -53,7 +53,7 @@ _TAB = "    "
 
 
 class Excerpts:
-    """Print lines of a file below findings. The data has no byte order mark."""
+    """Lines of a file with the wrong text of findings underlined. The data has no byte order mark."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
@@ -676,7 +676,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Return the findings of one kind. If there are many, the last one lists the lines of the others."""
+    """Combine many warnings or notes of one kind into one; the last finding lists the lines of the others."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

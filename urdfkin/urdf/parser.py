@@ -316,12 +316,12 @@ class _Builder:
     def instruction(self, target: str, text: str) -> None:
         if self.begun:
             message = "a processing instruction is not at the beginning of the file; urdfdom refuses the file"
-            remedy = "remove the instruction, or move it before all other content"
+            remedy = "remove the instruction, or move it before every element, comment and document type"
             found = quoted(f"<?{target} {text}".strip() + "?>")
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration; stop the parser if the declaration contains definitions."""
+        """Report a document type declaration; stop the parser if it contains or refers to definitions."""
         self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -815,11 +815,14 @@ _UNUSED_NUMBERS = {
 }
 
 
-@lru_cache(1024)
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     """Return the known tag or attribute that is most similar to a word, or None."""
-    if len(word) > _LONGEST_WORD:
-        return None
+    # The cache does not store long words, which may have megabytes.
+    return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
+
+
+@lru_cache(1024)
+def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     folded = {name.lower(): name for name in known}
     close = difflib.get_close_matches(word.lower(), folded, n=1, cutoff=0.8)
     if close:

@@ -53,7 +53,7 @@ class Element:
 
     Attributes:
         line: Line number of the start tag, from 1.
-        offset: Index of the start tag's first byte in the file.
+        offset: Index of the start tag's first byte, without counting a byte order mark.
         above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
         text: The first characters of the text between the element's tags.
     """

@@ -240,7 +240,7 @@ def _read_string(word: str, most: int) -> Text:
 
 
 def _in_package(name: str, path: str) -> Path:
-    """Return the file of a `package://` address. The search includes the folders above the current folder."""
+    """Return the file of a `package://` address. The search starts in the current folder and goes upwards."""
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(

@@ -8,7 +8,7 @@
   same form, with A and B exchanged and the opposite joint axis.
 - Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. If the up axis is Y, the robot
   is rotated, so that z is up.
-- Joints that close a loop, have no body, or are excluded from the articulation are reported.
+- Joints that close a loop, name a missing prim, or are excluded from the articulation are reported.
 
 A stage may consist of many files, called layers. Before OpenUSD combines the layers, `files_of` reads each
 layer separately, and refuses references to network addresses and to files outside the robot's folder, package
@@ -274,8 +274,9 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    `variants` are pairs of a variant set and a variant. All prims with this set select the variant.
-    `articulation` is the path or name of the articulation to read; None if there is only one.
+    `variants` are pairs of a variant set and a variant, and are applied in order. All prims with this set
+    select the variant. `articulation` is the path or name of the articulation to read; None if there is only
+    one.
 
     Raises:
         InputError: OpenUSD is not installed or does not accept the file, a reference is refused, the robot
@@ -954,7 +955,7 @@ class _StageReader:
         free = kind in (JointKind.PLANAR, JointKind.FLOATING)
         if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
             raise InputError(
-                "urdfkin supports a joint with several degrees of freedom only if its parent is the root",
+                "body0 of a floating joint must be the world, and body0 of a planar joint must be its parent",
                 where=f"{self.source}: joint {edge.path}",
                 found=kind.value,
                 remedy="exchange body0 and body1 of this joint, or write several joints",
@@ -1187,7 +1188,7 @@ def _turned(xyzw: FloatArray) -> float:
 
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
     numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a
-    four-dimensional box. The component of the vector that is perpendicular to the quaternion changes the
+    four-dimensional box. Only the component of the vector that is perpendicular to the quaternion changes the
     rotation. This component is longest at a corner of the box, so the function compares all corners.
     """
     unit = xyzw / np.linalg.norm(xyzw)

@@ -43,7 +43,7 @@ _COMPUTED = re.compile(r"\$[({]|[*?\[]")
 def arguments_of(path: Path, find: Find) -> set[str] | None:
     """Return the names in `<xacro:arg>` and `$(arg)` of a file and of all files that it includes.
 
-    The result is None if one of the files cannot be read.
+    The result is None if one of the files cannot be read, or if there are more than `MOST_FILES` files.
     """
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
@@ -112,9 +112,10 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
     answer = _answer(output)
     if "urdf" in answer:
-        declared = list(arguments) if answer.get("arguments") is None else answer["arguments"]
-        if unknown := [name for name in arguments if name not in declared]:
-            raise UnknownNameError("xacro argument", unknown[0], declared, where=str(path))
+        if isinstance(names := answer.get("arguments"), list):  # the process is not trusted
+            declared = [str(name) for name in names]
+            if unknown := [name for name in arguments if name not in declared]:
+                raise UnknownNameError("xacro argument", unknown[0], declared, where=str(path))
         return str(answer["urdf"]).encode()
     reason = answer.get("error") or f"the process of xacro ended with status {status}"
     raise XacroError(

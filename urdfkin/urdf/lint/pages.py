@@ -149,7 +149,10 @@ def explain(rule: Rule) -> str:
         textwrap.fill(content.others, WIDTH),
     ]
     if rule.oracle is not None:
-        paragraphs.append("Pinocchio cannot check the results of a robot that has this finding.")
+        paragraphs.append(
+            "Pinocchio cannot check the results of a robot that has this finding.\n"
+            "urdfkin reports these results as not verified."
+        )
     if content.question is not None:
         paragraphs.append(f"{content.question}.")
     return "\n\n".join(paragraphs)

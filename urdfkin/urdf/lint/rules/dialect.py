@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quoted(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # A macro may contain links and joints if it is a child of <robot>.
+    # Kinematics needs a macro that is a child of <robot>, or is inside a joint.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
     expressions: list[_Place] = [

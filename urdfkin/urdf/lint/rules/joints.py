@@ -420,7 +420,7 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if leader.mimic is not None:
             message = f"the mimicked joint itself mimics {leader.mimic.leader!r}"
-            remedy = "name the last joint of the chain, because some readers apply only the last rule"
+            remedy = "name the last joint of the chain, because some readers apply only one rule of a chain"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
             self.check_range(joint, mimic, joint.limit)
