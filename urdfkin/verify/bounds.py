@@ -378,11 +378,11 @@ def true_value_magnitudes(
     *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
     error of 1 eps rad changes a vector by at most eps times the length of the vector.
 
-    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times, so the displacement has an error of
-    at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain cancel each
-    other, |M q| + |C| is far below X. The function therefore uses X as the length of the displacement. Then
-    3/2 eps for each rule are enough, also for the velocity and the acceleration of the joint, which are
-    rounded less often.
+    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement has therefore an
+    error of at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain
+    cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
+    displacement. Then 3/2 eps for each rule are enough. The same error is enough for the velocity and the
+    acceleration of the joint, which are rounded less often.
 
     Args:
         plan: The compiled tree of one frame.

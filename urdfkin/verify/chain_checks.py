@@ -34,7 +34,8 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
     computes along the chain, which is a part of the two paths. The bound counts all joints of both paths. The
-    length in the bound is the distance of the first frame from the root plus the length of the chain.
+    length in the bound is the distance of the first frame from the root plus the length of the chain, with
+    prismatic displacements.
 
     Raises:
         TableError: the chain and Pinocchio differ by more than rounding.

@@ -47,7 +47,7 @@ from urdfkin.verify.pinocchio import depth_of
 #: Mass (kg) and moments of inertia (kg m^2) of each link while MuJoCo reads the text.
 _MASS = "1"
 #: Maximum number of links in a chain, because MuJoCo's time grows with the square of this number.
-#: MuJoCo rejects robots with more than 1,023 links, but only after this time.
+#: MuJoCo rejects chains of more than 1,023 links, but only after this time.
 _DEEPEST = 1_000
 #: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
