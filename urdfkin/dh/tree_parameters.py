@@ -103,7 +103,10 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error of the poses on the longest path, in eps * reach; not a proven bound."""
+        """Estimated rounding error of the poses on the longest path, in eps * reach; not a proven bound.
+
+        The estimate does not include Pinocchio's rounding errors.
+        """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + longest) + self.left_out / EPS
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class NotebookView:
-    """The 3D view that `Robot.view` returns in a notebook; `q` (nq,) is the first configuration."""
+    """The 3D view of `Robot.view` in a notebook: `q` (nq,) is the first configuration, `height` is in px."""
 
     def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
         self._name, self._height = robot.name, height

@@ -1332,7 +1332,7 @@ class Robot(Displayable):
                 frame. Results of "dh" and "screws" are in the axes of `base_frame`.
             name: Prefix of the function names; None: the names of the robot and the frame.
             verify: True: check the code with Pinocchio. None: as chosen in `load`. The first line of
-                unchecked code is UNVERIFIED.
+                unchecked code contains the word UNVERIFIED.
 
         Raises:
             UnknownNameError: the language, frame, quantity, reference or form does not exist.

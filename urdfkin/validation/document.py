@@ -83,7 +83,7 @@ class ReportedModel(TypedDict):
     name: Annotated[str, says("The robot's name.")]
     source: Annotated[str, says("A path, a catalogue name, - for standard input, or <text>.")]
     path: Annotated[str | None, says("Path of the robot's file; null for a robot given as text.")]
-    sha256: Annotated[Sha256, says("SHA-256 of the URDF's text as UTF-8, or of the MJCF file.")]
+    sha256: Annotated[Sha256, says("SHA-256 of the URDF's text as UTF-8, or of the MJCF or USD file.")]
     mimic: Annotated[
         bool | None,
         says("Whether mimic joints are coupled to the mimicked joints; null: the default of this robot."),

@@ -33,8 +33,8 @@ class OraclePair:
 
     Attributes:
         failed: Number of results outside their bound.
-        worst: The largest disagreement in multiples of eps * scale. The scale is that of urdfkin and the
-            second oracle, also if the library is Pinocchio.
+        worst: The largest disagreement in multiples of eps * scale. For Pinocchio and the second oracle, the
+            scale is that of `_sum_of_bounds`.
         share_of_bound: The largest ratio of a disagreement to its bound.
     """
 

@@ -16,7 +16,7 @@ class Timings:
     """Computing times in seconds.
 
     Attributes:
-        read: Time of building the models of urdfkin and of the oracles.
+        read: Time of reading the file, and of building the models and the tables.
         compare: Time of the bounds and of the comparison: the total time minus all other times.
         second: Time of the second oracle.
     """

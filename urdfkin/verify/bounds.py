@@ -32,7 +32,7 @@ worst way. Reports state differences in multiples of eps * scale, so that differ
 robots can be compared.
 
 *Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
-vectors (`urdfkin.kinematics.number_kinds`). All terms are then positive, so no intermediate value exceeds the
+vectors (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
 result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The difference v_i^2
 z x z is 0 except for rounding errors, which are large for fast joints with an oblique axis. The bound on the
 angular acceleration alpha therefore uses w_i instead of w_{i-1}.
@@ -294,7 +294,8 @@ class Bound:
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the factor `k` of the bound for each result, as an array of shape `leading`.
 
-    A `k` that is not finite and positive becomes NaN, so that no result is within the bound.
+    All numbers of a result have the same `k`. A `k` that is not finite and positive becomes NaN, so that no
+    result is within the bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -302,7 +303,10 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with the given scale (n, frames, ...); k is `factors` times `size.roundings`."""
+    """Return the bound with the given scale (n, frames, ...).
+
+    `k` is the number of factors times `size.roundings`. LOCAL and WORLD have one factor more than `factors`.
+    """
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
@@ -316,8 +320,8 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     `urdfkin.verify.mujoco` places at the root. At the end, MuJoCo converts the results to the frame's origin.
     A joint or the frame is at most the length p of the path away from the centre of mass. Lever arms are
     therefore at most 2 p. The conversion to the centre of mass and back is a cross product with a lever arm,
-    which at most doubles the number of factors. In MuJoCo, each joint adds `MUJOCO` rounding errors instead
-    of `ROUNDINGS`.
+    which at most doubles the number of factors. The bound allows `MUJOCO` rounding errors for each joint
+    instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -374,10 +378,11 @@ def true_value_magnitudes(
     *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
     error of 1 eps rad changes a vector by at most eps times the length of the vector.
 
-    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times, so the displacement has an error of
-    at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain cancel each
-    other, |M q| + |C| is far below X. The function therefore uses X as the length of the displacement. Then
-    3/2 eps for each rule are enough. The velocity and the acceleration of the joint are rounded less often.
+    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement has therefore an
+    error of at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain
+    cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
+    displacement. Then 3/2 eps for each rule are enough. The same error is enough for the velocity and the
+    acceleration of the joint, which are rounded less often.
 
     Args:
         plan: The compiled tree of one frame.
@@ -581,7 +586,7 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. The bound includes these errors, because
-    `Magnitudes.roundings` counts one joint more than the path contains.
+    `Magnitudes.roundings` counts one joint more than the path contains, and a joint has more rounding errors.
 
     Args:
         bound: Bound of the Jacobian.
@@ -629,12 +634,13 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
-        weights = plan.cache["column weights"] = np.zeros((2, len(plan.frames), plan.nv))
+        weights = np.zeros((2, len(plan.frames), plan.nv))
         for f, (_, frame) in enumerate(plan.frames):
             for c in np.flatnonzero(plan.leaders[f] >= 0):
                 kind = 0 if plan.columns[c, ColumnField.TURNS] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
+        plan.cache["column weights"] = weights  # stored only now, because other threads may read it
     return weights[0], weights[1]
 
 

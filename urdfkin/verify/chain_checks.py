@@ -28,13 +28,14 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the child link. In a chain that leads towards the tips, this
-    frame comes after the motion of the joint. In a chain that leads towards the root, this frame comes before
+    Pinocchio's frame of a joint is the frame of the child link. Where the chain leads towards the tips, this
+    frame comes after the motion of the joint. Where the chain leads towards the root, this frame comes before
     the motion.
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
-    computes along the chain, which is a part of the two paths. The bound counts all joints and lengths of
-    both paths.
+    computes along the chain, which is a part of the two paths. The bound counts all joints of both paths. The
+    length in the bound is the distance of the first frame from the root plus the length of the chain, with
+    prismatic displacements.
 
     Raises:
         TableError: the chain and Pinocchio differ by more than rounding.

@@ -1,7 +1,8 @@
 """Compare results with an oracle's, in multiples of eps * scale and as a fraction of the bound.
 
 `disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes these
-differences in one pass, because the comparison with NumPy would take as long as Pinocchio's computation.
+differences in one pass, because the comparison with NumPy would take as long as Pinocchio's computation. The
+kernel and NumPy return equal numbers.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ from urdfkin.verify.oracles import OracleLibrary
 def check_analytical_jacobian(
     bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's analytical Jacobians (n, frames, 6 or 7, nv), and the bound on urdfkin's error.
+    """Return an oracle's analytical Jacobians (n, frames, 6 or 7, nv), and the bound on the difference.
 
     `bound_of` computes the bound of the velocity Jacobian.
     """
@@ -59,7 +59,7 @@ def check_analytical_jacobian(
 def check_relative_placement(
     bound_of: Callable[..., Bound], oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> tuple[FloatArray, Bound]:
-    """Return an oracle's relative placements (n, frames, 4, 4), and the bound on urdfkin's error.
+    """Return an oracle's relative placements (n, frames, 4, 4), and the bound on the difference.
 
     `bound_of` computes the bound of placements in the world. The relative placement is the pose of frame b
     relative to frame a; frame a is the last frame of `x.plan`. The path to frame a has the length s_a and k_a
@@ -89,7 +89,7 @@ def check_relative_placement(
 
 
 def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary) -> tuple[FloatArray, Bound]:
-    """Return an oracle's IMU readings (n, frames, 6), and the bound on urdfkin's error."""
+    """Return an oracle's IMU readings (n, frames, 6), and the bound on the difference."""
     local, (v, a) = Reference.LOCAL, x.rates
     query = x.query._replace(reference=local)
     gravity = np.asarray(x.options["gravity"], dtype=np.float64)

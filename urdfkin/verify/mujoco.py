@@ -9,7 +9,8 @@ changes the text before MuJoCo reads it:
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
   body to the world. A planar joint becomes two slide joints and a hinge.
-- The mimic joints follow the rules from `rules_of_text`, because MuJoCo's kinematics ignores constraints.
+- The mimic joints follow the rules from `rules_of_text`. MuJoCo would turn the mimic rules into constraints,
+  which its kinematics ignores.
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a

@@ -1,8 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo, and conversion of a call's arguments for an oracle.
 
 An oracle is a library whose results urdfkin compares with its own results. urdfkin converts the arguments of
-a call for its own computation, and this module converts them a second time for the oracle. The two
-conversions are independent, so a wrong broadcast, order or name in one of them causes a disagreement.
+a call for its own computation, and this module converts them a second time for the oracle. Except for units
+and named poses, the two conversions share no code. A wrong broadcast, order or name in one of them therefore
+causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -289,7 +290,7 @@ class Frames:
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
     """Return the frames of a model from Pinocchio's URDF parser.
 
-    If `stands_on_world` is True, the first frame is that of the link "universe", the parent of a root joint.
+    If `stands_on_world` is True, the first frame is that of the link `WORLD`, the parent of a root joint.
     """
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
@@ -556,7 +557,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """Reshape results to (n, frames, ...), where one result has `axes` axes; check the shape."""
+        """Reshape results to (n, frames, ...), with `axes` axes for one result; other shapes: OracleError."""
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
             raise OracleError(
@@ -579,7 +580,8 @@ class Oracle:
     """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
     A subclass builds the library's model in `__init__`, and implements the methods `placements`,
-    `velocities`, `accelerations`, `jacobians` and `jacobian_rates`.
+    `velocities`, `accelerations`, `jacobians` and `jacobian_rates`. Each method takes a `QueryBatch` and
+    returns an array (n, frames, ...).
 
     Args:
         text: The URDF text.

@@ -228,10 +228,12 @@ class PinocchioOracle(Oracle):
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames.
 
-        The base's frame takes the place of the world's frame in the list of frames.
+        The base's frame takes the place of the world's frame in the list of frames. A root joint of the robot
+        stays in the model.
         """
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects equal names of a link and a joint; numbers as names avoid this error.
+        # `appendModel` rejects a link with the name of a joint or of the free-flyer.
+        # Numbers as names avoid this error.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):

@@ -251,8 +251,8 @@ HESSIAN = Quantity(
     command="hessian",
     summary="derivatives of a frame's Jacobian by each joint coordinate",
     page="The table has a group of rows for each column of the Jacobian. Each row is the derivative of the"
-    " column by one joint coordinate. The sum of all rows, each multiplied by the velocity of its joint, is"
-    " the result of `urdfkin jacobian-rate`.",
+    " column by one joint coordinate. The sum of the rows of a group, each multiplied by the velocity of its"
+    " joint, is a row of `urdfkin jacobian-rate`.",
     example="urdfkin hessian panda --q random --seed 1 --frame panda_hand",
 )
 ACCELERATION = Quantity(

@@ -17,6 +17,7 @@ number, and products are computed from mantissas and exponents.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -85,7 +86,8 @@ class SingularValues(Displayable):
         k, shape = self.values.value.shape[-1], self.values.value.shape[:-1]
         names = [f"sigma_{i + 1}" for i in range(k)]
         if shape:
-            flat = [x.reshape(-1, *x.shape[len(shape) :]) for x in (self.values.value, self.condition.value)]
+            n, sigma = math.prod(shape), self.values.value
+            flat = [x.reshape(n, *x.shape[len(shape) :]) for x in (sigma, self.condition.value)]
             size, ranks = self.manipulability.value.ravel(), (self.values.lower > 0.0).sum(axis=-1).ravel()
             rows: list[list[str | float]] = [
                 [str(list(index)).strip("[]"), *values.tolist(), condition, w, f"{rank} of {k}"]

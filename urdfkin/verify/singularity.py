@@ -24,7 +24,7 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Maximum number of columns in a minimal dependent set.
+#: Maximum number of columns in a minimal dependent set that the search can find; larger sets exist.
 _LARGEST_SET = 4
 #: A Jacobian with more columns than this number is not searched for minimal dependent sets.
 _MOST_COLUMNS = 16
@@ -273,6 +273,7 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
+        # Three parallel or concurrent lines lie in one plane if they are linearly dependent; four need not.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
         # If all axes pass through a point a, each column [v; z] satisfies v = a x z.

@@ -69,7 +69,8 @@ class TableCheck:
         metres: Distance between the table's tip and Pinocchio's tip, m.
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
-        shares: Ratios of the differences `units` to their bounds; above 1 is a disagreement.
+        shares: Ratios of the differences `units` to their bounds. A ratio above 1 is a disagreement, unless
+            `loss` explains it.
         snapped: True if snapping changed the table, for example from 89.99 to 90 degrees. The bound then
             includes the deviation that the table states.
         loss: Explanation of a difference above the bound, if very large lengths in the table cause the

@@ -390,6 +390,9 @@ def comparison_with_oracle(
     """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
 
     Large results are compared in blocks, while the oracle's results are still in the processor's cache.
+
+    Raises:
+        OracleError: the oracle does not return a result for each configuration.
     """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)

@@ -65,11 +65,18 @@ class Enclosure:
 
     @property
     def width(self) -> FloatArray:
-        """The difference `upper - lower`, which is 0 if the true value is a double."""
+        """The difference `upper - lower`, which is 0 only if the true value is a double.
+
+        Any other width is at least the distance between two neighbouring doubles.
+        """
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is between `lower` and `upper`; check the shape of `x`."""
+        """Return whether each number of `x` is between `lower` and `upper`.
+
+        Raises:
+            InputError: the shape of `x` is not that of the quantity.
+        """
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
