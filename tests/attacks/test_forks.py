@@ -80,7 +80,7 @@ CASES = {
         """,
     "an entry in the ledger, while another thread makes one": """
         from urdfkin.verify import certificate
-        held(certificate._entering)
+        held(certificate._ledger_lock)
         fork(lambda: (robot.placement(q[:3], "tool0"), robot.certificate()))
         """,
     "a kernel, while another thread compiles one": """
