@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import update_wrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -38,12 +38,15 @@ _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
 }  # fmt: skip
+_F = TypeVar("_F", bound=Callable[..., Any])
 #: Maximum number of characters in a line of a table.
 #: Without this limit, one very long name could fill the memory: all cells of a column have the same width.
 _MAX_WIDTH = 10_000
 
 
-def output_option(help_: str = "Write the output to this file; its suffix selects the format.") -> Any:
+def output_option(
+    help_: str = "Write the output to this file; its suffix selects the format.",
+) -> Callable[[_F], _F]:
     return click.option(
         "--output",
         "-o",
