@@ -50,7 +50,7 @@ _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
 #: Files for robots with more joint velocities contain no Hessian, because its check in PyTorch is slow.
-#: JAX does not check the Hessian of a file in the format `array`, because the compilation takes minutes.
+#: The Hessian in files of the format `array` is not checked with JAX, which would compile for minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 

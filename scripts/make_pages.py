@@ -230,7 +230,7 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # A step is the distance of neighbouring doubles at the largest end of an interval.
+            # A step is the distance between neighbouring doubles at the larger end of an interval.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

@@ -73,7 +73,7 @@ def of_compiled(scope: dict[str, Any]) -> float:
 
 
 def worst(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest error of rows of numbers, as a share of its bound; NaN is the largest."""
+    """Return the largest ratio of a row's error to the row's bound; NaN counts as the largest number."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):

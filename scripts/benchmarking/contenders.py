@@ -233,7 +233,7 @@ def _link(joint: ET.Element, tag: str) -> str:
 
 
 def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of MuJoCo, with rows [angular; linear] and without merged links (`fusestatic`)."""
+    """Yield the calls to MuJoCo; rows are [angular; linear], and links are not merged (`fusestatic`)."""
     import mujoco
 
     flags = {"fusestatic": "false", "discardvisual": "true"}

@@ -336,7 +336,7 @@ def _values(model: CalibrationModel, robot: Robot, q: FloatArray) -> FloatArray:
 def _check_measured(
     robot: Robot, model: CalibrationModel, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measured]:
-    """Check `q` and `poses`; return the path's coordinates (s, c), and the poses as `Measured`."""
+    """Check `q` and `poses`; return the path's coordinates (samples, n), and the poses as `Measured`."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
@@ -398,7 +398,7 @@ def _fit(
 
 
 def _significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """Return the parameters to write and their fit; base and tool are always included."""
+    """Return the parameters for the file, and their fit; base and tool are always included."""
     model, kept, found = fit.model, fit.identification.kept, fit.fitted
     is_end = [model.chain.parameters[k].end for k in kept]
     change = found.at[list(kept)] - model.chain.start[list(kept)]

@@ -885,7 +885,7 @@ def remarks(
 
 
 def _in_order(which: str, value: Value) -> tuple[Value, Value]:
-    """Return the values in A and in B of a parameter that only one model has."""
+    """Return a parameter's values in A and in B: None for the model that does not have it."""
     return (value, None) if which == "A" else (None, value)
 
 

@@ -23,7 +23,7 @@ _EASIER, _HARDER = 0.03, 10.0
 _SLOW = 0.99
 #: The iteration ends if a full step would reduce the squared error by at most this fraction.
 _LEAST_REDUCTION = 1e-13
-#: Relative rounding error (in eps) of the norm of n residuals, divided by n.
+#: Relative rounding error (eps) of the norm of n residuals is at most this number times n.
 _NORM_ROUNDING = 4.0
 
 

@@ -16,7 +16,7 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Matrix = tuple[Vector, Vector, Vector]
 Six = tuple[Number, ...]
-#: The part of q, v or a that begins with the first number of a joint.
+#: The slice of q, v or a that begins with the joint's first number.
 Numbers = Sequence[Number]
 
 ZERO: Vector = (0, 0, 0)

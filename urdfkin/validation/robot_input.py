@@ -1,4 +1,4 @@
-"""Robots of a validation as plain data; the digest of a robot's text identifies the robot.
+"""The robots to validate, as plain data; each robot is identified by the digest of its text.
 
 A robot from a file is represented by the path, so that thousands of robots take little memory. An error is
 raised if the text has changed since the start of the validation.

@@ -1,4 +1,4 @@
-"""Compare results with an oracle's, in multiples of eps * scale and as a fraction of the bound.
+"""Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
 
 `disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes these
 differences in one pass, because the comparison with NumPy would take as long as Pinocchio's computation. The

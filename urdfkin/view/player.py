@@ -155,7 +155,7 @@ def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
     """Return an endless animation of frames (height, width, 3 or 4), each shown for `seconds`."""
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
-    # A GIF stores times in hundredths of a second, and browsers show pictures of 1/100 s for longer.
+    # A GIF stores durations in 1/100 s, and browsers show a frame of 1/100 s for longer than that.
     milliseconds = max(20, 10 * round(100 * seconds))
     images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=milliseconds, loop=0)
     return stream.getvalue()

@@ -143,7 +143,7 @@ class MistakeSearch:
         return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
 
     def _fitted(self, written: TableArrays, model: TableArrays) -> Fitted:
-        """Return the free parameters that the fit changed by more than its resolution."""
+        """Return the free parameters that the fit changed by more than the resolution of the fit."""
         metres, radians = self.check_targets.largest_errors(model)
         fine = resolution(metres / self.check_targets.scale, radians)
         rows = np.arange(len(model.cells))

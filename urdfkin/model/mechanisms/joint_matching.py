@@ -131,7 +131,7 @@ class Pairing:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each axis at a body of A coincides with an axis of B's body after the motion X."""
+        """Return whether each joint axis of A's body coincides with one of B's body, after B moves by X."""
         return all(
             any(
                 family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
