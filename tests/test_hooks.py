@@ -210,6 +210,7 @@ def test_the_action_reports_new_findings_and_executes_no_input(runner: Repositor
     assert not mark.exists()
 
 
+@pytest.mark.slow
 def test_the_action_fails_if_two_files_of_a_robot_differ(tmp_path: Path) -> None:
     (tmp_path / "urdfkin-same").mkdir()
     (tmp_path / "urdfkin-same" / "bin").symlink_to(Path(sys.executable).parent)

@@ -67,6 +67,7 @@ def test_the_files_that_numba_compiles_exist_and_no_other_file_is_left_out() -> 
     assert left_out == COMPILED
 
 
+@pytest.mark.slow
 def test_every_mutant_of_the_package_compiles_and_has_a_test() -> None:
     for path in files([]):
         tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -50,6 +50,7 @@ def test_the_time_slider_selects_the_nearest_sample_and_shows_checked_results(vi
     np.testing.assert_allclose(viewer.sliders.handles[0].value, np.rad2deg(x.q[5, 0]), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_the_player_plays_to_the_end_at_the_chosen_speed_and_a_pause_holds_the_sample(viewer: Viewer) -> None:
     player(viewer).show(0)
     player(viewer).speed.value = "0.5"
