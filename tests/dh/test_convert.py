@@ -164,7 +164,7 @@ def test_a_table_can_be_loaded_as_a_robot(name: str) -> None:
     table = read_table(references()[name]) if name in references() else SLIDING
     robot = load(table)
     q = robot.sample(4)
-    np.testing.assert_allclose(robot.placement(q, table.tip_frame), table.placement(q), atol=1e-13)
+    np.testing.assert_allclose(robot.placement(q, table.tip_frame), table.placement(q), atol=1e-14)
     assert robot.certificate().verified
 
 
