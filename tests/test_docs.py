@@ -90,6 +90,7 @@ def test_the_sizes_of_exported_code_are_those_on_the_page() -> None:
     assert check_exports.page(text) == text, "run python scripts/check_exports.py --sizes"
 
 
+@pytest.mark.slow
 def test_the_size_of_an_installation_is_written_by_its_script() -> None:
     text = measure_size.PAGE.read_text("utf-8")
     (checking,) = re.findall(r"needs urdfkin and click, (\d+) MB\.", text)

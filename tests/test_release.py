@@ -165,6 +165,7 @@ def test_without_yourdfpy_urdfkin_reads_its_files() -> None:
     assert done.stdout == "(6, 8)\n", done.stderr
 
 
+@pytest.mark.slow
 def test_the_packages_that_only_yourdfpy_needs_are_not_in_the_line_that_avoids_them() -> None:
     (line,) = re.findall(r'^.*"pin>=.*$', (ROOT / "docs/install.md").read_text("utf-8"), re.MULTILINE)
     named = {re.split("[<>=]", word)[0] for word in shlex.split(line)[2:]}

@@ -72,6 +72,7 @@ def _opens(source: str) -> bool:
     return any(not name.startswith("webbrowser.") for name in opening)
 
 
+@pytest.mark.slow
 def test_no_other_module_opens_files_that_another_user_may_have_created() -> None:
     found = {
         path.relative_to(PACKAGE).as_posix()

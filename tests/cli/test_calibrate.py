@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from tests.calibration.arms import BRANCHED, bench
 from tests.calibration.test_parameters import table
@@ -36,6 +37,7 @@ def test_calibrate_writes_a_urdf_and_prints_data(tmp_path: Path) -> None:
     assert "verified by Pinocchio" in shown.text
 
 
+@pytest.mark.slow
 def test_an_implausible_calibration_is_written_only_with_force(tmp_path: Path) -> None:
     (words, _), out = words_of(tmp_path, shift=1), tmp_path / "new.urdf"
     done = urdfkin(*words, "-o", str(out))

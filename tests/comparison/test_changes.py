@@ -92,6 +92,7 @@ MJCF = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
 </worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_differences_between_a_urdf_and_an_mjcf_file_are_reported_at_the_joint(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="MuJoCo reads MJCF")

@@ -14,7 +14,7 @@ from tests.cli.running import urdfkin as run
 from urdfkin.comparison import readers
 from urdfkin.comparison.readers import compare_readers
 
-pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
 pytest.importorskip("mujoco")
 TEXTS = {name: feature.text for name, feature in FEATURES.items()}
 
@@ -200,7 +200,6 @@ def test_a_body_that_a_library_lacks_is_missing_and_a_link_without_a_prim_is_not
     assert found.missing == ("upper", "hand")
 
 
-@pytest.mark.slow
 def test_a_library_that_hangs_or_crashes_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = urdfkin.load(TEXTS["mimic"])
     monkeypatch.setattr(readers, "own_python", lambda _: ["/bin/sh", "-c", "kill -11 $$"])
@@ -210,7 +209,6 @@ def test_a_library_that_hangs_or_crashes_is_reported(monkeypatch: pytest.MonkeyP
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "no answer in 0.2 s"
 
 
-@pytest.mark.slow
 def test_the_command_readers_prints_and_writes_every_format(tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.write_text(TEXTS["mimic"])

@@ -305,6 +305,7 @@ MJCF = """<mujoco><worldbody><body name="b"><joint name="one" axis="0 0 1"/><geo
 </worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["mjcf", "table", "model"])
 def test_a_robot_from_another_format_can_be_locked(source: str) -> None:
     arm = urdfkin.load("planar_two_link")

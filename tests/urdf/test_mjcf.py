@@ -29,6 +29,8 @@ from urdfkin.urdf.mjcf import Mjcf, is_mjcf
 from urdfkin.urdf.sources import Source
 from urdfkin.verify import mjcf_check, mjcf_process
 
+pytestmark = pytest.mark.slow
+
 TWO = """
 <mujoco model="two">
   <compiler angle="degree"/>
@@ -133,7 +135,6 @@ def random_mjcf(rng: np.random.Generator) -> tuple[str, list[str]]:
     return f"<mujoco>{compiler}<worldbody>{text}{'</body>' * open_bodies}</worldbody></mujoco>", names
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(25))
 def test_the_placements_of_any_tree_of_hinges_and_slides_are_those_of_mujoco(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -245,7 +246,6 @@ def test_mjcf_is_loaded_from_text_bytes_streams_and_standard_input(monkeypatch: 
         loaded(b"<mujoco>\xff</mujoco>")
 
 
-@pytest.mark.slow
 def test_all_commands_accept_an_mjcf_file(tmp_path: Path) -> None:
     path, report = tmp_path / "arm.xml", tmp_path / "report.json"
     path.write_text(one_joint('<joint name="a" range="-1 2"/><joint name="b" axis="0 1 0" pos="1 1 1"/>'))
@@ -476,7 +476,6 @@ def test_an_error_of_the_reader_slightly_above_the_rounding_bound_is_found(
 # -- limits of time and memory ---------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_the_compilation_of_a_file_with_endless_replicas_ends_with_an_error() -> None:
     inside = '<geom size=".1"/>'
     for _ in range(9):

@@ -35,6 +35,8 @@ from urdfkin.report.diff import as_data, headline
 from urdfkin.urdf import usd
 from urdfkin.verify import usd_check
 
+pytestmark = pytest.mark.slow
+
 HEAD = '#usda 1.0\n(\n    defaultPrim = "arm"\n    metersPerUnit = {unit}\n    upAxis = "{up}"\n)\n'
 
 
@@ -743,7 +745,6 @@ def test_layers_that_refer_to_each_other_in_a_circle_are_a_finding(
         assert "USD103" in codes(robot)
 
 
-@pytest.mark.slow
 def test_two_to_the_power_of_40_prims_are_an_error_in_limited_time(write: Write) -> None:
     # Each of 40 prims has two children that refer to the next prim.
     child = 'def "{}" (references = </p{}>) {{ }}\n'
@@ -814,7 +815,6 @@ def test_textures_and_other_assets_are_never_opened(write: Write, tmp_path: Path
     assert loaded(write(stage(LINKS + JOINTS + shape))).nq == 2
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("make", [crate_file, package])
 def test_a_truncated_file_is_an_error_unless_a_truncated_package_still_has_the_whole_robot(
     write: Write, make: Callable[[Write], Path]
@@ -870,7 +870,6 @@ def test_a_pointer_of_git_lfs_is_refused_with_its_remedy(write: Write, tmp_path:
             loaded(path)
 
 
-@pytest.mark.slow
 def test_a_damaged_binary_file_never_ends_the_process_that_calls_load(write: Write, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     whole = np.frombuffer(crate_file(write).read_bytes(), np.uint8)
@@ -1031,7 +1030,6 @@ def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(writ
     assert not found.holds(SameQuestion(within=0.0))
 
 
-@pytest.mark.slow
 def test_all_outputs_have_the_verdict_up_to_single_precision(write: Write, tmp_path: Path) -> None:
     files = {name: tmp_path / name for name in ("map.toml", "a.md", "a.html", "ur5.urdf")}
     robot = loaded("ur5")
@@ -1265,7 +1263,6 @@ def test_diff_compares_all_pairs_of_three_formats(write: Write) -> None:
     assert command("diff", words[1], words[3]).code == 0
 
 
-@pytest.mark.slow
 def test_check_prints_the_position_of_a_finding_in_all_formats(write: Write) -> None:
     path = write(stage(IN_RADIANS))
     done = command("check", str(path))

@@ -499,6 +499,7 @@ def test_status_lists_finished_failed_and_missing_chunks(tmp_path: Path) -> None
     assert "chunks: 6 done, 0 missing" in run("report status", str(tmp_path)).text
 
 
+@pytest.mark.slow
 def test_a_stored_validation_of_a_robot_from_another_format_is_resumed(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     arm = tmp_path / "arm.xml"
