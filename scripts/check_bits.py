@@ -102,7 +102,7 @@ def same(x: FloatArray, y: FloatArray) -> bool:
 
 
 def differing(subject: Subject, now: Arrays) -> Iterator[str]:
-    """Yield the results of batches, prepared evaluators or several frames that differ from single calls."""
+    """Yield the results of batches and prepared evaluators that differ from single calls."""
     frame = subject.frames[0]
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]

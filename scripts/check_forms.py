@@ -5,8 +5,9 @@
     python scripts/check_forms.py --toolbox PYTHON     # another interpreter, with roboticstoolbox
     python scripts/check_forms.py --forms sympy latex  # some formats only
 
-LaTeX tables are compiled and must fit on the page of an article. A format without its interpreter or library
-is not run. Exit 1: results of a format differ by more than rounding, or a LaTeX table is too wide.
+LaTeX tables are compiled and must fit on the page of an article. The code of a format is not run if its
+interpreter or library is missing. Exit 1: results of a format differ by more than rounding, or a LaTeX table
+is too wide.
 """
 
 import argparse

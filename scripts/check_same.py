@@ -5,10 +5,10 @@
 
 There are twenty-one changes. After eleven of these changes, a robot is still the same
 (`tests/comparison/pairs.py`): all links must then have the poses that `same` predicts, at random
-configurations. After the other changes, the robot differs. An independent global search then looks for the
-largest distance between a frame of the robot and the frame of the changed robot. This distance is computed
-with fifty digits from the decimals in the texts of the two robots, and must lie in the interval of `same`.
-Exit 1: a distance is outside its interval, or a verdict is wrong.
+configurations. After any other change, the robot differs from the original. An independent global search then
+looks for the largest distance between a frame of the robot and the frame of the changed robot. This distance
+is computed with fifty digits from the decimals in the texts of the two robots, and must lie in the interval
+of `same`. Exit 1: a distance is outside its interval, or a verdict is wrong.
 """
 
 import argparse

@@ -50,7 +50,7 @@ def files_of_load(source: Path) -> list[str]:
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
-    """Return the files whose functions run during `same`; a first call only compiles kernels."""
+    """Return the files whose functions run during `same`, without the compilation of kernels."""
     same = partial(urdfkin.same, first, second)
     with only("compiled"):
         same()

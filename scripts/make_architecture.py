@@ -48,7 +48,7 @@ def modules() -> dict[str, Path]:
 def package_of(module: str) -> str:
     """Return the package of a module; for a module outside `urdfkin`, return its folder.
 
-    The modules `urdfkin` and `urdfkin.__main__` are the package `urdfkin`.
+    The modules `urdfkin` and `urdfkin.__main__` count as the package `urdfkin`.
 
     >>> package_of("urdfkin.robot"), package_of("urdfkin"), package_of("scripts.mutating.operators")
     ('robot', 'urdfkin', 'scripts')

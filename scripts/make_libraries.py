@@ -36,7 +36,7 @@ CONFIGURATIONS = 3
 #: Maximum difference (m, and entries of a rotation matrix) of a correct pose.
 #: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
 RIGHT = 1e-9
-#: Time limit (s) of a process that answers the remaining features.
+#: Time limit (s) of the process that tests the remaining features.
 _SECONDS = 60
 _QUOTED = 160
 VERDICTS = {

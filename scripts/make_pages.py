@@ -254,7 +254,7 @@ def _of_chains() -> Iterator[tuple[object, ...]]:
 
 
 def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
-    """Return the enclosures of random motions, and the processor time (ms) of one motion."""
+    """Return interval results of random motions, and the processor time (ms) of one motion."""
     found, times = [], []
     for seed in (0, *range(count)):  # the first motion is not timed
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))

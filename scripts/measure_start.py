@@ -33,7 +33,7 @@ _NOTEBOOK = "import sys, urdfkin; r = urdfkin.load(sys.argv[1]); r.jacobian(r.ne
 class Row:
     what: str  # name of the process on the page
     words: tuple[str, ...]  # arguments of the interpreter; ROBOT is the path of a URDF file
-    most: float = math.inf  # limit of the time; 1 is the time of `import numpy, pinocchio`
+    most: float = math.inf  # limit of the time, as a multiple of the time of `import numpy, pinocchio`
     fresh: bool = False  # whether the process starts with an empty kernel cache
 
 

@@ -48,7 +48,7 @@ COMPILED = {
 
 
 def files(parts: list[str]) -> list[Path]:
-    """Return the package's files below one of the parts; raise ValueError if a part has no file."""
+    """Return the package's files in the given folders; raise ValueError if a folder has no file."""
     below = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
     found = {name: path for name, path in below.items() if name not in COMPILED}
     for part in parts:
@@ -129,7 +129,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a mutant: `noticed` by a test, `survived`, `too slow`, or `argued` (harmless)."""
+    """The result of a mutant: `noticed` by a test, `survived`, `too slow`, or `argued` to be harmless."""
 
     mutant: Mutant
     word: str

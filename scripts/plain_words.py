@@ -79,7 +79,7 @@ def passages(paths: list[Path]) -> Iterator[Passage]:
 
 
 def complaints(paths: list[Path]) -> list[str]:
-    """Return a line for each word of the list, with its place and its plain form."""
+    """Return a line for each listed word of a text, with its place and its replacement."""
     found = []
     for passage in passages(paths):
         for pattern, plain in PLAIN.items():

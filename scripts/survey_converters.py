@@ -3,8 +3,8 @@
     python scripts/survey_converters.py TOOL[=PYTHON]... [--robots NAME...]
 
 PYTHON is the interpreter of an environment with the tool (default: this interpreter). A tool that reads MJCF
-gets the MJCF file that MuJoCo makes of the URDF. For a tool that reads USD, `TOOLS` names the tool that
-writes the USD file; give both tools. Install each tool in its own environment, because usd-core and
+gets the MJCF file that MuJoCo makes of the URDF. A tool that reads USD needs a second tool, which writes the
+USD file; `TOOLS` names the second tool. Install each tool in its own environment, because usd-core and
 usd-exchange contain modules with equal names:
 
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
@@ -48,7 +48,7 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    """A converter: the tool that writes its source (empty for the URDF), and its program."""
+    """A converter: its program, and the tool that writes its input file (empty if it reads the URDF)."""
 
     reads: str
     program: str

@@ -70,7 +70,7 @@ _HOMES = {
 }
 
 # A package imports only from packages that are earlier in the list of docs/architecture.md.
-# A hook lets a package call a function of a later package without an import of this package.
+# A hook lets a package call a function of a higher package without importing that package.
 register_hook("a table in a form", lazy_import("urdfkin.dh.export:export"))
 register_hook("code of a robot", lazy_import("urdfkin.export.forms:code_of_robot"))
 register_hook("code of a chain", lazy_import("urdfkin.export.forms:code_of_chain"))

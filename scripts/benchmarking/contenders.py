@@ -94,7 +94,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the calls of the robot's method and of prepared frames; with `verify`, all are checked."""
+    """Yield the calls of the robot's method and of frames that were prepared in advance."""
     robot, frame = subject.robot, subject.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)
@@ -111,7 +111,7 @@ def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> I
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return Pinocchio's cheapest calls: `computeFrameJacobian`, or a recursion and an acceleration."""
+    """Return the fastest calls of Pinocchio that compute a quantity."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,

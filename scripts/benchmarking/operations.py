@@ -74,7 +74,7 @@ def count(results: Any) -> int:
 
 @dataclass
 class _Walk:
-    """The functions of the forward recursion, bound to numbers that record their operations."""
+    """The functions of the forward recursion, for numbers that record each operation."""
 
     written: list[Any] = field(default_factory=list)
 

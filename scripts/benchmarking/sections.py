@@ -242,7 +242,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     for line in (
         "q",  # a line without a call measures the cost of the loop
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # ends at the check of the arrays, which rejects a tuple
+        f"compute({q_v_a}, shape)",  # the code still fails at the check of the arrays, which rejects a tuple
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",

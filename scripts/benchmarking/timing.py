@@ -1,8 +1,8 @@
-"""Time contenders, and check that all of them compute the same numbers.
+"""Measure the run time of each compared library, and check that all libraries compute the same numbers.
 
-Each round times every contender once, in another order. Ratios are therefore reliable on a noisy machine, and
-absolute times are not. Before each timed run, the contender computes once without timing. The processor's
-cache then contains the contender's data, and the threads of other contenders are idle.
+Each round measures every library once, in a different order. Ratios are therefore reliable on a noisy
+machine, and absolute times are not. Before each timed run, the contender computes once without timing. The
+processor's cache then contains the contender's data, and the threads of other contenders are idle.
 """
 
 import gc

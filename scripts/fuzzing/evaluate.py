@@ -28,7 +28,7 @@ from urdfkin.verify.verifier import NotVerifiedWarning
 
 #: Robots with these findings have sizes beyond the floating-point range, so results may be nan.
 _SIZES = {"URDF526", "URDF603", "URDF606"}
-#: Maximum number of frames in one call, and of frames that also have calls of their own.
+#: Maximum number of frames in one call, and number of these frames that are also computed alone.
 TOGETHER, ALONE = 12, 2
 NAMES = 6
 #: Distance of the far base from the world's origin, in metres.

@@ -146,7 +146,7 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
 
 
 def odd_limit(rng: random.Random) -> str:
-    """Return a text for a limit of effort or jerk; urdfdom rejects some of the texts."""
+    """Return a random text for a limit of effort or jerk; some of these texts are invalid."""
     refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
     fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
     return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))
@@ -207,7 +207,7 @@ class _Robot:
     def joint(self, i: int) -> str:
         """Return joint i, the parent of link i + 1."""
         rng, kind = self.rng, self.kinds[i]
-        # Most robots are chains, because rounding errors add up along a chain.
+        # Most random robots are chains, because a chain accumulates the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)
         parts = [
             f"<parent link={quoteattr(self.links[parent])}/>",

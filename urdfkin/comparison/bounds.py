@@ -231,7 +231,7 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return distances (frames, starts, values) for values `z` (frames, starts, values, variables)."""
+        """Return the distances for `z`, an array (frames, starts, values, variables)."""
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # the size -1 fails for an empty array
         distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
@@ -315,7 +315,7 @@ class Boxes:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (module docstring) (n, 3), and its derivatives (n, 3, variables), at the middles `c`."""
+        """Return D (n, 3) and its derivatives (n, 3, variables) at the midpoints `c` of boxes."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)

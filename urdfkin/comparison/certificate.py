@@ -35,7 +35,7 @@ MOST_AGAIN = 2**22
 #: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
 #: Another machine may have written the certificate, with other rounding errors.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: Relative tolerance of a bound that is proven again, in units of the machine epsilon.
+#: Relative tolerance, in units of the machine epsilon, for a bound that `recheck` proves again.
 _BOUND_TOLERANCE = 64.0
 #: Entries that `recheck` computes again from the two models, and compares with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
@@ -233,11 +233,11 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     The certificate states which joints match, and how the coordinates of A are converted to those of B. The
     function checks these statements. The transforms must be rigid motions, and the named joints must exist.
     If the certificate changes the order of joints, the new order must give the same motion. The function then
-    uses the stated joint pairs, so it does not search for matching joints. Only for the verdict "differs", it
-    searches, because other joint pairs could make the models agree. The function computes the verdict, the
-    changes and the remarks again, and compares them with the certificate. A lower bound is a distance at a
-    configuration in the certificate. urdfkin and Pinocchio both compute this distance again. Each upper bound
-    is proven again.
+    uses the stated joint pairs, so it does not search for matching joints. If the verdict is "differs", the
+    function does search, because other joint pairs could make the models agree. The function computes the
+    verdict, the changes and the remarks again, and compares them with the certificate. A lower bound is a
+    distance at a configuration in the certificate. urdfkin and Pinocchio both compute this distance again.
+    Each upper bound is proven again.
 
     Raises:
         InputError: the certificate was made for models with other texts, or names a joint or link that a
@@ -409,7 +409,7 @@ def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
 def _as_written_errors(
     claim: FrameEntry | None, comparator: Comparator, alignment: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """Yield wrong statements about the largest distance between the unchanged models."""
+    """Check the statements about the largest distance between the unchanged models; yield errors."""
     written = comparator.as_written(alignment)
     if claim is None:
         if written.frames:
@@ -479,7 +479,7 @@ def _interval_errors(
 def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Yield the errors of a lower bound.
+    """Check a lower bound, and yield a message for each error.
 
     An error is yielded if `q_a` and `q_b` do not correspond or exceed the limits. An error is also yielded if
     the distance or the angle there is smaller than stated.

@@ -43,7 +43,7 @@ _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Attributes of a link whose change displaces the link, if the versions have different formats.
+#: Attributes that move a link when they change; used if the two versions have different formats.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -259,7 +259,7 @@ def _renamed(result: Sameness) -> KinematicTree:
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
-    for i, joint in enumerate(tree.joints):  # name a fixed joint after A's joint with the same child link
+    for i, joint in enumerate(tree.joints):  # use the name of A's joint with the same child link
         link = links.get(tree.links[i + 1])
         if joint.name not in names and link in old.links[1:]:
             names[joint.name] = old.joints[old.link_index(link) - 1].name

@@ -419,7 +419,7 @@ class Sameness(Displayable):
 
     @property
     def within_single(self) -> bool:
-        """Whether the models differ, but no frame differs by more than single precision can cause.
+        """True if the models differ, but only by what rounding to single precision can cause.
 
         The models are compared as they are written. The limit is the sum of the rounding errors of all
         joints. A real error in one joint can be smaller than this sum. Therefore, only `up_to_single` proves
@@ -668,7 +668,7 @@ def changes_of_b(
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
     """For each changed tool, yield the string "tools" and a line that describes the change.
 
-    A frame that differs counts as a tool if it has no children, or if it describes how the robot is mounted.
+    A frame that differs counts as a tool if it has no children, or if it only describes the robot's mounting.
     """
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
@@ -711,7 +711,7 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the links of the root body that lie before the moving part, and those that lie beside it.
+    """Return two sets of links of the root body: links with all moving joints, and links with none.
 
     A link before the robot, such as a pedestal, has a fixed child link that carries all moving joints. A link
     beside the robot, such as a table, carries no moving joint. If the robot has no moving joint, both sets

@@ -542,7 +542,7 @@ def _never_moves(joint: Joint) -> bool:
 def _spelled_alike(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Return link labels of two models, and pairs of joints whose names differ only by USD's spelling.
+    """Return link labels of two models, and joint pairs whose names differ only by USD's restrictions.
 
     USD does not allow all names, so a USD file spells some names differently. Such a name is matched to a
     name of the other model, unless a second name of the other model has the same spelling.
@@ -634,13 +634,13 @@ class JointComparison:
     position error and the rotation error of this frame. The multiplier and the offset of a mimic rule have a
     relative error of at most 2^-24.
 
-    In B, P may not be an ancestor of the compared link: the paths to P and to the link may branch at a common
-    ancestor. Let W and E be the position error and the rotation error of the link relative to this common
-    ancestor. Let V and F be the position error and the rotation error of P relative to the common ancestor.
-    Let d be the distance between the link and P. Then the position error of the link relative to P is at most
-    W + V + F d, and the rotation error is at most E + F. `same` ignores the rounding errors of double
-    precision, so these errors are added to the bounds. If both models are rounded, the bounds of both models
-    are added.
+    In B, P need not be an ancestor of the compared link: the paths to P and to the link may branch at a
+    common ancestor. Let W and E be the position error and the rotation error of the link relative to this
+    common ancestor. Let V and F be the position error and the rotation error of P relative to the common
+    ancestor. Let d be the distance between the link and P. Then the position error of the link relative to P
+    is at most W + V + F d, and the rotation error is at most E + F. `same` ignores the rounding errors of
+    double precision, so these errors are added to the bounds. If both models are rounded, the bounds of both
+    models are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. This happens if the
     parent of the joint is a link that only B has, or if P is far from the joint in B. Therefore, `same`

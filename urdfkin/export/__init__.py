@@ -38,7 +38,7 @@ def code_in(code: FrameCode, to: str) -> FrameCode:
 
 
 def write(code: FrameCode, to: str) -> str:
-    """Return the text of a sealed file in the language `to`; raise VerificationError as `code_in` does."""
+    """Return the text of an exported file with its digest; raise VerificationError as `code_in` does."""
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
     return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))

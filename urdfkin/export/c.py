@@ -248,7 +248,7 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: FrameCode, *frames: str) -> str:
-    """Return a program that runs the test vectors with the templates `frames`, for example "check_one.c"."""
+    """Return a program, such as "check_one.c", that checks the exported functions with the test vectors."""
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
     return fill_template("check.c", checks="".join(checks))
 

@@ -195,7 +195,7 @@ class _ExportedRobot(Protocol):
 
 
 class CompiledFrame:
-    """One frame of a robot in one reference frame, compiled; the result of `Robot.compiled`.
+    """Compiled functions for one robot frame in one reference frame; the result of `Robot.compiled`.
 
     Results agree with those of `Robot` within the error bound, but not to the last bit. A configuration has
     exactly the same result in a batch and in a single call. A wrong shape of an input, or a number that is
@@ -385,8 +385,8 @@ class CompiledFrame:
     ) -> TypeGuard[Sequence[FloatArray]]:
         """Return whether all arguments are arrays that the machine code can use without a copy.
 
-        Such arrays need no conversion of arguments (`Call`). For 100,000 accelerations, the
-        conversion would take a tenth of the time: each batch removes its code from the processor's caches.
+        Such arrays need no conversion of arguments (`Call`). For 100,000 accelerations, the conversion would
+        take a tenth of the time, because each batch evicts the conversion's code from the processor's caches.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(

@@ -94,7 +94,7 @@ class ExactGraph(Graph):
 def exact_plan(
     graph: ExactGraph, text: str, tree: KinematicTree, plan: CompiledTree, link: int
 ) -> CompiledTree:
-    """Return a link's compiled tree `plan` with the exact constants of the URDF text of `tree`."""
+    """Return the compiled tree `plan` with the exact constants of the URDF text of `tree`."""
     graph.place = -1
     eq, path = graph.chapter, tree.path(link)
     joints = read_exact(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
@@ -196,9 +196,9 @@ def exact_functions(
 ) -> tuple[tuple[Function, ...], ExactProof]:
     """Return functions with exact constants, and the result of their comparison with Pinocchio.
 
-    The functions are evaluated at fifty digits. The test vectors are copied from `proof`, which
-    belongs to the same functions with constants in double precision. Raise VerificationError if Pinocchio
-    computes another result.
+    The functions are evaluated at fifty digits. The test vectors are copied from `proof`, the export of the
+    same functions with double-precision constants. Raise VerificationError if Pinocchio computes another
+    result.
     """
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):

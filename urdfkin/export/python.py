@@ -142,7 +142,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a writer of results as a stack of their entries, for libraries with immutable arrays."""
+    """Return a writer for libraries with immutable arrays; the writer stacks the entries of a result."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -190,9 +190,10 @@ def _demand(
 ) -> str:
     """Return the code of the function `_demand`, which checks an input.
 
-    The arguments `wrong` and `is_array` are code: `wrong` is true for numbers of a wrong type, `is_array` is
-    true for an accepted container ("" for no test). The error message describes accepted numbers as `numbers`
-    and accepted containers as `array`. `given` are further parameters of `_demand`.
+    The arguments `wrong` and `is_array` are code: `wrong` is an expression that is true for a number of a
+    wrong type. `is_array` is an expression that is true for an accepted container, or "" for no test. The
+    error message describes accepted numbers as `numbers` and accepted containers as `array`. `given` are
+    further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -260,7 +261,7 @@ def _rate(plan: CompiledTree) -> float:
     The bound is never below 1. It is the largest sum of the multipliers of all revolute joints whose values
     depend on the same coordinate.
 
-    With a floating joint, the bound is never below 3. If one number of a unit quaternion changes by t, the
+    With a floating joint, the bound is never below 3. If one component of a unit quaternion changes by t, the
     body rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the
     change. The derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a
     product of F rotated vectors, the third derivative is at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
@@ -270,7 +271,7 @@ def _rate(plan: CompiledTree) -> float:
 
 
 def _all(code: FrameCode) -> str:
-    """Return the names of all functions as code for the elements of a tuple."""
+    """Return Python code: the names of all functions, separated by commas."""
     return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
 
 
