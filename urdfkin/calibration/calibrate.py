@@ -321,7 +321,7 @@ def fitted_model(
 
 
 def _general_target(model: CalibrationModel) -> FloatArray:
-    """Return the model's parameters (p,); if the target position is fitted, it lies on no joint axis."""
+    """Return initial parameters (p,); a fitted target position lies on no joint axis."""
     at = model.chain.start.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":

@@ -16,9 +16,9 @@ unknown.
 Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
 has a column in the Jacobian. In each step, the elimination subtracts from each remaining column its
 projection onto the chosen columns. The length of the remainder measures how independent the column is. A
-column is a candidate if its remainder is at least half as long as the longest remainder. The elimination
-chooses the first candidate in the model's order of preference; the fit then includes this parameter. As a
-result, no fitted parameter must become large to have the effect of a parameter that is not fitted. Without
+column is a candidate if its remainder is at least half as long as the longest remainder. Among the
+candidates, the elimination keeps the first in the model's order of preference, and this parameter is fitted.
+As a result, a fitted parameter never becomes large only to replace a parameter that is not fitted. Without
 this choice, four parameters of nearly parallel axes would become hundreds of metres and cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
@@ -68,9 +68,9 @@ from urdfkin.verify.singular_values import singular_values
 
 #: A column is a candidate if its remainder is at least this fraction of the longest remainder.
 _AS_GOOD = 0.5
-#: Maximum number of fitted parameters that a message names as having the same effect as a fixed parameter.
+#: Maximum number of fitted parameters that a message lists for one fixed parameter.
 _NAMED = 3
-#: A message names a fitted parameter only if it has more than this fraction of a fixed parameter's effect.
+#: A message lists a fitted parameter only if it has more than this fraction of the fixed parameter's effect.
 _SHARE = 1e-6
 
 
@@ -165,7 +165,7 @@ def first_names(names: Iterable[str], most: int) -> str:
     return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
-#: A fit can be checked if its total redundancy is at least this number; without rounding, it is an integer.
+#: A fit can be checked if its total redundancy is at least this number; the exact redundancy is an integer.
 _ONE_OR_MORE = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
 #: The residuals do not show pose errors along the eigenvectors of these eigenvalues.
@@ -414,7 +414,8 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # Rounding may make a small variance 0 or negative; the change of such a parameter is significant.
+        # Rounding may make a small variance 0 or negative; a change of a parameter with this variance is
+        # significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:

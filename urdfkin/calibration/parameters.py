@@ -3,7 +3,7 @@
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
 origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
 an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
-joint's value by (1 + g). The derivative of the tip's pose with respect to g is its derivative with respect to
+joint's value by (1 + g). The derivative of the tip's pose with respect to g is the derivative with respect to
 the motion's angle or length, multiplied by the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
@@ -159,7 +159,8 @@ FITTED = ("base", "tool", "offsets", "origins", "gains")
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
 #: Order in which parameters are fitted if their effects are equal, for revolute (True) and prismatic joints.
-#: The joint's zero comes first, then motions of the axis, then motions of the frame alone.
+#: The order of preference is: the joint's zero, motions that move the joint axis, motions that move only the
+#: frame.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")

@@ -33,13 +33,15 @@ from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTr
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: An rms error above both of these fractions, of the reach and of the positions' spread, is not plausible.
+#: An rms error is not plausible if it exceeds this fraction of the reach and this fraction of the positions'
+#: spread.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
 #: An rms error above both of these fractions, of the reach and of the error before the fit, is not plausible.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
-#: Rms errors above which common mistakes in the data are tried: a fraction of the reach, and radians.
+#: If an rms error exceeds its limit, the fit is repeated to find common mistakes in the data. Limits:
+#: fraction of the reach, and rad.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
@@ -48,7 +50,8 @@ _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is compared with a limit.
 #: Changes that the data determine poorly, such as the tilt of an axis near the target, then pass.
 _UNCERTAIN = 5.0
-#: Largest error after a correction, divided by the error before it: for accepted fits, and for refused fits.
+#: Maximum ratio of the error after a correction to the error before it: for accepted fits, and for refused
+#: fits.
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Number of corrections that are fitted; the most promising corrections are fitted first.
 _FITTED = 4

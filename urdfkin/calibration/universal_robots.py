@@ -9,8 +9,8 @@ joint: x, y, z, roll, pitch and yaw.
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
 Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn and another angle is small (1e-5 to 1e-4 rad), the
-two products differ by the small angle. The order "driver" agrees with the robot's controller. The order
-"urdf" agrees with the URDF that the ROS description makes from the file.
+two products differ by the small angle. The order "driver" agrees with the robot's controller. With the order
+"urdf", the result agrees with the URDF that the ROS package generates from the file.
 """
 
 from __future__ import annotations

@@ -144,7 +144,7 @@ def command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # The JSON is passed as text, so that the line `check` is not added to it.
+        # The JSON is passed as finished text, so that no entry `check` is added.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 #: A name without quotes, blanks, and characters that a shell expands.
 #: Colons are excluded too, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size (bytes) of a robot file whose frames are completed
+#: Maximum size (bytes) of a robot file from which shell completion reads frame names
 _MOST_BYTES = 10_000_000
 #: XML elements whose attribute `name` is a frame: children of a URDF's root, any elements of an MJCF file
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")

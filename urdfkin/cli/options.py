@@ -128,7 +128,7 @@ _LOAD_OPTIONS = "urdfkin.load_options"
 
 
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
-    """Return a callback that stores an option for `load_options`; without `always`, only if it is given."""
+    """Return a callback that stores an option for `load_options`; `always` also stores a missing option."""
 
     def store(context: click.Context, _: click.Parameter, value: Any) -> None:
         if always or value not in (None, ()):

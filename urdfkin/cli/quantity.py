@@ -399,7 +399,7 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
 
 
 def _short_poses(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> FloatArray:
-    """Return each pose as six or seven numbers; if T is verified, Pinocchio also checks the orientations."""
+    """Return each pose as six or seven numbers; with `verify`, Pinocchio checks the orientations."""
     import numpy as np
 
     from urdfkin.kinematics.rotation import quaternion_of, rpy_of

@@ -93,8 +93,8 @@ def _with_errors(stream: Any, descriptor: int) -> Any:
 def _open_closed_streams() -> None:
     """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
-    The null device is opened in the wrong direction for standard input and output: reading from a closed
-    standard input fails, and writing to a closed standard output fails. Text for standard error is lost.
+    The null device is opened for writing as standard input, and for reading as standard output. Reading and
+    writing therefore fail as on a closed stream. Text for standard error is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -178,7 +178,7 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, only the last 16 characters are stored, after an "x" if the line is not blank.
+        # Of a long line, only the last 16 characters are stored; an "x" before them replaces other text.
         # Without the "x", these characters could look like a CI command at the beginning of a line.
         is_long = len(whole) > _MOST_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole

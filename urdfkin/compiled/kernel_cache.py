@@ -22,7 +22,8 @@ from urdfkin.system.locks import importing, lock_over_forks
 #: Lock that a thread holds while it imports Numba or compiles a kernel.
 #: A fork waits for this lock, because the child could not finish an import or a compilation of the parent.
 #: Before a fork, Python acquires the locks in the reverse order of their creation.
-#: The import of Numba acquires this lock first and then `logging`'s lock, so `logging`'s lock must be older.
+#: The import of Numba acquires this lock first and then `logging`'s lock, so `logging`'s lock must be
+#: created earlier.
 compiling = lock_over_forks()
 
 #: A function with two arguments: the kernel's name, and the duration (s), or None when compilation begins.

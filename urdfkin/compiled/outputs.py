@@ -74,7 +74,7 @@ def emit_velocity(m, s, program, place, sources, b, reference, state, to):
 
 
 def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
-    """Write a frame's acceleration [linear; angular], 7.129 and 7.130, in the given reference frame."""
+    """Write a frame's acceleration [linear; angular] by equations 7.129 and 7.130."""
     p, w, alpha, acc = state[1], state[2], state[4], state[5]
     if reference == _WORLD:
         acc = eq.point_acceleration(acc, alpha, w, eq.minus(_no_vector(), p))

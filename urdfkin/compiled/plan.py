@@ -117,8 +117,8 @@ class CompiledTree:
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
-            fixed joints. The first entries are from the previous moving joint to each moving joint. The other
-            entries are from the last moving joint to each frame, in the order of `frames`.
+            fixed joints. The first entries are the transforms from the previous moving joint to each moving
+            joint. The other entries are from the last moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum of `Joint.tilt` (rad) over the joints between the root and each frame, in output
             order.
@@ -349,12 +349,14 @@ class Head(IntEnum):
 LANES = 8
 #: Number of integers for an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers for a joint angle: scratch row, scratch row of the sine, mimic rule, whether it mimics.
+#: Number of integers for a joint angle: scratch row, scratch row of the sine, index of the mimic rule, flag
+#: for a mimic joint.
 ANGLE_WIDTH = 4
 #: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, STORED_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers for a Jacobian column of a Hessian: scratch row, joint, index in v, row of the sum.
+#: Number of integers for one Jacobian column in a Hessian: scratch row, joint, index in v, scratch row of the
+#: running sum.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -598,7 +600,7 @@ REFERENCES = {
 
 
 class KernelArgs(IntEnum):
-    """Indices of a kernel's arguments. Only calls with one configuration use the arguments from CORE on."""
+    """Indices of a kernel's arguments; CORE and later arguments belong to calls with one configuration."""
 
     PROGRAM = 0
     CONSTANTS = auto()

@@ -11,7 +11,7 @@ measures how long Python has computed without each kernel.
 | more than `COMPILING`, no kernel on disk | compile the kernel in this process |
 
 The time includes an estimate for the next computations. If no second process can compile the kernel, this
-process compiles it after `BESIDE`.
+process compiles it after the time `BESIDE`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Thresholds (s) of the time without a kernel, for the actions in the table of the module docstring.
+#: Thresholds (s) of the computing time without a kernel; the table in the module docstring lists the actions.
 LOADING, BESIDE, COMPILING = 0.3, 1.0, 3.0
 #: Time (s) that replaces `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03
@@ -94,7 +94,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 def single_pays(name: str) -> bool:
     """Return whether to load the fast function (`SINGLE`) that calls the kernel `name` for one configuration.
 
-    Each call adds the time that the fast function would have saved to a total.
+    Each call adds the time that the fast function would save to a running total.
     """
     if _only:
         return _only[-1] == "compiled"

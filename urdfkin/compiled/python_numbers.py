@@ -1,4 +1,4 @@
-"""Number types for one configuration, with which the recursion runs in Python without compilation.
+"""Number types for the recursion of one configuration in plain Python, without compilation.
 
 Results are exactly the same doubles as those of compiled kernels; `urdfkin.compiled.machine.numbers` explains
 the types. Scratch memory is a list with one number for each row. These functions take lists; compiled kernels
@@ -147,7 +147,7 @@ class Product:
 
 
 class Known:
-    """The constant 0, the constant 1, or the unused number `nothing()`, whose `value` is None."""
+    """The constant 0, the constant 1, or the placeholder `nothing()`, whose `value` is None."""
 
     __slots__ = ("value",)
 
@@ -222,7 +222,7 @@ def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
 
 
 def put(s: list[Number], row: int, x: Any) -> None:
-    """Write a number to a row of scratch memory; `nothing()` leaves the row as it is."""
+    """Write a number to a row of scratch memory; do nothing if the number is `nothing()`."""
     if x is not _NOTHING:
         s[row] = x if type(x) is Number else Number(_double(x))
 
@@ -231,7 +231,7 @@ def constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-same = Number  # compiled code repeats a double for all configurations of a block
+same = Number  # in compiled code, one double is copied to all configurations of a block
 
 
 def numbers_of(array: Any) -> Any:
@@ -240,7 +240,7 @@ def numbers_of(array: Any) -> Any:
 
 
 def numbers_at(address: Any) -> Any:
-    """Return the argument, which is a list of numbers; compiled code has an address instead of a list."""
+    """Return the argument, a list of numbers; compiled code converts an address here."""
     return address
 
 
@@ -257,7 +257,7 @@ def read_rows(
 def write_rows(
     m: int, s: Sequence[Number], rows: Sequence[int], first: int, count: int, to: list[float], at: int, _: int
 ) -> None:
-    """Write the scratch rows `rows[first]`, `rows[first + 1]`, ... to `count` numbers from `to[at]`."""
+    """Copy `count` scratch rows, from `rows[first]` on, to the array `to`, from the index `at` on."""
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
 

@@ -137,7 +137,7 @@ def _turned_about_z(axes, state, s, row):
 
 
 def revolute(axes, state, s, row, v, a):
-    """Compute the state after a revolute joint: 7.129, then 7.127, then the rotation of the frame."""
+    """Compute the state after a revolute joint: apply equations 7.129 and 7.127, then rotate the frame."""
     R, p, w, vel, alpha, acc = state
     z = seen(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
@@ -145,7 +145,7 @@ def revolute(axes, state, s, row, v, a):
 
 
 def prismatic(axes, state, slide, v, a):
-    """Compute the state after a prismatic joint: position 7.64, acceleration 7.130, velocity 7.128."""
+    """Compute the state after a prismatic joint: apply equations 7.64, 7.130 and 7.128."""
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
     z = seen(axes, R, (zero(), zero(), one()))
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
@@ -334,9 +334,9 @@ def _over_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction.
 
     The arguments v and a are the scratch rows of the joint's velocity and acceleration. For a revolute joint,
-    x is the scratch row of the sine; for other joints, x is the scratch row of the first coordinate. For a
-    planar joint, z is the scratch row of the sine; for other joints, z is 1 for a mimic joint and 0
-    otherwise. The constants of a mimic rule begin at `g[c]`.
+    x is the scratch row that stores the sine; for other joints, the row of the first coordinate. For a planar
+    joint, z is the scratch row that stores the sine; for other joints, z is 1 for a mimic joint, else 0. The
+    constants of a mimic rule begin at `g[c]`.
     """
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)

@@ -36,7 +36,7 @@ from urdfkin.model.tree import FloatArray, Joint
 NEARLY_PARALLEL = 1e-2
 
 #: Largest tilt (rad) of nearly parallel axes.
-#: Axes with a tilt above `NEARLY_PARALLEL` are nearly parallel only if their common normal is far away.
+#: Two axes with a tilt above `NEARLY_PARALLEL` are nearly parallel only if their common normal is far away.
 LARGEST_HAYATI_TILT = 0.35
 
 
@@ -137,8 +137,8 @@ def _parallel(
 def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float) -> AxisTransform:
     """Return the transform between two axes for a Hayati row (Hayati, 1983).
 
-    The next axis intersects the xy plane of this joint's frame in a point. The x axis of the row leads from
-    the origin to this point.
+    The next axis intersects the xy plane of this joint's frame in a point. The x axis of the row's frame
+    points from the origin to this point.
     """
     z = A[:3, 2]
     delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)

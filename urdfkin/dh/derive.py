@@ -83,8 +83,9 @@ class Choices:
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
     """Return a table of a chain; it gives the pose of the chain's tip for every q, up to rounding errors.
 
-    `like` is a standard table of the same joints. The result copies its directions of x, its offsets along
-    parallel axes, and its zero positions of the first and the last joint. `like` has priority over `choices`.
+    `like` is a standard table of the same joints. The result copies the table's directions of x, offsets
+    along parallel axes, and zero positions of the first and the last joint. `like` has priority over
+    `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -231,7 +232,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # Projection e - (e . z) z of the base's x axis e, without cancellation for z close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # z_0 is along the base's x axis: project the y axis.
+    if np.linalg.norm(x) < NEARLY_PARALLEL:  # if z_0 is along the base's x axis, project the y axis
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -293,7 +294,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta from the first row of another table, and d if it is 0 there; change the base accordingly."""
+    """Copy theta from another table's first row, and a zero d; change the base to compensate."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE * EPS or offset:

@@ -34,7 +34,7 @@ _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """Return a chain's table with the frames of a reference; `reversed_like` gives `choices.flip`."""
+    """Return a chain's table with the frames of a reference table."""
     standard = replace(choices, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
 
@@ -143,9 +143,9 @@ def dh_table(
         slide: Position of the axis of each prismatic joint; the joint itself defines only the axis's
             direction. "drawn": the axis passes through the joint's origin in the URDF. "minimal": the axis
             passes through the origin of the next revolute joint, so that a is 0.
-        like: A published table. The result copies its positive directions of the joints, its directions of x,
-            its offsets along parallel axes, and its zero positions of the first and the last joint. All other
-            numbers come from the URDF. With `like`, the arguments `flip`, `first`, `last`, `sign` and
+        like: A published table. The result copies the table's positive joint directions, directions of x,
+            offsets along parallel axes, and zero positions of the first and the last joint. All other numbers
+            come from the URDF. With `like`, the arguments `flip`, `first`, `last`, `sign` and
             `parallel_offset` are ignored.
 
     Raises:

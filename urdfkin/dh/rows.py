@@ -77,7 +77,7 @@ class Literal(float):
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
     """Return, for each row, half a unit of the last digit of each cell, in metres and radians.
 
-    `data` is a valid table's mapping from `urdfkin.dh.parse_table.mapping_from_text`.
+    `data` is the mapping that `urdfkin.dh.parse_table.mapping_from_text` returns for a valid table.
     """
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     rows = []

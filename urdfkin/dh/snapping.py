@@ -36,7 +36,7 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Largest tolerance of a snapped table: 5 degrees (in rad).
+#: Largest tolerance (rad) for rounding a table's angles: 5 degrees.
 #: Above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
 #: Number of configurations at which a rounded table is compared with the exact chain or table.
@@ -256,7 +256,7 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Recommend the tolerance with the fewest noisy cells, in one line; None if no tolerance helps.
+    """Recommend, in one line, the tolerance that leaves the fewest cells with rounding noise.
 
     A noisy cell differs slightly from 0 or from a multiple of 15 degrees, because an angle in the file is
     rounded. For example, 1.5708 may cause a tilt of 5e-12 rad and offsets of about 1e-12 m. `snapped` is

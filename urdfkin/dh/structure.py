@@ -41,7 +41,7 @@ from urdfkin.model.tree import FloatArray, JointKind
 
 #: Largest deviations (rad and metres) of a reported property.
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
-#: Largest deviation (rad and metres) of an exact property.
+#: Largest deviation (rad and metres) from a property, such as parallel axes, that counts as exact.
 EXACT = 1e-9
 #: Singular value below which the Jacobian loses rank; rounding errors are far smaller.
 _RANK = 1e-6
@@ -73,8 +73,8 @@ class StructureKind:
     """A geometric property of some consecutive joints, for example "spherical wrist".
 
     Attributes:
-        radians: Angle between the actual axes and axes with the exact property.
-        metres: Distance between the actual axes and axes with the exact property.
+        radians: Angle between the actual axes and axes for which the property holds exactly.
+        metres: Distance between the actual axes and axes for which the property holds exactly.
         at: (3,) position of the intersection in the base at the zero configuration (metres), or None.
     """
 
@@ -204,7 +204,7 @@ def _arm_kinds(
 
 
 def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the known closed-form solutions; an approximate property gives an approximate solution."""
+    """Return the known closed-form solutions; approximately parallel axes give approximate solutions."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:

@@ -120,7 +120,7 @@ class DHRow:
 
     @property
     def foot(self) -> float:
-        """Offset (m) between the feet of the row's x axis and of the common normal on the next axis.
+        """Distance (m) along the next axis between the row's x axis and the common normal.
 
         The x axis of a Hayati row intersects the next axis, but is not the common normal of the two axes. The
         offset is |a sin(beta)| / sin^2(tilt); it is 0 if `beta` is 0.

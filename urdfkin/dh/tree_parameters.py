@@ -217,7 +217,8 @@ class _LinkAxis:
 def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_LinkAxis]()
-    # For each link: the antecedent, T_antecedent_link, and the number of joints between these links.
+    # For each link: its antecedent (the previous link of the table), T_antecedent_link, and the number of
+    # joints between them.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -236,9 +237,9 @@ def _steps(
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
-    The transform leads from the axis of the antecedent to the joint's axis. The angle and the offset lead
-    from the axis frame of a link to the frame of its row. The first moving child of a link defines the link's
-    x axis. For a link without a moving child, x is chosen so that theta = 0.
+    The transform leads from the axis of the previous joint on the path to the joint's axis. The angle and the
+    offset lead from the axis frame of a link to the frame of its row. The first moving child of a link
+    defines the link's x axis. For a link without a moving child, x is chosen so that theta = 0.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
@@ -335,7 +336,7 @@ def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return CSV in metres and radians; each line has a row, and the entries T11 to T34 of T_frame_link."""
+    """Return CSV in metres and radians: each row of the table, and the entries T11 to T34 of T_frame_link."""
     entries = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *entries]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3], strict=True):

@@ -214,7 +214,7 @@ class Cell:
 
     @property
     def constant(self) -> str:
-        """Text of the cell without the variable."""
+        """Text of the cell, without the joint variable."""
         return f"{self.number!r} {self.unit or ''}"
 
 

@@ -95,7 +95,7 @@ class _InlinedLibrary(_Library):  # type: ignore[misc]
     """LLVM code of an inlined function."""
 
     def finalize(self) -> None:
-        """Mark the library as finished without generating machine code."""
+        """Mark the library as complete, but do not generate machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -176,7 +176,7 @@ def compiling_allowed() -> Iterator[None]:
 def _skip_blas_check() -> None:
     """Prevent Numba from importing SciPy only to check that its linear algebra is available.
 
-    The import takes a fifth of the running time of a command, and no kernel calls linear algebra. For other
+    The import would take a fifth of a command's running time, and no kernel calls linear algebra. For other
     compiled functions that call linear algebra, Numba still imports and checks SciPy. If a version of Numba
     makes this check in a different function, `_skip_blas_check` has no effect.
     """

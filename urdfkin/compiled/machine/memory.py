@@ -276,7 +276,7 @@ def fetch(x, at, count):
             _fetch(x, number)
 
 
-#: Distance (in doubles) from the number that is read to the number that is loaded into the cache.
+#: Prefetch distance: number of doubles between the number that is read and the number that is prefetched.
 _AHEAD = 512
 
 
@@ -301,7 +301,8 @@ def add_squares(total, x, at, count):
     """Add to `total` the squares of `count` numbers that begin at `x[at]`; load later numbers into the cache.
 
     The function adds eight numbers at once. If `count` is not a multiple of eight, each remaining number is
-    added eight times. This has no effect, because the sum is only compared with a very large bound.
+    added to all eight partial sums. This has no effect, because the sum is only compared with a very large
+    bound.
     """
     # Four independent sums take a quarter of the time, because additions to one sum wait for each other.
     second, third, fourth = same(0.0), same(0.0), same(0.0)

@@ -2,9 +2,10 @@
 
 A value of type `Lanes(8)` is eight doubles in one vector register, and a value of type `Lanes(1)` is one
 double. Both are Numba types that use LLVM's vectors, so a value stays in a register from one equation to the
-next. A product x y is not computed at once. In the sum x y + z, the product and the sum are one fused
-multiply-add, which is rounded only once. This module, and not the compiler, decides which operations are
-fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same doubles, on every machine.
+next. A product x y is stored as two factors, and multiplied only when it is needed. In the sum x y + z, the
+product and the sum are one fused multiply-add, which is rounded only once. This module, and not the compiler,
+decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same
+doubles, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
 sum with zero, costs no time. If the axis is `(zero(), zero(), one())`, the compiler therefore simplifies the
@@ -58,7 +59,7 @@ class Product(types.Type):
 
 
 class Known(types.Type):
-    """The type of a number that is known at compile time: 0, 1, or None for the unused number `nothing()`."""
+    """The type of a compile-time constant: 0, 1, or None for the placeholder `nothing()`."""
 
     def __init__(self, value: int | None) -> None:
         self.value = value

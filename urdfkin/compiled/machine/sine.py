@@ -5,8 +5,8 @@ rounding error of this subtraction is computed too. The polynomials come from fd
 k_sin.c and k_cos.c). For angles below 2^20 quarter turns, pi/2 is represented by the sum of two doubles. Two
 doubles are enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the
 cosine is near 0, and this small value has an error of up to 1e-27. The sine and the cosine of a larger angle
-are computed by the C library. Smaller angles in the same vector do not use the C library, because the result
-of a configuration must not depend on the other configurations.
+are computed by the C library. Only the large angles of a vector use the C library. Otherwise, the result of a
+configuration would depend on the other configurations in the vector.
 """
 
 from __future__ import annotations

@@ -113,8 +113,8 @@ def one_configuration(bound, arguments, count):
 
     Args:
         bound: Address of a tuple of Python objects. The first item is the array of kernel arguments. The next
-            items are NumPy's array type, None, and the function that creates the result array. Then follow
-            the shape of the result array and objects that must stay alive.
+            items are NumPy's array type, None, and the function that creates the result array. The shape of
+            the result array and objects that must stay alive come last.
         arguments: Address of the Python call's arguments.
         count: Number of these arguments.
     """

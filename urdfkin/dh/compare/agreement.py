@@ -39,13 +39,16 @@ FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
 #: Differing cells are reported only if their correction reduces the tip error to this fraction.
 _CORRECTED = 0.5
-#: The correction of a reported single mistake reduces the tip error to this fraction or to the tolerance.
+#: A single mistake is reported only if its correction reduces the tip error to this fraction, or to the
+#: tolerance.
 _MISTAKE_CORRECTED = 0.05
 #: Smallest reported change of a cell, relative to the reach (a tenth of `EXPLAINED`).
 _LEAST_CHANGE = 1e-10
-#: The cells that differ without a fit are reported if they are at most this many more than after a fit.
+#: The cells that differ without a fit are reported unless they exceed the cells after a fit by more than this
+#: number.
 _MORE_CELLS = 2
-#: Smallest diameter of the tip's positions, relative to the path length, that is used as the reach.
+#: The diameter of the tip's positions is used as the reach if it is at least this fraction of the path
+#: length.
 _FIXED_TIP = 1e-6
 #: Range of a prismatic joint without limits (metres).
 _SLIDE = (-0.5, 0.5)
@@ -222,7 +225,7 @@ def _mask(reference: DHTable) -> FloatArray:
 def _hidden(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of each cell with the same effect on the tip as base, tool or joint offsets.
+    """Return row and name of each cell that a change of base, tool or joint offsets can replace.
 
     Cells beta with the value 0 are not included.
     """
@@ -271,7 +274,7 @@ def _differences_without_fit(
     check_targets: TargetPoses,
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ without a fit; () if their correction does not remove the tip error."""
+    """Return the cells that differ without a fit; () if correcting these cells leaves a tip error."""
     corrected = fit_cells(written, targets, _mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > EXPLAINED * targets.scale or radians > EXPLAINED:

@@ -52,7 +52,7 @@ _SOLVED = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 #: Number of times that the weights of the cells are recomputed.
 _REWEIGHTINGS = 25
-#: Smallest weight of a cell, relative to the reach.
+#: Smallest weight of a table cell, as a fraction of the robot's reach.
 _LEAST_WEIGHT = 1e-9
 #: Initial weight of the last cell; initial weights increase linearly from 1 at the first cell.
 #: Because these weights differ, the fit changes only one of two cells with the same effect on the tip.

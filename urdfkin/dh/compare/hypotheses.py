@@ -2,8 +2,8 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape; the shape consists of the distances and angles between consecutive axes, and the
-offsets along these axes. `diagnose` fits only the few interpretations whose shapes are closest to the URDF's
-shape.
+offsets along these axes. `diagnose` fits only the few interpretations whose distances and angles between axes
+are closest to the URDF's.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from urdfkin.model.tree import FloatArray
 _MOST_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL = 2e-2
-#: Cost of each change to the file's interpretation, relative to the smallest difference of the shapes.
+#: Penalty for each change of the file's interpretation, as a fraction of the smallest shape difference.
 _DIFFERENCE_COST = 0.1
 #: Largest tip error of a better interpretation, as a fraction of the original tip error and of the reach.
 _BETTER = 0.05
@@ -210,14 +210,14 @@ class Interpretation:
         return len(self._convention_and_units(other)) + (columns + 1) // 2
 
     def differences(self, other: Interpretation) -> str:
-        """Name the differences from another interpretation, for example "modified, millimetres"."""
+        """Describe the differences from another interpretation: "modified, millimetres"."""
         names = self._convention_and_units(other)
         if self.columns != other.columns:
             names.append(f"its columns {', '.join(COLUMNS)} as {', '.join(self.columns)}")
         return ", ".join(names)
 
     def _convention_and_units(self, other: Interpretation) -> list[str]:
-        """Return the names of convention and units that differ from another interpretation."""
+        """Return which of convention and units differ between this interpretation and another one."""
         mine, theirs = ((one.convention, one.lengths, one.angles) for one in (self, other))
         return [str(name) for name, other_name in zip(mine, theirs, strict=True) if name is not other_name]
 

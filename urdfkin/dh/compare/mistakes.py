@@ -1,7 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
 A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. After the
-correction of the cell, the table agrees with fewer fitted parameters, or without a fit. `MistakeSearch` tries
+cell is corrected, the table agrees with the URDF after a smaller fit, or without a fit. `MistakeSearch` tries
 each single correction, and reports the corrections that leave the fewest parameters to fit.
 """
 
@@ -34,7 +34,7 @@ from urdfkin.model.tree import FloatArray, pose
 
 #: Largest difference (rad) between two angles that are treated as equal.
 _SAME_ANGLE = 1e-9
-#: Maximum number of corrections for which joint offsets and joint signs are fitted.
+#: Joint offsets and joint signs are fitted only if there are at most this many corrections.
 #: A table of nine rows has about this number of possible corrections.
 _MOST_FITS = 100
 

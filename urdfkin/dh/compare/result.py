@@ -110,7 +110,7 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """A likely mistake in a table: a correction of the mistake leaves fewer parameters to fit.
+    """A likely mistake in a table: after its correction, fewer other parameters must be fitted.
 
     Attributes:
         rows: Indices of the changed rows, from 0.
@@ -151,7 +151,7 @@ class TableComparison:
             fitted; empty if this would change too many cells, or would not remove the tip error.
         hidden: Row index and name of each cell whose value the tip's poses do not determine, because base,
             tool and joint offsets compensate for every change.
-        mistakes: The likely mistakes: a correction of any of them leaves the fewest parameters to fit.
+        mistakes: The likely mistakes: those whose corrections leave the fewest parameters to fit.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
         tolerance: Tolerance at the tip (metres).
         samples: Number of configurations at which the fitted table was checked.

@@ -118,7 +118,7 @@ def _without_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlig
     """Keep the first of several alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
-        # A free joint offset can reverse x, so the two directions of x are then equivalent.
+        # If the joint's zero offset is free, it can reverse x, so both directions of x are equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
         last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.carry, _DECIMALS)
         different.setdefault((partial.senses, partial.free_offset, *last_frame), partial)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 #: Module of the formats in which units can be chosen.
 _TEXT = "urdfkin.dh.export.text"
 #: For each format: the module that contains its function `write_NAME`, and a description.
-#: The module is "" if the module `urdfkin.export` writes the format.
+#: The module name is "" if `urdfkin.export` writes the format.
 FORMATS: dict[str, tuple[str, str]] = {
     "terminal": (_TEXT, "aligned text"),
     "markdown": (_TEXT, "a Markdown table"),
