@@ -72,7 +72,7 @@ def about_y(sine, cosine, zero, one):
 
 
 def about_z(sine, cosine, zero, one):
-    """Return a rotation about z, which is 7.5 in three dimensions."""
+    """Return a rotation about z (7.5, extended to three dimensions)."""
     return (cosine, -sine, zero), (sine, cosine, zero), (zero, zero, one)
 
 
@@ -168,12 +168,12 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration after a joint with angular velocity o; b: derivative of o's components."""
+    """7.129: angular acceleration after a joint with angular velocity o, whose derivative is b."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration after a joint with velocities u and o; b: derivative of u's components."""
+    """Acceleration (7.130) after a joint with velocities u and o; b is the derivative of u's components."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 

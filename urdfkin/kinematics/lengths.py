@@ -2,7 +2,7 @@
 
 Each function computes the bounds of a link from the bounds of the parent link. The bounds of a link's point
 are (p, w, vel, alpha, acc): position, angular and linear velocity, angular and linear acceleration. A bound
-is at least the sum of the lengths of all terms of the quantity.
+is at least the sum of the norms of all terms that are added to form the quantity.
 
 NumPy arrays, Python numbers and the compiled copies (`urdfkin.verify.kernels`) give the same bits.
 """

@@ -1,4 +1,4 @@
-"""The textbook's equations for NumPy arrays, and for the lengths of vectors.
+"""The textbook's equations for NumPy arrays, and for upper bounds on the lengths of vectors.
 
 `array_equations` computes with NumPy arrays. The last axis of an array contains the three components of a
 vector, so one call computes a whole batch.
@@ -68,7 +68,7 @@ def norm(x: FloatArray) -> FloatArray:
     return counted(np.hypot.reduce(x, axis=-1))  # Squares could underflow or overflow; hypot does not.
 
 
-#: The equations with the lengths of vectors and the absolute values of numbers; arrays broadcast.
+#: The equations with lengths instead of vectors and absolute values instead of numbers; arrays broadcast.
 length_equations = bound(
     plus=add,
     minus=add,

@@ -412,7 +412,9 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = sine < 1e-150  # Squares of tiny components lose digits; phi k is then 2 `vector`.
+    small = (
+        sine < 1e-150
+    )  # If the components are tiny, their squares lose digits, so phi k is computed as 2 `vector`.
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 
@@ -445,8 +447,8 @@ class Sequence:
         third: Index of the third body-fixed axis; in a proper Euler sequence it is equal to `first`.
         other: The index that is neither the first nor the second.
         sign: +1 if (first, second, other) is right-handed, else -1.
-        fixed: Whether the name has axes that are fixed in space. Then the angles are in the reverse order of
-            the body-fixed axes.
+        fixed: Whether the sequence with this name rotates about axes that are fixed in space. Then the angles
+            are in the reverse order of the body-fixed axes.
     """
 
     name: str

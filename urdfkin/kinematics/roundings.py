@@ -47,9 +47,9 @@ deviation.
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
 2 |Q - 1| <= 2 t. If the joint rotates a vector, or translates a vector along the joint's axis, the error is
-at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t adds
-2 t / eps to the number of rounding errors of each factor, for all frames after the joint. If a tilt is larger
-than eps, urdfkin reports the finding URDF514.
+at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t counts as 2
+t / eps additional rounding errors of each factor, for all frames after the joint. If a tilt is larger than
+eps, urdfkin reports the finding URDF514.
 
 **An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. An export also omits
 small constants. An entry of a constant rotation matrix is small if it is less than half an eps of the largest
@@ -80,7 +80,7 @@ offset's length. The products with an omitted component, in a matrix row or in a
 too. The error of these products, 1.5, would be larger than the error of the omission. Without fused
 multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the errors
 of the sums over the joints. `ROUNDINGS` is 24.0 and does not cover these sums. The standard deviation is the
-same as for urdfkin. In a comparison of an export with true values (test vectors), the error is at most 7.2,
+same as for urdfkin. If an export is compared with true values (test vectors), the error is at most 7.2 eps,
 which is within `ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
@@ -213,7 +213,8 @@ SINGLE_POLYNOMIAL = 1.0
 # Rounding errors of a joint axis relative to the previous axis (`urdfkin.dh.common_normals`).
 
 #: Allowed difference (in eps per joint) between the constant poses that two programs read from one file.
-#: The worst case is 18.9: the sum of the docstring's first table without the rotation about the axis.
+#: The worst case is 18.9 eps: the sum of the docstring's first table without the row "rotation about the
+#: axis".
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
 #: Error (in eps) of the directions of two joint axes.
@@ -222,10 +223,10 @@ AXES = 5.0
 #: Error (in eps) of each joint that is caused by the program that wrote the file.
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
 #: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
-#: Roll and pitch both tilt an axis, so the error 22.5 counts twice; yaw does not tilt the axis.
+#: Roll and pitch both tilt an axis, so the error of 22.5 eps counts twice; yaw does not tilt the axis.
 WRITTEN = 45.0
 #: Error of a length along an axis, in units of eps times the length of the path.
-#: A dot product has an error of 2.4, and each sum of lengths has an error of 0.5 eps of this sum.
+#: A dot product has an error of 2.4 eps; each sum of lengths has an error of 0.5 eps times the sum.
 #: Only a few sums of lengths are nearly as large as the path's length.
 SUMMED = 4.0
 
@@ -241,7 +242,7 @@ ENTRY = 2.0
 #: Error of a length that is rounded to twelve digits, in the unit of `SUMMED`.
 DIGITS = SUMMED / 2.0
 #: Error (in eps) of the angle between two rotations.
-#: The first rotation is computed from roll, pitch and yaw, with an error of 3.1.
+#: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
 #: The second rotation is a product of three rotations.
 #: The product's errors are 0.5 for the sines, 0.5 for the cosines, and 1.4 and 1.8 for two multiplications.
 TURN = 8.0
@@ -249,12 +250,12 @@ TURN = 8.0
 #: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.
 #: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
-#: The sum 2.0 is doubled, so that a value at the limits is accepted.
+#: The bound is twice the sum 2.0, so that a value exactly at the limits is accepted.
 MIMIC_LIMIT = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the allowed difference (in eps), for each factor of a term, of two programs that read one URDF.
+    """Return the difference (in eps) that two readers of one URDF may have, for each factor of a term.
 
     `joints` is the number of joints on the path. `tilt` is the sum over these joints of the angle (radians)
     between Pinocchio's axis and the file's axis.

@@ -111,7 +111,7 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
     """Return the ranges of `own_ranges`, narrowed so that the mimic joints are within their limits.
 
-    A range in which no value keeps the mimic joints within their limits is not narrowed.
+    If no value in a range keeps the mimic joints within their limits, the range is not narrowed.
     """
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.allowed for one in narrowed_ranges(tree)}

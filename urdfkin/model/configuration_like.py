@@ -28,7 +28,7 @@ from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats
 
-#: Accepted types of q, v and a; text is an ArrayLike too.
+#: Types that q, v and a may have; for type checkers, a string is also an ArrayLike.
 Given = ArrayLike | Mapping[str, ArrayLike]
 
 #: Largest number of names in a message.
@@ -91,7 +91,7 @@ class CoordinateLayout:
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values of a text or mapping by name, and the pose with which the text begins, or None.
+        """Return the values of a text or mapping, and the name of the pose at the start of the text, or None.
 
         Numbers without names, or a repeated name, raise InputError; an unknown pose raises UnknownNameError.
 

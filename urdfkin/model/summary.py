@@ -11,7 +11,7 @@ from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
-#: Indices of text columns in tables that begin with link and joint, or with joint, parent and child.
+#: Indices of text columns, for tables whose first columns are link and joint, or joint, parent and child.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
 _WORDS_OF_JOINTS = (0, 1, 2, *(i + 1 for i in WORDS[2:]))
 

@@ -33,11 +33,11 @@ from urdfkin.verify.oracles import versions
 MOST_RUNS, MOST_FILES = 1000, 20_000
 #: Number of latest runs that are shown: as marks on a terminal, and in the charts of the page.
 MARKED, CHARTED = 20, 60
-#: Number of latest changes (and of runs on a terminal) that are shown without --all.
+#: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
 SHOWN = 20
 #: Maximum number of runs and of changes that the page lists for each robot.
 _LISTED = 500
-#: Mark of each verdict; the empty verdict belongs to a run without the robot.
+#: Symbol of each verdict; the empty verdict means that the run did not include the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
 #: Lower end of the chart of disagreements, as log10(disagreement / bound).
 _LOWEST = -3.0
@@ -123,7 +123,7 @@ class History:
         robots: For each robot, the results in each run. The key is the robot's source in the latest run.
             Worse verdicts come first.
         unusable: Files that cannot be used, with the reason.
-        repeated: Files with the same validation run as another file.
+        repeated: Files for which the validation runs in the same way as for another file.
     """
 
     runs: list[ValidationRun] = field(default_factory=list)
@@ -391,7 +391,7 @@ def _changes_by_source(found: History) -> ChangesBySource:
 
 
 def _changes_of(grouped: ChangesBySource, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
-    """Return the changes of a robot under all sources of the robot."""
+    """Return the changes of a robot, for all source names of the robot."""
     sources = dict.fromkeys(point["source"] for point in points)
     return [one for source in sources for one in grouped.get(source, [])]
 

@@ -134,7 +134,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Describe the distance of a frame for the unchanged model B; empty if it is a rounding error."""
+    """Describe how far a frame of the unchanged B is from A's frame; empty for a rounding error."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -198,7 +198,7 @@ def _names(found: Sameness) -> list[str]:
 
 
 def _worst_case(found: Sameness, frames: Sequence[Interval]) -> list[str]:
-    """Return a line about the distance of the first frame and the configuration, if there is a distance."""
+    """Return a line with the first frame's distance and the configuration with this distance, if any."""
     off = attained(frames[0])
     return [f"{frames[0].frame} is {off} off at: {where(found, frames[0])}"] if off else []
 

@@ -137,7 +137,7 @@ def more_accurate_counts(lines: Sequence[ReportedAccuracyLine]) -> str:
 
 
 def accuracy_words(study: ReportedAccuracy) -> str:
-    """Return in words the samples, the motion of the base, and the result of the accuracy study."""
+    """Describe the samples, the base's motion and the result of the accuracy study."""
     moving = " on a moving base" if study.get("moving_base") else ""
     return f"{counted(study['samples'], 'sample')}{moving}; {more_accurate_counts(study['lines'])}"
 

@@ -694,8 +694,8 @@ class Robot(Displayable):
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
             joints: The joints that remain movable; all other joints are locked. If `lock` has no value for a
-                locked joint, the value is 0. If `lock` begins with a pose, such as "ready", the value is that
-                in the pose.
+                locked joint, the value is 0. If `lock` begins with the name of a pose, such as "ready", the
+                joint is locked at its value in this pose.
 
         Raises:
             UnknownNameError: there is no such joint or pose.
@@ -810,7 +810,8 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from
 
         name = as_str(relative_to, "relative_to")
-        # Error messages repeat the call, so the name must be a plain string; a subclass has another repr.
+        # Error messages quote the call, so the name must be a plain str; a subclass of str may print
+        # differently.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -1225,7 +1226,8 @@ class Robot(Displayable):
             digits: Decimal digits of the interval arithmetic, at least 15. None: 30 digits plus one for each
                 joint before the frame. With 15 digits, the intervals are about as wide as the rounding errors
                 of doubles.
-            hessian: Whether to enclose the Hessian too; this takes less than 0.1 ms for each pair of joints.
+            hessian: Whether to compute intervals for the Hessian too; this takes less than 0.1 ms for each
+            pair of joints.
 
         Raises:
             InputError: an argument is a batch or has a wrong length, or `digits` is below 15.
@@ -1319,7 +1321,7 @@ class Robot(Displayable):
     ) -> str:
         """Return the kinematics of a frame as straight-line source code.
 
-        urdfkin compares the code with Pinocchio, and the text of the code states the agreement. The code also
+        urdfkin compares the code with Pinocchio, and writes the agreement in a comment of the code. The code also
         contains a self-test, with expected values that were computed with fifty digits.
 
         Args:

@@ -632,7 +632,8 @@ _ONE_TURN = math.tau + 0.02
 #: The rotation in the opposite direction would then be less than twice this angle.
 _AMBIGUOUS = math.tau / 3.0
 
-#: If the mimicked joint makes whole turns, a smaller motion (rad or m) of the mimic joint is only rounding.
+#: If the mimicked joint makes whole turns, a motion of the mimic joint below this value (rad or m) is a
+#: rounding error.
 _ROUNDING = 1e-9
 
 

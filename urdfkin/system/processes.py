@@ -82,7 +82,7 @@ def ask_python(command: list[str], request: bytes, patience: float, most: int) -
 
 @contextmanager
 def not_reading(settings: str) -> Iterator[None]:
-    """Hide a settings file in the current folder: if the file exists, make `/` the current folder."""
+    """Make `/` the current folder if the current folder contains a settings file that must not be read."""
     if not os.path.lexists(settings):
         yield
         return

@@ -374,9 +374,9 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
     """Yield a finding if a file is in degrees, but the limits of its hinges are probably in radians.
 
-    The angle unit applies to the whole file, so the limits of all hinges must be implausibly small in
-    degrees. Limits in degrees in a file in radians are not reported, because the hinges of some robots turn
-    several times.
+    The angle unit applies to the whole file, so a wrong unit is reported only if all hinges have implausibly
+    small limits. In a file in radians, limits that look like degrees are not reported, because some hinges
+    turn several times.
     """
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
@@ -397,7 +397,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # MuJoCo must not align the frame with the placeholder inertia, which the next loop sets.
+        # The next loop sets a placeholder inertia, with which MuJoCo must not align the frame.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)

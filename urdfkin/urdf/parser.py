@@ -146,7 +146,7 @@ def _codec(name: str) -> str | None:
 
 
 def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
-    """Return the line and the column of a byte, from 1."""
+    """Return the line and the column of a byte; both start at 1."""
     before = data[: max(offset, 0)].decode("utf-8", "replace")
     return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
 

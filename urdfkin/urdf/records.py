@@ -21,7 +21,7 @@ class Limits:
 
     Attributes:
         bytes: Maximum size of the file in bytes.
-        depth: Maximum number of levels of nested elements. Pinocchio reads at most the default number.
+        depth: Maximum number of levels of nested elements. Pinocchio never reads more than the default.
         elements: Maximum number of elements.
         attributes: Maximum number of attributes of one element.
         name: Maximum number of characters in the name of an element, an attribute, a link or a joint.

@@ -55,7 +55,7 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: Largest number in single precision. If a joint has no limit, the file contains this number or infinity.
 _LARGEST = float(np.finfo(np.float32).max)
-#: Up to this number times u n, the cosine between two axes of a frame is a rounding error, not shear.
+#: A cosine between two axes of a frame is a rounding error, not shear, up to this number times u n.
 #: Here n is the number of prims on the path to the frame's prim.
 #: The factor u is the largest relative error of rounding to single precision.
 #: Each entry of a stored rotation matrix has an error of u.
@@ -69,11 +69,12 @@ _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a pointer file of Git LFS, which stands for a file that was not downloaded.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Regular expression for relationships to the mimicked joint. The group is the direction, such as rotX.
+#: Regular expression for the names of USD relationships that point to the mimicked joint. The group is the
+#: direction, such as rotX.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: Words in the names of types and applied schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
-#: Ends of the type names of joints that a tree cannot represent.
+#: Suffixes of the type names of joints that a kinematic tree cannot represent.
 #: OpenUSD recognizes such a joint only if the plugin that defines the type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: Coefficients of a MuJoCo joint equality that a mimic rule, which is linear, cannot contain.
@@ -274,9 +275,9 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    `variants` are pairs of a variant set and a variant, and are applied in order. All prims with this set
-    select the variant. `articulation` is the path or name of the articulation to read; None if there is only
-    one.
+    `variants` are pairs of a variant set and a variant, and are applied in order. The variant is selected on
+    every prim that has this variant set. `articulation` is the path or name of the articulation to read; None
+    if there is only one.
 
     Raises:
         InputError: OpenUSD is not installed or does not accept the file, a reference is refused, the robot
@@ -328,7 +329,7 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
 
 
 def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
-    """Return the prims that have each variant set, including prims inside instances."""
+    """Return, for each variant set, the prims that have it, including prims inside instances."""
     sets: dict[str, list[Any]] = {}
     every = pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
     for prim in pxr.Usd.PrimRange.Stage(stage, every):
@@ -624,7 +625,7 @@ class _StageReader:
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return the body with index `i` of a joint, and the joint frame; None if the target does not exist.
+        """Return body i (0 or 1) of a joint and the joint frame; None if the body does not exist.
 
         The result has four entries: the path of the body (None for the world), the pose of the joint frame in
         the body (m), the number `size`, and the bounds `rounded` (see `_Edge`).

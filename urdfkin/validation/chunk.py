@@ -122,7 +122,7 @@ class Cut:
         return min(_MAX_DRAWS, max(1, -(-self.samples // DRAWN) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
-        """Number of chunks of a robot; at least one, for the special configurations."""
+        """Number of chunks of a robot's samples; at least one, for the special configurations."""
         return max(1, -(-self.samples // (self._draws * DRAWN)))
 
     def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:

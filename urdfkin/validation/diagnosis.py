@@ -74,7 +74,7 @@ class Diagnosis:
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        """Return whether a mistake has no effect: the predicted results equal the expected results."""
+        """Return whether a mistake has no effect, because its results equal the expected results."""
         return bool((np.abs(predicted - self.expected) <= _EQUAL * self._nonzero_scale()).all())
 
     def _nonzero_scale(self, n: int | None = None) -> FloatArray:
@@ -384,7 +384,7 @@ class Mistakes:
         return tuple(found)
 
     def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
-        """For each known tool, yield the mistake that the joints are in this tool's order."""
+        """For each known tool, yield the possible mistake that the joints are in this tool's order."""
         if self.conversion is not None:
             return
         from urdfkin.model.conventions import BUILT_IN
@@ -407,7 +407,7 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """For each link, yield the mistake that the function uses this link's frame."""
+        """For each link, yield the possible mistake that the function uses this link's frame."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return
@@ -425,7 +425,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield (0.0, sentence) for each wrong column that a mistake explains; 0.0: nothing is unexplained."""
+    """Yield (0.0, sentence) for each wrong column that a mistake explains completely."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

@@ -1,8 +1,8 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
 The addition of two tallies is commutative and associative, so the sum does not depend on the division of the
-samples into chunks. If two worst cases are equally bad, the sum contains the case with the smaller sample
-number.
+samples into chunks. If two worst cases are equally bad, the sum of two reports keeps the case with the
+smaller sample number.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two
@@ -119,7 +119,7 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    """Return the sum of two bounds k * eps * scale; the sum has the k of the second bound and a new scale."""
+    """Add two bounds k * eps * scale, and express the sum with the second bound's k and a new scale."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)

@@ -518,8 +518,9 @@ class _Run:
 
         The conversion rounds each joint angle before the angle is passed to the user's function. The rounded
         angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix has
-        an error of up to 2 eps |q|. Each term of the result has this matrix as a factor, so its relative
-        error is the same. The conversion of a base velocity by a matrix has at most 16 rounding errors.
+        an error of up to 2 eps |q|. Each term of the result has this matrix as a factor, so the result and
+        the matrix have equal relative errors. The conversion of a base velocity by a matrix has at most 16
+        rounding errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None

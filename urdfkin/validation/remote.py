@@ -67,7 +67,7 @@ class _CrashError(Exception):
 
 
 class _Parcel:
-    """The bytes of a robot and of a chunk; the receiving process gets one chunk that contains the robot."""
+    """The robot and the chunk, serialized separately; the receiving process puts the robot into the chunk."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk

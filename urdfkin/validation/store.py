@@ -260,7 +260,7 @@ def open_store(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether the file can exist before the manifest: another shard's process may have created it."""
+    """Return whether the process of another shard may have created this file before the manifest."""
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 

@@ -28,7 +28,7 @@ class Timings:
     second: float = 0.0
 
     def timed(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function, and add its computing time to a part, such as "urdfkin"."""
+        """Call a function, and add its computing time to the total of a category, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
             return function(*args, **kwargs)

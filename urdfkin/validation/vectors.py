@@ -67,7 +67,7 @@ _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: A multiple of 1 / 1024 has few decimals and is exactly a double.
 _GRID = 1024.0
-#: Number of digits of a tolerance, and number of digits to which it is first rounded.
+#: Number of digits of a printed tolerance, and number of digits to which it is rounded before.
 #: Results of different processors differ in the last digits; the first rounding removes these digits.
 _DIGITS, _FIRST_DIGITS = 3, 12
 

@@ -33,9 +33,9 @@ robots can be compared.
 
 *Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
 vectors (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
-result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The difference v_i^2
-z x z is 0 except for rounding errors, which are large for fast joints with an oblique axis. The bound on the
-angular acceleration alpha therefore uses w_i instead of w_{i-1}.
+result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The cross product
+v_i^2 z x z is 0 except for rounding errors, which are large for fast joints with an oblique axis. The bound
+on the angular acceleration alpha therefore uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -318,10 +318,10 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass, which
     `urdfkin.verify.mujoco` places at the root. At the end, MuJoCo converts the results to the frame's origin.
-    A joint or the frame is at most the length p of the path away from the centre of mass. Lever arms are
-    therefore at most 2 p. The conversion to the centre of mass and back is a cross product with a lever arm,
-    which at most doubles the number of factors. The bound allows `MUJOCO` rounding errors for each joint
-    instead of `ROUNDINGS`.
+    The distance of a joint or the frame from the centre of mass is at most the length p of the path. Lever
+    arms are therefore at most 2 p. The conversion to the centre of mass and back is a cross product with a
+    lever arm, which at most doubles the number of factors in a term. The bound allows `MUJOCO` rounding
+    errors for each joint instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -342,8 +342,8 @@ class DecimalErrors(NamedTuple):
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
         rules: Number of mimic rules of the joints on the path; a joint that mimics a mimic joint counts as
             two rules.
-        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if offsets in
-            a chain of mimic rules cancel, because their rounding errors do not cancel.
+        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. The length is positive even if
+            offsets in a chain of mimic rules cancel, because their rounding errors do not cancel.
     """
 
     angles: FloatArray
@@ -381,7 +381,7 @@ def true_value_magnitudes(
     *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement has therefore an
     error of at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain
     cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
-    displacement. Then 3/2 eps for each rule are enough. The same error is enough for the velocity and the
+    displacement. Then 3/2 eps for each rule are enough. The same error bound holds for the velocity and the
     acceleration of the joint, which are rounded less often.
 
     Args:
@@ -420,7 +420,7 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
     all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
     of a position changes by at most the angle error times the length of the path. The scale is multiplied by
-    1 + `angles` / k, which allows twice these changes and so covers terms of second order.
+    1 + `angles` / k. This is twice the change of first order, so it also covers terms of second order.
 
     Args:
         bound: Bound of the tree's placements, (n, frames, 4, 4).
@@ -514,8 +514,8 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
 
 #: Pinocchio's derivative of Jacobian column i by joint j is a sum of products (linear rows).
 #: The first pair applies if joint j is joint i or is nearer to the root than joint i; else the second.
-#: First number of a pair: how many products z x (z x d) the sum has for two revolute joints.
-#: Second number: how many products z x z the sum has for a revolute and a prismatic joint.
+#: First number of the pair: number of products z x (z x d) in the sum for two revolute joints.
+#: Second number of the pair: number of products z x z in the sum for a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -565,9 +565,10 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
 def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> Bound:
     """Return the bound of analytical Jacobians with Euler angles, (n, frames, 6, nv).
 
-    The rows of positions have the bound of the velocity Jacobian. For the rows of angles, let w be the
-    angular part of a column of the velocity Jacobian. The rotation axes of the three angles are e_i, u and t
-    = R e_k (`urdfkin.verify.analytical_reference`). With s = |e_i x t|, the sine or cosine of the middle
+    The position rows have the same bound as the rows of the velocity Jacobian. For the rows of angles, let w
+    be the angular part of a column of the velocity Jacobian. The rotation axes of the three angles are e_i, u
+    and t = R e_k (`urdfkin.verify.analytical_reference`). With s = |e_i x t|, the sine or cosine of the
+    middle
     angle:
 
     | Row | Element | Length of the vector |

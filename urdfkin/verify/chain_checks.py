@@ -28,9 +28,9 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the child link. Where the chain leads towards the tips, this
-    frame comes after the motion of the joint. Where the chain leads towards the root, this frame comes before
-    the motion.
+    Pinocchio's frame of a joint is the frame of the child link. On the part of the chain from the root to a
+    tip, this frame comes after the joint's motion. On the part of the chain from a link up to the root, this
+    frame comes before the joint's motion.
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
     computes along the chain, which is a part of the two paths. The bound counts all joints of both paths. The

@@ -105,7 +105,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        if len(size) < n:  # the kernel needs scratch memory if several results share a row of the scale
+        if len(size) < n:  # if several results share a row of the scale, the kernel needs scratch memory
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)
         kernel(one, other, size, worst, out_bits, unit, units, bits)

@@ -33,7 +33,7 @@ from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 #: Bit pattern of inf, as an integer.
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
-#: How many rows ahead of the compared row a row is loaded into the processor's cache.
+#: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.
 _AHEAD = 4
 
 
@@ -63,7 +63,7 @@ def _units(difference, size):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference in row `i`, by row `k` of the scale; all numbers must be finite."""
+    """Return the largest difference in row `i`, divided by row `k` of the scale, for finite numbers."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -72,7 +72,7 @@ def _largest(ours, theirs, scale, i, k):
 
 @helper()
 def _is_in_threes(scale, k):
-    """Return whether the scale has three equal linear rows and three equal angular rows."""
+    """Return whether the scale has equal numbers in its three linear rows, and in its three angular rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):

@@ -55,7 +55,7 @@ class MjcfReading:
         answer: Answer of the process: data of the robot, its frames, and MuJoCo's results.
         not_whole: Reason why MuJoCo compiled the file only without shapes and inertias; None: MuJoCo compiled
             the complete file.
-        pinocchio: Answer of the process about Pinocchio's reader; None: no answer.
+        pinocchio: Report of the process about Pinocchio's reader; None without a report.
     """
 
     urdf: str

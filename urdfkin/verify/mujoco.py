@@ -44,7 +44,7 @@ from urdfkin.verify.oracle import (
 )
 from urdfkin.verify.pinocchio import depth_of
 
-#: Mass (kg) and moments of inertia (kg m^2) of each link while MuJoCo reads the text.
+#: Placeholder mass (kg) and moments of inertia (kg m^2) of each link, with which MuJoCo loads the text.
 _MASS = "1"
 #: Maximum number of links in a chain, because MuJoCo's time grows with the square of this number.
 #: MuJoCo rejects chains of more than 1,023 links, but only after this time.
@@ -69,8 +69,8 @@ class _Joint:
 class _MujocoIndices:
     """Indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
-    The joint of a moving base is not part of urdfkin's q and v, so its indices are q = v = -1. A locked joint
-    has v = -1; its offset is the value at which the joint is locked.
+    The joint of a moving base is not part of urdfkin's q and v, so its indices are q = v = -1. For a locked
+    joint, the index in v is -1, and the offset is the value at which the joint is locked.
     """
 
     kind: str

@@ -223,7 +223,7 @@ class PinocchioLayout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G without the base; G adds a mimic joint's columns to its mimicked joint's."""
+        """Return J_full G without the base's columns; G adds each mimic joint's columns to its mimicked joint."""
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)

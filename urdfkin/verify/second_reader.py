@@ -81,7 +81,7 @@ def second_reading(
             contain.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    if "<!DOCTYPE" in text:  # yourdfpy would read the external files that a document type names
+    if "<!DOCTYPE" in text:  # yourdfpy would read the files that the document type declaration names
         return SecondReading(by, unread="the file has a document type")
     try:
         robot = read(text)

@@ -142,7 +142,7 @@ class _Explanation:
         self._names = [columns.joints[i] for i in self._moving]
 
     def result(self, full: int, least: float) -> Singularity:
-        """Return the rank, lost directions and reasons; the smallest singular value is at most `least`."""
+        """Return the rank, lost directions and reasons, if the smallest singular value is at most `least`."""
         U, s, Vt = np.linalg.svd(self._A)
         self._noise = 8.0 * self._matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
         motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
@@ -150,7 +150,8 @@ class _Explanation:
         usual, never = self._of_samples()
         directions = U[:, self._rank :].T
         directions = _basis(directions - directions @ never @ never.T)
-        # An arm with fewer joints than rows loses different directions in different configurations.
+        # For an arm with fewer joints than Jacobian rows, the directions without motion depend on the
+        # configuration.
         known = len(directions) == usual - self._rank and not (self._columns.moving_base and never.size)
         lost = np.zeros((len(directions) if known else 0, 6))
         if known:
@@ -273,7 +274,8 @@ class _Explanation:
         signs = np.sign(z @ z[0])[:, None]
         if parallel and np.abs(v - signs * v[0]).max() <= off:
             return f"{axes} are collinear."
-        # Three parallel or concurrent lines lie in one plane if they are linearly dependent; four need not.
+        # Three linearly dependent lines that are parallel or concurrent lie in one plane; four such lines
+        # need not.
         if parallel:
             return f"{axes} are parallel{' and lie in one plane' if len(one) == 3 else ''}."
         # If all axes pass through a point a, each column [v; z] satisfies v = a x z.

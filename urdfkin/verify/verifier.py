@@ -105,7 +105,7 @@ class Verifier:
         self._refusals: dict[str, str] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy has no checked results, and builds its own models of the oracles.
+        # A copy has no checked results, and builds its own Pinocchio and MuJoCo models.
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:

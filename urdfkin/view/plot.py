@@ -112,7 +112,7 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The axis is logarithmic, because bounds are about a hundred times the usual disagreement.
-    # Below 1, the size of one rounding error, the axis is linear.
+    # The plot's axis is linear below 1, the size of one rounding error, and logarithmic above it.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)

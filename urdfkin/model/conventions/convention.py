@@ -281,7 +281,7 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: In a transcoded name, a base-62 digit of at least this value is not the last digit of its number.
+#: In an encoded name, a base-62 digit of at least this value is followed by another digit of the same number.
 _CONTINUES = 31
 
 

@@ -755,7 +755,7 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each of urdfkin's numbers, return the index of the entry of `numbers` that determines it.
+    """For each entry of urdfkin's vector, return the index of the entry of `numbers` that determines it.
 
     A mimic joint's number is used only if no other number is available.
     """

@@ -462,8 +462,8 @@ class Congruence:
     def joint_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
         """Return the joint pairs at two bodies if the subtrees of the bodies match exactly, else None.
 
-        `via` contains the joints before the bodies; None at the first bodies. The motion X (4, 4) moves B's
-        body from B's zero configuration to the pose of A's body.
+        `via` contains the joints that lead to the bodies; None for the first bodies. The motion X (4, 4)
+        moves B's body from B's zero configuration to the pose of A's body.
         """
         found = self._at(bodies, via, X)
         return None if found is None else found[0]

@@ -71,7 +71,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """The number of joint pairs ahead of the current joint that matchers may still compare in total."""
+    """Number of joint pairs that all matchers together may still compare beyond the current joint."""
 
     left: int
 
@@ -282,7 +282,7 @@ class MechanismMatcher:
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
     def _poses_after(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield poses of the body of B after a joint, if the body before the joint has the pose X."""
+        """For the pose X of the body before a joint, yield possible poses of B's body after the joint."""
         there = BodyPair(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -435,7 +435,8 @@ class MechanismMatcher:
             home_b: (4, 4) the frame of B's joint in the zero configuration.
             plane: (4, 4) one possible N of a planar joint; every possible N is the product of this N and a
                 planar pose. None for a floating joint.
-            poses_after: (4, 4) poses of B's body after the joint at which its axes coincide with axes of A.
+            poses_after: Poses (4, 4) of B's body after the joint; at each pose, some of the body's axes
+            coincide with axes of A.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -589,7 +590,7 @@ def _best_of(scored: Sequence[tuple[_Choice, BodyPair, Score]]) -> tuple[_Choice
 
 
 def better(score: Score, than: Score) -> bool:
-    """Return whether the first score has more matches, or as many and less than half the difference."""
+    """Return whether the first score has more matches, or equally many and less than half the difference."""
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
@@ -606,7 +607,7 @@ def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
 
 
 def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    """Return the indices of some joints at a body, and of all joints after them."""
+    """Return the indices of the given joints of a body, and of all joints after these joints."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
         here, edge = stack.pop()
@@ -667,7 +668,7 @@ def _orders_to_try(
     """Yield other orders of consecutive joints of B that give the same motion.
 
     If A has joints with all these names, the function yields A's order and its reverse. Otherwise it yields
-    the first `MOST_ORDERS` of `orders`. `run` is the present order, from base to tip.
+    the first `MOST_ORDERS` of `orders`. `run` contains the joints in their current order, from base to tip.
     """
     called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
@@ -767,9 +768,9 @@ class _Rule:
         d: Offset of B's rule.
         offset: Zero offset o of B's joint in the alignment.
         turns: Whether the joint is revolute.
-        free: Whether any offset o is possible, because no axis and no link with the same name follows the
+        free: Whether any offset o is possible: no axis, and no link with a matching name, comes after the
             joint.
-        meets: Whether links of A and of B coincide on the body after the joint.
+        meets: Whether links of A and of B on the body after the joint have equal poses.
     """
 
     step: int
@@ -803,7 +804,7 @@ def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, t
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # Only joint pairs with the most frequent quotient alpha get a new zero offset.
+        # Only joint pairs with the most frequent ratio alpha of joint velocities get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )
@@ -848,7 +849,7 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether later axes or links of equal names determine a zero offset, and `_Rule.meets`."""
+    """Return whether later axes or links with equal names determine a zero offset; also return `meets`."""
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):

@@ -129,8 +129,8 @@ _Z = np.array([0.0, 0.0, 1.0])
 class JointTransform:
     """The conversion of a planar or floating joint: P_b = before P_a behind.
 
-    `before` is M and `behind` is N, both (4, 4). If one model's joint is reversed (`back`), the conversion is
-    P_b = before P_a^-1 behind.
+    `before` is M and `behind` is N, both (4, 4). If the joint is reversed in one model (`back`), the
+    conversion is P_b = `before` @ inverse(P_a) @ `behind`.
     """
 
     before: FloatArray
@@ -281,7 +281,7 @@ class Mechanism:
         return known
 
     def reordered(self, names: Sequence[str]) -> Mechanism:
-        """Return a mechanism with consecutive joints in another order, from the inner body outwards.
+        """Return a mechanism with consecutive joints in another order, which starts at the inner body.
 
         The motion stays the same. The result does not contain the links between these joints.
         """
@@ -543,7 +543,7 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest difference (m) among matched axes and matched links with child joints.
+        """Smallest and largest distance (m) between matched axes or matched links with child joints.
 
         Differences of 0 do not count.
         """
@@ -628,8 +628,8 @@ class AlignmentChoices:
     """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
-        base: The link of A and the link of B at whose bodies the search for matching joints starts. If `base`
-            is None, the search chooses its first bodies by link names.
+        base: The search for matching joints starts at the bodies of these two links, one of A and one of B.
+            If `base` is None, the search chooses its first bodies by link names.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: (`sense`, `offset`) of `MatchedJoints`, by the joint's name in A; a missing joint has (1, 0.0).
         conversions: Converts A's coordinates of a planar or floating joint to B's if they differ.

@@ -145,10 +145,10 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def rotated_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Return the support function's values (angles, n) at the n grid points after rotations of the set.
+        """Rotate the set by each angle; return the support function (angles, n) at the n grid points.
 
         The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
-        the grid points by the opposite angle. For each angle, `factors` contains a factor for the grid
+        the grid points by the opposite angle. For each angle, `factors` contains a multiplier for the grid
         points' components perpendicular to the axis.
         """
         G = self.grid.points
@@ -158,7 +158,7 @@ class Support:
         return self.at(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support function after translations by all distances from low to high (m)."""
+        """Return the support function of the set after translations by all distances from low to high (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
@@ -215,7 +215,7 @@ def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]
 #: `FINE` gives a smaller bound than `COARSE`, but takes longer.
 COARSE, FINE = Grid(8, 24), Grid(16, 48)
 #: Maximum number of sample values of a revolute joint's variable.
-#: If a range needs more samples, the joint's angles in A and B are treated as independent.
+#: If a range would need more samples, the joint's angles in A and B are treated as independent.
 MOST_VALUES = 1024
 
 
@@ -337,7 +337,7 @@ def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[
 def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
-    """Return d of the recursion (module docstring) after one more joint, but before its motion L."""
+    """Return the vector d of the recursion (module docstring) at the next joint, before the motion L."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
@@ -434,7 +434,7 @@ def _common_difference(
 def _independent_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support
 ) -> Support:
-    """Return the change of d by two revolute joints whose angles are treated as independent.
+    """Return the change of d that two revolute joints cause if their angles are treated as independent.
 
     If A and B have the same axis, the positions of a point in A and B differ at most by the chord of the
     largest difference of the angles. If the axes differ, the result is the sum of the support functions of

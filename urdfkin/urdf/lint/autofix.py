@@ -11,7 +11,7 @@ urdfkin accepts a fix if three conditions hold:
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
 a CI service, for example an escape sequence or a GitHub workflow command. Such text must be escaped, but
 `git apply` refuses a patch with escaped lines. The changes are then written as a git binary patch, which is
-ASCII. The escaped lines precede this patch as a comment.
+ASCII. The lines are escaped and precede this patch as a comment.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
     # A reporter stores only some of the findings if a code has very many.
-    # After a fix, it may store others, which would look like new findings, so these codes are not compared.
+    # After a fix, the file may store other numbers, whose findings would look new, so these codes are not
+    # compared.
     many = {finding.code for finding in before.findings if finding.also}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
@@ -170,8 +171,8 @@ _COUNTS = string.ascii_uppercase + string.ascii_lowercase
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
     """Return the patch of one file, safe to print; an empty string if the file does not change.
 
-    `file` is the name relative to the current folder. `before` and `after` are UTF-8. `shown` escapes text
-    that controls a terminal or a log in one line.
+    `file` is the name relative to the current folder. `before` and `after` are UTF-8. `shown` returns text
+    for one line of a terminal or a log, with control characters escaped.
     """
     if before == after:
         return ""

@@ -24,8 +24,8 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
     """Return one SARIF run with every code as a rule and every finding as a result.
 
-    A rule about MJCF or USD files is in the run only if a finding has the rule's code. A silenced finding is
-    marked as "suppressed in source", with the reason in the comment.
+    A rule about MJCF or USD files is listed in the SARIF run only if a finding has the rule's code. A
+    silenced finding is marked as "suppressed in source", with the reason in the comment.
     """
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}

@@ -34,7 +34,7 @@ TOPICS: dict[str, tuple[Rule, ...]] = {
 
 #: The rules about URDF files by code, in ascending order.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: The rules about MJCF and USD files by code.
+#: The rules about MJCF and USD files, indexed by code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule. The keys are the code in lower case, the digits of the code, and the short name.

@@ -147,7 +147,7 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """Parse and check the bytes in a reporter, and return the records; None if the file is not a URDF.
+    """Parse and check the bytes of a reporter's file, and return the records; None if the file is not a URDF.
 
     If `mimic` is False, mimic joints move freely, and all findings about mimic joints are notes. `root_joint`
     is "floating" or "planar" if the robot gets an additional joint `root_joint` with the parent link

@@ -276,7 +276,7 @@ class Choice:
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Like `of`, but count in copies of the baselines, so that a file can be checked a second time."""
+        """Like `of`, but count in copies of the baselines, so that the same file can be checked again."""
         copies = [known and replace(known, counts=Counter(known.counts)) for known in (self.baseline, before)]
         return replace(self, baseline=copies[0]).of(text, copies[1])
 

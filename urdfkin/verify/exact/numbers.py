@@ -36,7 +36,7 @@ DIGITS = 50
 _TWO_DOUBLES = 30
 #: Number of bits for each decimal digit of an interval.
 _BITS = math.log2(10.0)
-#: Number of additional bits of an interval: 15 digits, the precision of a double, then have 55 bits.
+#: Number of bits of an interval in addition to its digits; 15 digits, as in a double, give 55 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _MORE_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
@@ -207,7 +207,7 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
 ) -> dict[int, ExactJoint]:
-    """Return the exact numbers of the joints with the indices `among` in the tree (None: all), by index.
+    """Return the exact constants, by index, of the joints with the indices `among` (None: all).
 
     Raises:
         InputError: a joint is not in the text, and is not the root joint that `load` has added.

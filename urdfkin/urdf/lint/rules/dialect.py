@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quoted(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Kinematics needs a macro that is a child of <robot>, or is inside a joint.
+    # The kinematics depends on a macro that is a child of <robot>, or that is inside a joint.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
     expressions: list[_Place] = [
@@ -155,7 +155,7 @@ EXTENSIONS = frozenset(_COMMON.split())
 
 #: Lines of the form `element: attributes > child elements`.
 #: A line without a colon means that the attributes of the element are not checked.
-#: The content of an element without a line is not checked.
+#: The content of an element without a known line number is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -457,7 +457,7 @@ _BETWEEN = re.compile(r"[,\s]+")
 def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
     """Apply the comments that silence findings, and report invalid comments.
 
-    `codes` has the code of each rule, by all names of the rule in lower case.
+    `codes` maps each name of a rule, in lower case, to the rule's code.
     """
     silences = Silences()
     for comment in report.comments:

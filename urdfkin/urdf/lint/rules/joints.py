@@ -65,7 +65,7 @@ def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointReco
     """Report the second and all further parent joints of a link; return True if there are none.
 
     The links are visited depth first. If the child of a joint is on the current path, the joint closes a
-    loop. If the child was visited on another path, the joint is a further parent joint.
+    loop. If the child was already visited on another path, the joint is an additional parent joint.
     """
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}

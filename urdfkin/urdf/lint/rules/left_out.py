@@ -43,9 +43,9 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 _SEARCHED = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Tags of MJCF elements that findings name only by a tag, each with the tag in the finding.
+#: Tags of MJCF elements that findings mention without a name, each with the printed tag.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: Regular expression for a prim in a USD text file, or a character that begins or ends other content.
+#: Regular expression for a prim in a USD text file, or for a delimiter of other content.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
 #: Beginnings and ends of comments, arrays, strings and references in a USD text file.
 _NO_PRIM = {
