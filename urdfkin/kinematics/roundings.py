@@ -47,8 +47,8 @@ deviation.
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
 2 |Q - 1| <= 2 t. If the joint rotates a vector, or translates a vector along the joint's axis, the error is
-at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t counts as 2
-t / eps additional rounding errors of each factor, for all frames after the joint. If a tilt is larger than
+at most 2 t. All vectors after this joint have the same error. Therefore, a joint with the tilt t counts as
+2 t / eps additional rounding errors of each factor, for all frames after the joint. If a tilt is larger than
 eps, urdfkin reports the finding URDF514.
 
 **An export** (`urdfkin.export`) writes the same equations without products with 0 and 1. An export also omits

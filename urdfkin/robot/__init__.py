@@ -1321,8 +1321,8 @@ class Robot(Displayable):
     ) -> str:
         """Return the kinematics of a frame as straight-line source code.
 
-        urdfkin compares the code with Pinocchio, and writes the agreement in a comment of the code. The code also
-        contains a self-test, with expected values that were computed with fifty digits.
+        urdfkin compares the code with Pinocchio, and writes the agreement in a comment of the code. The code
+        also contains a self-test, with expected values that were computed with fifty digits.
 
         Args:
             to: Language, one of `urdfkin.export.LANGUAGES`, such as "c" or "numpy".

@@ -223,7 +223,7 @@ class PinocchioLayout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G without the base's columns; G adds each mimic joint's columns to its mimicked joint."""
+        """Return J_full G without the base's columns; G adds mimic joints' columns to mimicked joints."""
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)
