@@ -292,6 +292,22 @@ def test_in_a_pipe_no_name_is_folded_and_no_line_ends_in_blanks(
 # -- locked joints -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "acceleration panda --base-velocity 1,0,0,0,0,0",
+        "acceleration panda --base-velocity 1,0,0,0,0,0 --breakdown",
+        "singular-values panda",
+        "chain panda",
+    ],
+)
+def test_json_states_the_locked_joints_and_the_motion_of_the_base(words: str) -> None:
+    data = good(f"{words} --lock panda_joint1=0.3 --format json").data
+    assert data["lock"] == {"panda_joint1": 0.3}
+    if "--base-velocity" in words:
+        assert data["base_velocity"] == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+
+
 def test_locked_joints_have_no_coordinate_and_no_column() -> None:
     done = urdfkin("jacobian panda --lock panda_finger_joint1=40mm --q ready --format json")
     robot = library.load("panda", lock={"panda_finger_joint1": 0.04})

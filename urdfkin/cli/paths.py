@@ -76,13 +76,14 @@ def chain_command(
         return TextDocument(title, [Table(heads, rows, left=5, names=(0,))])
 
     def data() -> dict[str, Any]:
+        converted = inputs.converted()
         return {
             "robot": loaded.name,
             "source": loaded.source,
             "base": path.base,
             "tip": path.tip,
-            "q": inputs.converted().q[0].tolist(),
-            **({} if convention is None else {"convention": convention}),
+            "q": converted.q[0].tolist(),
+            **converted.settings,
             "coordinates": list(path.joint_names),
             "path_q": path_q.tolist(),
             "joints": [

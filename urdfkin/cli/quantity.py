@@ -213,27 +213,27 @@ def _answer(x: Inputs, quantity: Quantity, result: FloatArray, reference: str | 
 
 
 def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArray) -> dict[str, Any]:
+    about = {"quantity": quantity.name, "frame": x.frame, "reference": reference}
+    rows = list(quantity.labels) or None
+    return _head(x, quantity.inputs, **about, rows=rows) | {"result": result.tolist()}
+
+
+def _head(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
+    """Return the entries of a JSON result that identify the robot, `about`, the inputs and the settings."""
+    times = {} if x.t is None else {"t": x.t.tolist()}
     return {
         "robot": x.robot.name,
         "source": x.robot.source,
         "path": x.robot.path,
         "sha256": x.robot.sha256,
         "urdfkin": x.robot.certificate().urdfkin,
-        "quantity": quantity.name,
-        "frame": x.frame,
-        "reference": reference,
-        "rows": list(quantity.labels) or None,
+        **about,
         "coordinates": list(x.coordinate_names),
         "rates": list(x.rate_names),
-        **_input_data(x, quantity.inputs),
+        **times,
+        **{letter: getattr(x, letter).tolist() for letter in letters},
         **x.settings,
-        "result": result.tolist(),
     }
-
-
-def _input_data(x: Inputs, letters: str) -> dict[str, Any]:
-    times = {} if x.t is None else {"t": x.t.tolist()}
-    return times | {letter: getattr(x, letter).tolist() for letter in letters}
 
 
 def _rows(x: Inputs, quantity: Quantity, result: FloatArray) -> Iterator[list[object]]:
@@ -324,17 +324,10 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
             yield [t, "sum", "", *map(repr, found.total[k].tolist())]
 
     def data() -> dict[str, Any]:
-        return {
-            "robot": x.robot.name,
-            "source": x.robot.source,
-            "quantity": "acceleration breakdown",
-            "frame": x.frame,
-            "reference": reference,
-            "rows": list(SIX),
-            "joints": list(found.joints),
-            "kinds": list(KINDS),
-            **_input_data(x, "qva"),
-            **{name: getattr(found, name).tolist() for name in ("base", "terms", "total")},
+        about = {"quantity": "acceleration breakdown", "frame": x.frame, "reference": reference}
+        axes = {"rows": list(SIX), "joints": list(found.joints), "kinds": list(KINDS)}
+        return _head(x, "qva", **about, **axes) | {
+            name: getattr(found, name).tolist() for name in ("base", "terms", "total")
         }
 
     title = f"acceleration of {x.frame}, {reference}, by joint"
@@ -565,15 +558,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
             yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
 
     def data() -> dict[str, Any]:
-        return {
-            "robot": x.robot.name,
-            "source": x.robot.source,
-            "frame": x.frame,
-            "rows": rows,
-            "coordinates": list(x.coordinate_names),
-            "rates": list(x.rate_names),
-            **_input_data(x, "q"),
-            **x.settings,
+        return _head(x, "q", quantity="singular values", frame=x.frame, rows=rows) | {
             "singular_values": plain(found.values._asdict()),
             "condition": plain(found.condition._asdict()),
             "manipulability": plain(found.manipulability._asdict()),
