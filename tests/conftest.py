@@ -1,22 +1,23 @@
-"""What holds for every test: how properties are searched, and that processes run the code under test.
+"""Settings for every test: threads, bytecode, Hypothesis examples and garbage collection.
 
-Linear algebra takes one thread: there are as many tests at a time as cores, and two threads in each that wait
-for one another took six times one's processor time for a fit of 140 numbers.
+Linear algebra uses one thread. pytest runs one test on each core, and a second thread in each test made a fit
+of 140 numbers six times slower.
 
-Hundreds of tests start a process, and each would compile the whole package again where Python was told to
-keep no bytecode: half of what such a test takes. It is kept in `__pycache__`, as usual.
+Processes that tests start read and write bytecode in `__pycache__`. Otherwise, each of hundreds of processes
+would compile the package again, which takes half of the time of such a test.
 
-Properties are tried on the same examples in every run, so that a verdict depends on the commit alone: the
-seed of a test is the hash of its source, and no run reads what an earlier one kept. By itself Hypothesis also
-draws constants from the modules imported so far, which depend on the tests that run together: not here.
-`pytest --hypothesis-profile=search` tries new examples, those constants among them.
+Hypothesis tries the same examples in every run, so the result of a test depends only on the commit. The seed
+of a test is the hash of its source, and no run reads examples of earlier runs. By default, Hypothesis also
+draws constants from the imported modules, which depend on the tests of the run. This function is disabled.
+`pytest --hypothesis-profile=search` tries new examples, including these constants.
 
-What is collected lives until the end, so no garbage is looked for among ten thousand tests: not while they
-are gathered, which took a third longer, and not each time that garbage is looked for later.
+Collected tests exist until the end of the run, so the garbage collector ignores them. It is also disabled
+while pytest collects ten thousand tests, because it took a third of this time.
 """
 
 import gc
 import os
+import signal
 import sys
 from collections.abc import Generator
 from pathlib import Path
@@ -30,9 +31,12 @@ _ROOT = str(Path(__file__).parents[1])
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (_ROOT, os.environ.get("PYTHONPATH"))))
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads it when it is imported
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads the variable when it is imported
+# A shell ignores SIGINT for a process in the background. Tests of Ctrl-C need the default handler.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
-# No deadline: a busy machine is no counterexample. Trees are built from many draws, and are large.
+# A deadline would fail on a busy machine. Trees need many draws and are large.
 _UNHURRIED = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 settings.register_profile("same", _UNHURRIED, derandomize=True)
 settings.register_profile("search", _UNHURRIED, derandomize=False, print_blob=True)
@@ -43,19 +47,19 @@ def _collects_constants_of(path: str) -> bool:
     return settings.get_current_profile_name() != "same" and is_local_module_file(path)
 
 
-# Not public: tests/test_same_examples.py fails if another version of Hypothesis collects constants otherwise.
+# This function is not public; tests/test_same_examples.py fails if another version of Hypothesis lacks it.
 vars(providers)["is_local_module_file"] = _collects_constants_of
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Let `-m "not slow"` leave out long tests too."""
+    """Mark long tests as slow, so that `-m "not slow"` excludes both."""
     if item.get_closest_marker("long"):
         item.add_marker("slow")
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Collect without looking for garbage, and leave what was collected out of every search."""
+    """Disable garbage collection while tests are collected, and exclude the tests from later collections."""
     gc.disable()
     try:
         return (yield)

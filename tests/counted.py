@@ -1,4 +1,4 @@
-"""Numbers that remember each of their roundings: the equations' own text says how it rounds."""
+"""Numbers that record each of their rounding errors, so that the equations' code determines its errors."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _NEW = count()
 
 @dataclass(frozen=True)
 class Counted:
-    """A double; what each rounding so far did to it at most, in u = eps/2, to first order; whether sums fuse.
+    """A double with the largest first-order effect of each earlier rounding, in u = eps/2.
 
-    A product that is fused waits for the sum that it meets, as in `urdfkin.compiled.machine.numbers`.
+    If `fused` is true, a product is rounded only in the next sum, as in `urdfkin.compiled.machine.numbers`.
     """
 
     value: float
@@ -28,7 +28,7 @@ class Counted:
     waits: bool = False
 
     def rounded(self) -> Counted:
-        """As it stands in a register: what is rounded may be off by u of itself."""
+        """Return the number with one more rounding, whose error is at most u times the value."""
         new = {next(_NEW): abs(self.value)} if self.value else {}
         return Counted(self.value, self.errors | new, self.fused)
 
@@ -57,7 +57,7 @@ class Counted:
         return Counted(-self.value, {k: -e for k, e in self.errors.items()}, self.fused, self.waits)
 
     def __mul__(self, other: Counted | int) -> Counted:
-        if isinstance(other, int):  # 0, 1 and 2 round nothing
+        if isinstance(other, int):  # products with 0, 1 and 2 are exact
             scaled = {k: other * e for k, e in self.errors.items()} if other else {}
             return Counted(other * self.value, scaled, self.fused, self.waits)
         x, y = self._number(), other._number()
@@ -70,7 +70,7 @@ class Counted:
     __radd__, __rmul__ = __add__, __mul__
 
     def of(self, value: float, slope: float) -> Counted:
-        """A function of the number, rounded."""
+        """Return the rounded value of a function of the number."""
         x = self._number()
         return Counted(value, {k: slope * e for k, e in x.errors.items()}, self.fused).rounded()
 
@@ -81,17 +81,17 @@ eq = bound()
 
 
 def matrix(R: FloatArray, *, fused: bool) -> Matrix:
-    """Exact numbers."""
+    """Return a matrix of exact numbers."""
     return tuple(tuple(Counted(float(x), fused=fused) for x in row) for row in R)  # type: ignore[return-value]
 
 
 def sine_cosine(angle: float, *, fused: bool) -> tuple[Counted, Counted]:
-    """Right to half a unit in the last place."""
+    """Return sine and cosine, correctly rounded."""
     return tuple(Counted(f(angle), fused=fused).rounded() for f in (math.sin, math.cos))  # type: ignore[return-value]
 
 
 def unit(x: Sequence[Counted]) -> list[Counted]:
-    """Divided by its length."""
+    """Return the vector divided by its length."""
     squares = x[0] * x[0]
     for c in x[1:]:
         squares = squares + c * c
@@ -101,7 +101,7 @@ def unit(x: Sequence[Counted]) -> list[Counted]:
 
 
 def rows_of(R: Matrix) -> list[FloatArray]:
-    """For each row, what each rounding does to its three numbers, in eps: (roundings, 3)."""
+    """Return, for each row, the effects (roundings, 3) of each rounding on its numbers, in eps."""
     found = []
     for row in R:
         numbers = [x.rounded() if x.waits else x for x in row]
@@ -111,7 +111,7 @@ def rows_of(R: Matrix) -> list[FloatArray]:
 
 
 def all_conspiring(R: Matrix) -> float:
-    """How far a number of a turned unit vector may be off, in eps: all signs as they hurt most."""
+    """Return the largest error (eps) of a component of a rotated unit vector, for the worst signs."""
     worst = 0.0
     for E in rows_of(R):
         for start in np.vstack((np.eye(3), [[1.0, 1.0, 1.0], [1.0, -1.0, 1.0]])):
@@ -124,5 +124,5 @@ def all_conspiring(R: Matrix) -> float:
 
 
 def deviation(R: Matrix) -> float:
-    """The same where each rounding is anything up to its half unit, independently: the standard deviation."""
+    """Return the error's standard deviation (eps), for independent, uniformly distributed roundings."""
     return max(math.sqrt(np.linalg.eigvalsh(E.T @ E)[-1] / 3.0) for E in rows_of(R))

@@ -1,4 +1,4 @@
-"""Motion written down a second time, at 50 digits, and differentiated there.
+"""Motion in independent formulas, differentiated numerically at 60 digits.
 
 An independent source for rates: differences with a step of 1e-18 at 60 digits are right to far more digits
 than a double has, whatever the function is made of.
@@ -20,35 +20,35 @@ from urdfkin.robot import Robot
 from urdfkin.verify.exact import numbers
 from urdfkin.verify.exact.recursion import ExactMotion, move
 
-#: Work with this many digits wherever `mp` is used.
+#: Number of digits of all computations with `mp`.
 mp = mpmath.mp.clone()
 mp.dps = 60
-mp.mpf.sin_cos = lambda angle: (mp.sin(angle), mp.cos(angle))  # as a ball has it
+mp.mpf.sin_cos = lambda angle: (mp.sin(angle), mp.cos(angle))  # as in an interval of Arb
 
 Matrix = Any
 _STEP = mp.mpf(10) ** -18
 
 
 def array(matrix: Matrix) -> FloatArray:
-    """The nearest doubles of an mpmath matrix; a column becomes a vector."""
+    """Return the nearest doubles of an mpmath matrix; a column becomes a vector."""
     values = np.array([[float(matrix[i, j]) for j in range(matrix.cols)] for i in range(matrix.rows)])
     return values[:, 0] if matrix.cols == 1 else values
 
 
 def rate(function: Callable[[Any], Matrix], t: float) -> Matrix:
-    """The first derivative at t."""
+    """Return the first derivative at t."""
     t = mp.mpf(t)
     return (function(t + _STEP) - function(t - _STEP)) / (2 * _STEP)
 
 
 def second_rate(function: Callable[[Any], Matrix], t: float) -> Matrix:
-    """The second derivative at t."""
+    """Return the second derivative at t."""
     t = mp.mpf(t)
     return (function(t + _STEP) - 2 * function(t) + function(t - _STEP)) / _STEP**2
 
 
 def column(*entries: Any) -> Matrix:
-    """A column of mpmath numbers."""
+    """Return a column of mpmath numbers."""
     return mp.matrix([[entry] for entry in entries])
 
 
@@ -58,28 +58,28 @@ def cross_matrix(w: Matrix) -> Matrix:
 
 
 def unskewed(S: Matrix) -> Matrix:
-    """The w of S(w)."""
+    """Return the vector w of the matrix S(w)."""
     return column(S[2, 1], S[0, 2], S[1, 0])
 
 
 def turn(axis: str, angle: Any) -> Matrix:
-    """Rx, Ry or Rz."""
+    """Return the rotation Rx, Ry or Rz."""
     return about(column(*(1 if letter == axis else 0 for letter in "xyz")), angle)
 
 
 def about(axis: Matrix, angle: Any) -> Matrix:
-    """R_k(phi) = I + sin S + (1 - cos) S^2, with k put to length one at full precision."""
+    """Return R_k(phi) = I + sin S + (1 - cos) S^2, for the normalised vector k."""
     S = cross_matrix(axis / mp.norm(axis))
     return mp.eye(3) + mp.sin(angle) * S + (1 - mp.cos(angle)) * S * S
 
 
 def angular_velocity(R: Callable[[Any], Matrix], t: float) -> Matrix:
-    """The w of R-dot R^T."""
+    """Return the angular velocity w from S(w) = R-dot R^T."""
     return unskewed(rate(R, t) * R(mp.mpf(t)).T)
 
 
 def angular_acceleration(R: Callable[[Any], Matrix], t: float) -> Matrix:
-    """The rate of w: R-dot-dot R^T + R-dot R-dot^T is S(alpha)."""
+    """Return the angular acceleration from S(alpha) = R-dot-dot R^T + R-dot R-dot^T."""
     first = rate(R, t)
     return unskewed(second_rate(R, t) * R(mp.mpf(t)).T + first * first.T)
 
@@ -88,14 +88,14 @@ def angular_acceleration(R: Callable[[Any], Matrix], t: float) -> Matrix:
 
 
 def true_motion(robot: Robot, x: Sequence[FloatArray], base: BaseMotion | None = None) -> ExactMotion:
-    """The motion of one sample by the same recursion, on mpmath's numbers instead of balls."""
+    """Return the motion of one sample by the same recursion with mpmath's numbers instead of intervals."""
     with patch.object(numbers, "arb", mp.mpf):
         joints, on = numbers.read_exact(robot.urdf, robot.tree), None if base is None else root_state(base)
         return move(robot.tree, joints, *x, base=on)
 
 
 def root_state(base: BaseMotion) -> State:
-    """The state of the root link that moves so."""
+    """Return the state of the root link with this motion."""
     T, six, six_2 = base.placement, base.velocity, base.acceleration
     first, second, third = map(tuple, orthogonal_factor(T[:3, :3]).tolist())
     vectors: Any = (T[:3, 3], six[3:], six[:3], six_2[3:], six_2[:3])
@@ -103,7 +103,7 @@ def root_state(base: BaseMotion) -> State:
 
 
 def orthogonal_factor(M: FloatArray) -> Matrix:
-    """U of M = U H by Higham's iteration, (X + X^-T) / 2."""
+    """Return the orthogonal factor U of M = U H by Higham's iteration, (X + X^-T) / 2."""
     X = mp.matrix(M.tolist())
     for _ in range(12):
         X = (X + (X**-1).T) / 2

@@ -1,4 +1,4 @@
-"""Three frames and a point that move in some smooth way, written down at 60 digits."""
+"""Smooth motions of three frames and a point, as functions of time at 60 digits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.high_precision import (
 )
 from urdfkin.kinematics.bodies import MovingFrame
 
-#: The moment at which the tests look.
+#: Time at which the tests compare motions.
 T = 0.7
 
 ORIENTATIONS: tuple[Callable[[Any], Any], ...] = (
@@ -33,12 +33,12 @@ ORIGINS: tuple[Callable[[Any], Any], ...] = (
 
 
 def point(t: Any) -> Any:
-    """A point on its way through the last frame."""
+    """Return the position of the moving point in the last frame."""
     return column(mp.sin(5 * t), t * t, 1 - t)
 
 
 def frame(i: int) -> MovingFrame:
-    """Frame i + 1 in frame i at that moment, its rates differentiated at 60 digits."""
+    """Return the motion of frame i + 1 in frame i at this time, with derivatives at 60 digits."""
     R, d = ORIENTATIONS[i], ORIGINS[i]
     return MovingFrame(
         array(R(mp.mpf(T))), array(d(mp.mpf(T))), array(angular_velocity(R, T)), array(rate(d, T)),

@@ -1,6 +1,6 @@
-"""Make a function slightly wrong for a while, wherever it has been imported to.
+"""Make a function slightly wrong for a test, in every module that has imported it.
 
-The function object itself gets other code, so that every name bound to it calls the wrong one.
+The code of the function object is replaced, so every reference to the function calls the wrong code.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-#: By how much results are changed: far above rounding, far below what one sees.
+#: Size of the change of a result: far larger than rounding errors, far smaller than a visible error.
 SIZE = 1e-10
 
 _originals: dict[str, Callable[..., Any]] = {}
@@ -22,7 +22,7 @@ _generator = np.random.default_rng(0)
 
 @contextmanager
 def slightly_wrong(function: Any) -> Iterator[None]:
-    """While open, each call's result is off by random numbers of about `SIZE`, other ones at each call."""
+    """Add random errors of about `SIZE` to the results of each call while the context is open."""
     key = f"{function.__module__}.{function.__qualname__}"
     code = function.__code__
     original = types.FunctionType(
@@ -45,7 +45,7 @@ def slightly_wrong(function: Any) -> Iterator[None]:
 
 
 def call_wrong(key: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-    """Call the original and spoil what it returns."""
+    """Call the original function, and change its result."""
     return _spoiled(_originals[key](*args, **kwargs))
 
 

@@ -1,4 +1,4 @@
-"""A tree with every kind of joint, a branch, a fixed joint in the middle and a follower, all askew."""
+"""A tree with oblique joints of every kind, a branch, an inner fixed joint and a mimic joint."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from urdfkin.model.tree import Joint, JointKind, KinematicTree, Mimic, build_tre
 
 
 def pose(generator: np.random.Generator) -> FloatArray:
-    """Some (4, 4) pose."""
+    """Return a random pose (4, 4)."""
     T = np.eye(4)
     T[:3, :3] = exp_rotation(generator.normal(size=3))
     T[:3, 3] = generator.uniform(-0.5, 0.5, 3)
@@ -16,7 +16,7 @@ def pose(generator: np.random.Generator) -> FloatArray:
 
 
 def odd_tree() -> KinematicTree:
-    """The same tree each time."""
+    """Return the tree."""
     generator = np.random.default_rng(7)
 
     def joint(name: str, kind: JointKind, mimic: Mimic | None = None) -> Joint:
@@ -36,7 +36,7 @@ def odd_tree() -> KinematicTree:
 
 
 def state(tree: KinematicTree, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Configurations, rates and their rates, (n, ...) each."""
+    """Return configurations, joint velocities and joint accelerations (n, ...)."""
     generator = np.random.default_rng(seed)
     q = generator.uniform(-2.0, 2.0, (n, tree.nq))
     at = tree.q_index[tree.joint_index("free")] + 3

@@ -46,7 +46,7 @@ class TreeOracle:
         return int(self.model.getFrameId(link, pin.FrameType.BODY))
 
     def placement(self, q: FloatArray, tip: str, base: str) -> FloatArray:
-        """(..., 4, 4) T_base_tip."""
+        """Return T_base_tip (..., 4, 4)."""
         poses = []
         for one in np.atleast_2d(q):
             pin.framesForwardKinematics(self.model, self.data, self.G @ one + self.offset)
@@ -55,7 +55,7 @@ class TreeOracle:
         return np.array(poses).reshape(*np.shape(q)[:-1], 4, 4)
 
     def jacobian(self, q: FloatArray, tip: str) -> FloatArray:
-        """(6, nv) Jacobian of `tip` in the root's frame, [linear; angular], LOCAL_WORLD_ALIGNED."""
+        """Return the Jacobian (6, nv) of `tip` in the root, [linear; angular], LOCAL_WORLD_ALIGNED."""
         pin.computeJointJacobians(self.model, self.data, self.G @ q + self.offset)
         pin.updateFramePlacements(self.model, self.data)
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -64,7 +64,7 @@ class TreeOracle:
         return np.asarray(J @ self.G)
 
     def acceleration(self, q: FloatArray, v: FloatArray, a: FloatArray, tip: str) -> FloatArray:
-        """(6,) classical acceleration of `tip`, [linear; angular], LOCAL_WORLD_ALIGNED."""
+        """Return the classical acceleration (6,) of `tip`, [linear; angular], LOCAL_WORLD_ALIGNED."""
         G = self.G
         pin.forwardKinematics(self.model, self.data, G @ q + self.offset, G @ v, G @ a)
         reference = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

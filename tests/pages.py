@@ -1,4 +1,4 @@
-"""A page of the documentation as a test sees it: blocks that are run in order, and what they print."""
+"""The blocks of a documentation page, which are run in order, and their outputs."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ _BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
 class Ran(NamedTuple):
-    """A block that was run, what the page shows below it, and what it printed."""
+    """A block that was run, the output on the page, and the printed output."""
 
     code: str
     shown: str
     printed: str
 
     def agrees(self) -> bool:
-        """Whether they are the same but for blanks and the signs of zeros; `...` stands for anything."""
+        """Whether the outputs are equal except for blanks and signs of zeros; `...` matches any text."""
         words = [re.escape(word) for word in tidy(self.shown)]
         pattern = " ".join(words).replace(re.escape("..."), ".*")
         return re.fullmatch(pattern, " ".join(tidy(self.printed)), re.DOTALL) is not None
 
 
 def tidy(text: str) -> list[str]:
-    """The words; a zero may print as -0, since its sign is rounding."""
+    """Return the words, without the signs of zeros, which depend on rounding."""
     return re.sub(r"-0\.(?![0-9])", " 0.", re.sub(r"[\[\]]", " ", text)).split()
 
 
 def pages() -> list[str]:
-    """Every page by its path below docs."""
+    """Return every page, by its path in docs."""
     return sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
 
 
 def blocks(page: str) -> list[tuple[str, str]]:
-    """Language and text of each block."""
+    """Return language and text of each block."""
     return _BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
 
 
 def run(page: str) -> Iterator[Ran]:
-    """Its Python in one namespace, its `$ urdfkin` lines in this process, in order."""
+    """Run the blocks in order: Python in one namespace, and lines `$ urdfkin` in this process."""
     namespace: dict[str, Any] = {}
     below = [*blocks(page)[1:], ("", "")]
     for (kind, text), (next_kind, next_text) in zip(blocks(page), below, strict=True):

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for trees whose joints stand in every awkward relation to each other."""
+"""Hypothesis strategies for trees in which consecutive joint axes have special relations."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 
 TURNS = np.array([0.0, math.pi / 2, math.pi, -math.pi / 2])
 
-#: How the next axis stands to the one before it.
+#: Relations of an axis to the previous axis.
 RELATIONS = (
     "skew", "square", "meeting", "parallel", "antiparallel", "collinear", "near", "near-anti", "coaxial-ish",
 )  # fmt: skip
 
-#: How many of them, from the first, have no tiny tilts or offsets.
+#: Number of relations, from the first one, without tiny tilts or offsets.
 TAME = 6
 
 tiny = st.integers(1, 12).map(lambda k: 10.0**-k)
@@ -27,7 +27,7 @@ any_length = st.one_of(tame_length, st.floats(-0.5, 0.5), tiny)
 
 
 def rotation(axis: str, angle: float) -> FloatArray:
-    """(4, 4) turn about a coordinate axis."""
+    """Return a rotation (4, 4) about a coordinate axis."""
     i = "xyz".index(axis)
     j, k = (i + 1) % 3, (i + 2) % 3
     T = np.eye(4)
@@ -40,12 +40,12 @@ def rotation(axis: str, angle: float) -> FloatArray:
 def z_joint(
     name: str, T: FloatArray | None = None, kind: JointKind = JointKind.REVOLUTE, **more: Any
 ) -> Joint:
-    """A joint with its axis along z, at T in its parent; `more` are its limit and its rule."""
+    """Return a joint with the axis z and the pose T in its parent; `more` are its limit and mimic rule."""
     return Joint(name, kind, 0, np.eye(4) if T is None else T, np.array([0.0, 0.0, 1.0]), **more)
 
 
 def shift(x: float, y: float, z: float) -> FloatArray:
-    """(4, 4) translation."""
+    """Return a translation (4, 4)."""
     T = np.eye(4)
     T[:3, 3] = x, y, z
     return T
@@ -53,7 +53,7 @@ def shift(x: float, y: float, z: float) -> FloatArray:
 
 @st.composite
 def step(draw: st.DrawFn, tame: bool = False) -> FloatArray:
-    """The constant pose from one joint's z-frame to the next one's; tame ones have no tiny numbers."""
+    """Return the pose from one joint's frame to the next joint's frame; with `tame`, without tiny numbers."""
     length = tame_length if tame else any_length
     relation = draw(st.sampled_from(RELATIONS[:TAME] if tame else RELATIONS))
     a, tilt = draw(length), 0.0
@@ -78,7 +78,7 @@ def step(draw: st.DrawFn, tame: bool = False) -> FloatArray:
 
 @st.composite
 def local_frame(draw: st.DrawFn) -> FloatArray:
-    """(4, 4) rotation: how a URDF's joint frame stands to its axis, z for the identity."""
+    """Return the rotation (4, 4) of a joint frame relative to its axis; for the identity, the axis is z."""
     if draw(st.booleans()):
         return np.eye(4)
     return rotation("x", draw(angle)) @ rotation("y", draw(angle)) @ rotation("z", draw(angle))
@@ -94,7 +94,7 @@ def trees(
     slides: bool = True,
     tame: bool = False,
 ) -> KinematicTree:
-    """A serial robot `l0 ... tip` of moving joints, with fixed joints strewn in."""
+    """Return a serial robot `l0 ... tip` of moving joints, with fixed joints between some of them."""
     joints, link, carried = list[tuple[Joint, str, str]](), "l0", np.eye(4)
     kinds = (JointKind.REVOLUTE, JointKind.CONTINUOUS, *[JointKind.PRISMATIC] * slides)
     for i in range(draw(st.integers(min_joints, max_joints))):
@@ -118,7 +118,7 @@ def trees(
 
 
 def configurations(n: int, count: int = 8, seed: int = 0) -> FloatArray:
-    """(count, n) configurations, the first of them zero."""
+    """Return configurations (count, n); the first one is zero."""
     q = np.random.default_rng(seed).uniform(-3.0, 3.0, (count, n))
     q[0] = 0.0
     return q

@@ -1,4 +1,4 @@
-"""Hypothesis strategies: rotations, and trees of every kind of joint that a URDF can hold."""
+"""Hypothesis strategies for rotations, and for trees with every joint kind of URDF."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ names = st.text(
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
-    """Rz(yaw) Ry(pitch) Rx(roll), by itself: not the code under test."""
+    """Return Rz(yaw) Ry(pitch) Rx(roll) without the tested code."""
     (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     x = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
     y = [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr]
@@ -38,7 +38,7 @@ rotations = st.builds(rotation, angles, angles, angles)
 
 @st.composite
 def poses(draw: st.DrawFn) -> FloatArray:
-    """(4, 4) poses."""
+    """Return a pose (4, 4)."""
     T = np.eye(4)
     T[:3, :3] = draw(rotations)
     T[:3, 3] = [draw(lengths) for _ in range(3)]
@@ -47,7 +47,7 @@ def poses(draw: st.DrawFn) -> FloatArray:
 
 @st.composite
 def axes(draw: st.DrawFn) -> FloatArray:
-    """(3,) unit vectors, those along a coordinate axis included."""
+    """Return a unit vector (3,), in some cases a coordinate axis."""
     coordinate_axis = draw(st.sampled_from([(0, 0, 1), (1, 0, 0), (0, -1, 0), None]))
     vector = np.array(coordinate_axis or draw(st.tuples(*[lengths] * 3)))
     length = float(np.linalg.norm(vector))
@@ -56,7 +56,7 @@ def axes(draw: st.DrawFn) -> FloatArray:
 
 @st.composite
 def limits(draw: st.DrawFn, kind: JointKind) -> Limit | None:
-    """Limits as a URDF can say them for a kind; infinite efforts and velocities need its version 1.2."""
+    """Return limits that URDF allows for a joint kind; infinite effort and velocity require URDF 1.2."""
     if kind not in AXIAL or (kind is JointKind.CONTINUOUS and draw(st.booleans())):
         return None
     magnitudes = st.one_of(st.floats(0.1, 100.0), st.just(math.inf))
@@ -71,7 +71,7 @@ def limits(draw: st.DrawFn, kind: JointKind) -> Limit | None:
 
 @st.composite
 def trees(draw: st.DrawFn, *, max_joints: int = 8, kinds: tuple[JointKind, ...] = ALL_KINDS) -> KinematicTree:
-    """Trees whose every link hangs from a link drawn before it."""
+    """Return a tree in which the parent of each link was drawn before the link."""
     count = draw(st.integers(0, max_joints))
     links = draw(st.lists(names, min_size=count + 1, max_size=count + 1, unique=True))
     joint_names = draw(st.lists(names, min_size=count, max_size=count, unique=True))

@@ -1,4 +1,4 @@
-"""The benchmark compares results before it times anything, and its figures are what it measured."""
+"""The benchmark compares results before it measures times, and prints the measured times."""
 
 import json
 import os

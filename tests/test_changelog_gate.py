@@ -1,4 +1,4 @@
-"""A branch that changes the package says so in the changelog; a checkout that cannot tell is let through."""
+"""A branch that changes the package must change the changelog; a checkout without history passes."""
 
 import shutil
 import subprocess
@@ -28,7 +28,7 @@ def commit(folder: Path, message: str, **files: str) -> None:
 
 @pytest.fixture
 def branch(tmp_path: Path) -> Path:
-    """A repository on a branch that has just left main."""
+    """Make a repository with a new branch."""
     folder = tmp_path / "here"
     folder.mkdir()
     git(folder, "init", "-b", "main")

@@ -1,4 +1,4 @@
-"""The program that compares results to the last bit finds a bit that differs, wherever it is."""
+"""The program that compares results to the last bit finds any changed bit."""
 
 from pathlib import Path
 from typing import Any

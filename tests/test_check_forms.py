@@ -1,4 +1,4 @@
-"""The script that runs every form on the catalogue: on a robot of it, and it sees what it should."""
+"""The script that checks all exported forms runs on one robot, and finds planted errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 @cache
 def talos_thumb() -> Subject:
-    """Four joints to turn, one that follows another which is not on the way."""
+    """Return four revolute joints; one of them mimics a joint that is not on the path."""
     robot = urdfkin.load("talos")
     return subject(robot, "talos", robot.dh("gripper_left_fingertip_1_link", "arm_left_5_link"))
 
@@ -46,7 +46,7 @@ def test_a_catalogue_robot_is_exported_in_every_format(form: str, tmp_path: Path
 
 def test_a_latex_table_is_as_wide_as_the_page_at_most(tmp_path: Path) -> None:
     texts = [export(urdfkin.load(name).dh(), "latex") for name in ("icub", "ur5")]
-    # What is not fitted is too wide: the compiler says so.
+    # Without scaling, the table is too wide, and LaTeX reports this.
     loose = [text.replace(r"\ifdim\width>\linewidth\linewidth\else\width\fi", r"\width") for text in texts]
     try:
         over = too_wide([*texts, *loose], tmp_path)

@@ -1,4 +1,4 @@
-"""The page of conventions says what the libraries do today, found by asking them."""
+"""The page of conventions agrees with the installed libraries."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The pages say what is so: every command, name, link, figure and answer."""
+"""Every command, name, link, number and answer of the pages is correct."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_the_layout_on_the_page_is_generated_from_the_schema() -> None:
 
 
 def commands() -> list[tuple[str, str]]:
-    """Every line that calls urdfkin, in blocks of shell and in the workflow's steps."""
+    """Return every line that calls urdfkin, in shell blocks and in the steps of the workflow."""
     found = []
     for page in PAGES:
         text = (ROOT / page).read_text("utf-8")
@@ -53,7 +53,7 @@ def test_every_command_on_the_pages_can_be_parsed(page: str, line: str) -> None:
     group = cli.make_context("urdfkin", ["--help"], resilient_parsing=True)
     command = cli.get_command(group, words[0])
     assert command is not None, (page, line)
-    command.make_context(words[0], words[1:], parent=group)  # raises what the command line would say
+    command.make_context(words[0], words[1:], parent=group)  # raises the command's error
 
 
 def test_the_pages_contain_commands() -> None:
@@ -81,7 +81,7 @@ def test_every_script_that_writes_a_page_is_run_by_make_docs() -> None:
     texts = {path.stem: path.read_text("utf-8") for path in (ROOT / "scripts").glob("*.py")}
     writers = {name for name, text in texts.items() if re.search(r"PAGE\.write_text|insert\(PAGE", text)}
     makers = {path.stem for path in (ROOT / "scripts").glob("make_*.py")}
-    assert run_by_make == writers | makers - {"make_pictures"}  # photographs need a browser
+    assert run_by_make == writers | makers - {"make_pictures"}  # screenshots need a browser
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_the_distances_of_the_catalogues_pairs_are_those_that_same_finds(pair: s
 
 
 def plain(text: str) -> str:
-    """Words with one blank between them."""
+    """Return the words of a text, separated by one blank."""
     return " ".join(re.sub(r"<[^>]+>", "", text).split())
 
 
@@ -154,7 +154,7 @@ def test_the_guide_and_the_finding_state_the_same_size() -> None:
 
 
 def leads_somewhere(name: str) -> bool:
-    """Whether a dotted name is a module, or something in one."""
+    """Return whether a dotted name is a module or a member of a module."""
     try:
         pkgutil.resolve_name(name)
     except (ImportError, AttributeError):
@@ -171,7 +171,7 @@ def test_every_name_and_file_of_urdfkin_on_a_page_exists(page: str) -> None:
     assert {file for file in files if not (ROOT / file).exists()} == set()
 
 
-# -- what newcomers are told exists: files of the worked examples, targets of make, commands of hooks --------
+# -- files of examples, targets of make, commands of hooks -----------------------------------------------
 
 
 GUIDE = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
@@ -278,7 +278,7 @@ def test_the_projects_own_robots_have_no_findings(path: Path) -> None:
     assert urdfkin.check(path) == []
 
 
-# -- the operations that the page on speed speaks of are those that the walk does, counted by doing them -----
+# -- the numbers of operations on the page about speed ---------------------------------------------------
 
 
 def counted(name: str, frame: str, quantity: str) -> int:

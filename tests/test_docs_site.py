@@ -1,4 +1,4 @@
-"""The documentation as a site: it builds without a warning, stands alone, and reads well in a browser."""
+"""The documentation site builds without a warning, works offline, and is readable in a browser."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ROOT = DOCS.parent
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built as `make site` builds it."""
+    """Build the site as `make site` does."""
     from mkdocs.commands.build import build
     from mkdocs.config import load_config
 
@@ -36,12 +36,12 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     logging.getLogger("mkdocs").setLevel(logging.WARNING)
     config = load_config(str(ROOT / "mkdocs.yml"), site_dir=str(folder), strict=True)
     config.plugins.on_startup(command="build", dirty=False)
-    build(config)  # strict: a link or heading that is not there ends it
+    build(config)  # with `strict`, a missing link or heading is an error
     return folder
 
 
 def documented() -> Iterator[tuple[str, object]]:
-    """Each name of the reference with the public members of its classes, and each function of an equation."""
+    """Yield the names of the reference with the public members of classes, and the equations' functions."""
     for name in re.findall(r"`(urdfkin\.kinematics\.[\w.]+)`", (DOCS / "equations.md").read_text("utf-8")):
         yield name, pydoc.locate(name)
     for _, _, names in LIBRARY.values():
@@ -127,7 +127,7 @@ def test_no_page_is_wider_than_a_phone(site: Path, desk: Browser) -> None:
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     with opened(tmp_path_factory.mktemp("profile")) as browser:
-        browser.chrome.get("about:blank")  # what a new tab asks for is none of ours
+        browser.chrome.get("about:blank")  # requests of a new tab are not from the page
         yield browser
 
 
@@ -148,7 +148,7 @@ def test_the_pages_of_commands_and_library_contain_every_name() -> None:
 
 
 def _documented() -> list[str]:
-    """The full path of each name on the pages of the library, and of each public member of a class there."""
+    """Yield the full path of each name on the library pages, and of each public member of its classes."""
     found = []
     for name in " ".join(names for _, _, names in LIBRARY.values()).split():
         path = address(name)
@@ -162,7 +162,7 @@ def _documented() -> list[str]:
 
 @pytest.mark.parametrize("path", _documented())
 def test_each_name_in_the_reference_has_an_example(path: str) -> None:
-    """Doctests are run with the package's other tests."""
+    """The doctests run with the other tests of the package."""
     module, _, own = path.rpartition(".")
     assert ">>> " in (inspect.getdoc(inspect.getattr_static(pydoc.locate(module), own)) or "")
 

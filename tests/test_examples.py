@@ -1,4 +1,4 @@
-"""Every example runs as it stands, from any folder, prints something, and is short and numbered."""
+"""Every example runs unchanged in any folder, prints a result, is short, and has a number."""
 
 import ast
 import runpy

@@ -1,4 +1,4 @@
-"""The fuzzer makes the same mutants each time, survives its workers, and would notice what it looks for."""
+"""The fuzzer makes the same mutants in each run, survives crashed workers, and detects planted errors."""
 
 import os
 import re
@@ -78,7 +78,7 @@ def test_the_robots_are_distributed_over_the_families() -> None:
 
 @pytest.mark.long
 def test_every_mutation_is_used_and_nearly_all_change_the_file() -> None:
-    files = [path for path in fuzz.files() if path.stat().st_size < 20_000]  # the large are no other
+    files = [path for path in fuzz.files() if path.stat().st_size < 20_000]  # small files suffice
     originals = {path.stem: path.read_bytes() for path in files}
     used, changed = set(), 0
     for number in range(1000):

@@ -1,4 +1,4 @@
-"""What would kill the process is not asked of Pinocchio, and the result says that it was not checked."""
+"""A call that would crash Pinocchio is not made, and the result states that it was not checked."""
 
 import threading
 
@@ -23,7 +23,7 @@ def chain(count: int, kind: JointKind = JointKind.FIXED) -> KinematicTree:
 @pytest.mark.slow
 @pytest.mark.parametrize("where", ["main thread", "another thread"])
 def test_a_chain_too_deep_for_the_stack_is_verified(where: str) -> None:
-    """Pinocchio's parser kills a process at about 3,800 links, at 480 on a thread with 1 MB of stack."""
+    """Pinocchio's parser crashes at about 3,800 links, or at 480 links in a thread with 1 MB of stack."""
     robot = urdfkin.load(to_urdf(chain(5_000)))
     answers = []
 
@@ -57,7 +57,7 @@ def test_validate_reports_robots_that_cannot_be_verified() -> None:
 
 @pytest.mark.parametrize("kind", [JointKind.FLOATING, JointKind.PLANAR])
 def test_a_file_with_a_root_named_universe_is_verified(kind: JointKind) -> None:
-    """The names are those of a hung robot, but nobody hung it."""
+    """The robot has the names that urdfkin gives to an added root joint, but urdfkin has added none."""
     text = to_urdf(with_root_joint(chain(2), kind))
     robot = loaded(text)
     robot.placement(robot.sample(2, seed=0), "l2")

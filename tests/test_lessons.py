@@ -1,4 +1,4 @@
-"""The lessons as notebooks in Jupyter's kernel: they print what they show, and objects show themselves."""
+"""The lessons run as notebooks in Jupyter's kernel, with the outputs of the pages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if not os.environ.get("CI"):  # there it must be
     pytest.importorskip("ipykernel")
 
 LESSONS = [page for page in pages() if page.startswith("lessons/")]
-#: What the last line of a cell shows, with words that are in it.
+#: The object that the last line of a cell displays, with words of its output.
 SHOWN = {
     "import urdfkin; robot = urdfkin.load('panda'); J = robot.jacobian('ready', 'panda_hand')": (),
     "robot": ("panda_joint4", "-3.0718"),
@@ -40,7 +40,7 @@ def code(source: str) -> Cell:
 
 
 def executed(cells: list[Cell], home: Path) -> list[Cell]:
-    """The cells as a kernel leaves them, which keeps its things in a folder of its own."""
+    """Run a notebook in a kernel with its own folder, and return the cells."""
     nbformat, client = (import_module(name) for name in ("nbformat", "nbclient"))  # without types
     book = nbformat.reads(json.dumps(notebook("") | {"cells": cells}), as_version=4)
     client.NotebookClient(book, timeout=300, resources={"metadata": {"path": str(home)}}).execute()
@@ -49,7 +49,7 @@ def executed(cells: list[Cell], home: Path) -> list[Cell]:
 
 
 @pytest.mark.long
-@pytest.mark.filterwarnings("ignore")  # the client's
+@pytest.mark.filterwarnings("ignore")  # of the client
 def test_the_lessons_run_in_a_notebook_and_objects_are_displayed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

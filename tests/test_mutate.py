@@ -1,4 +1,4 @@
-"""The script that makes slips makes each of them, the same ones each time, where the program really runs."""
+"""The script that makes mutants makes the same mutants in each run, in code that runs."""
 
 import ast
 import hashlib
@@ -98,7 +98,7 @@ def test_a_mutant_without_a_test_survives_and_one_with_a_test_is_detected(
     assert evaluate(mutant, timeout=100.0).word == word
 
 
-#: Parts of earlier versions.
+#: Names of former parts of the package.
 GONE = ("verification", "judge", "keeping")
 
 #: Parts of the package whose mutants are tested quickly, and on which all reports depend.

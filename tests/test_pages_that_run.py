@@ -1,4 +1,4 @@
-"""The pages run, print what they say, and say of other libraries what is so."""
+"""The code of the pages runs with the printed output; statements about other libraries are correct."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PAGE = (DOCS / "accelerations.md").read_text(encoding="utf-8")
 Q, V, A = np.array([np.pi / 2.0, 0.5]), np.array([2.0, 0.3]), np.zeros(2)
 
 
-#: Pages whose blocks other tests run, or that need what a test must not have.
+#: Pages whose blocks other tests run, or whose blocks cannot run in a test.
 ELSEWHERE = {
     "check.md": "tests/cli/test_check_in_a_repository.py",
     "dh.md": "tests/cli/test_dh.py",
@@ -33,9 +33,9 @@ ELSEWHERE = {
 }
 
 
-#: Pages that show files, and programs that are run on their own.
+#: Pages that show files, and pages with programs that run separately.
 WITH_FILES = {"calibration.md": pytest.mark.slow, "dh-at-work.md": pytest.mark.long}
-#: The first line of a file that a page shows has its name, as a comment of whatever kind.
+#: Pattern of the first line of a file on a page: a comment with the file's name.
 NAMED = re.compile(r"\A(?:#|%|<!--)\s*(\S+\.\w+)")
 
 
@@ -45,12 +45,12 @@ def runs(page: str) -> bool:
 
 
 def loose(text: str) -> str:
-    """Without the blanks at the ends of lines."""
+    """Return a text without blanks at the ends of lines."""
     return re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
 
 
 def pattern(shown: str) -> re.Pattern[str]:
-    """Output as a page shows it: `...` stands for anything."""
+    """Return the pattern of an output on a page, in which `...` matches any text."""
     return re.compile(".*?".join(map(re.escape, loose(shown).strip("\n").split("..."))), re.DOTALL)
 
 
@@ -95,7 +95,7 @@ def test_each_block_prints_the_output_below_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with np.printoptions(), warnings.catch_warnings():
-        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # examples of what is warned of
+        warnings.simplefilter("ignore", urdfkin.UrdfWarning)  # examples of mistakes
         for block in run(page):
             assert block.agrees(), f"{block.code}\n{block.printed}"
 
@@ -107,7 +107,7 @@ def test_a_page_that_another_test_runs_is_named_in_that_test(page: str) -> None:
 
 
 def rows(library: str) -> list[tuple[str, FloatArray]]:
-    """What the table says of a library: the call and the bead's numbers."""
+    """Yield the call and the bead's numbers of a library in the table."""
     found, owner = [], ""
     for line in PAGE.splitlines():
         cells = [cell.strip() for cell in line.split("|")[1:-1]]
@@ -164,7 +164,7 @@ def test_the_statements_about_mujoco_are_true() -> None:
 
 
 def table_rows(heading: str) -> list[list[str]]:
-    """The rows of a table of docs/coming-from.md: what stands between backticks in each cell."""
+    """Return the rows of a table of docs/coming-from.md: the code in each cell."""
     section = (DOCS / "coming-from.md").read_text("utf-8").split(f"\n## {heading}")[1].split("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("| ")][1:]
     return [re.findall(r"`([^`]+)`", line) for line in lines]
@@ -185,13 +185,13 @@ def test_the_pinocchio_code_and_the_urdfkin_code_give_the_same_result() -> None:
 
 
 def own_robot() -> dict[str, object]:
-    """What the Robotics Toolbox's table calls so."""
+    """Return the robot that the table about the Robotics Toolbox names."""
     robot = urdfkin.load("elbow")
     q, v = np.linspace(-0.6, 0.9, robot.nq), np.linspace(1, -1, robot.nv)
     return {"np": np, "urdfkin": urdfkin, "robot": robot, "path": str(robot.path), "q": q, "v": v}
 
 
-@pytest.mark.filterwarnings("ignore")  # the other library's
+@pytest.mark.filterwarnings("ignore")  # code of the other library
 def test_the_robotics_toolbox_code_and_the_urdfkin_code_give_the_same_result() -> None:
     rtb = pytest.importorskip("roboticstoolbox")
     ours = own_robot()

@@ -1,4 +1,4 @@
-"""The page about speed shows the figures that were measured, each at its place, and nothing typed by hand."""
+"""The page about speed contains the measured numbers at the right places, and no other numbers."""
 
 import json
 import re

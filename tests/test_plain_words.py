@@ -1,4 +1,4 @@
-"""Text that people read avoids the words that readers did not understand."""
+"""Pages, docstrings, comments and messages avoid words that readers did not understand."""
 
 from __future__ import annotations
 

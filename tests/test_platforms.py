@@ -1,4 +1,4 @@
-"""The parts that use Linux have another way on systems without it; macOS itself is tested in CI only."""
+"""Code for Linux has an alternative for other systems; only CI tests macOS."""
 
 from __future__ import annotations
 

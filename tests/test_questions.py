@@ -1,4 +1,4 @@
-"""The page of questions answers what people ask, and what a message leads to is there."""
+"""The page of questions has correct answers, and every section that a message names exists."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ AXES = QuestionsSection.AXES.value
 
 
 def _typed(*words: str) -> Callable[[], str]:
-    """What a command prints, with its message if it fails."""
+    """Return the output of a command, with the message if it fails."""
     return lambda: (done := run(*words)).text + done.err
 
 
 def _raised(call: Callable[[], object]) -> Callable[[], str]:
-    """The message of what a call raises."""
+    """Return the message of the exception that a call raises."""
 
     def message() -> str:
         with pytest.raises(UrdfkinError) as raised:
@@ -68,7 +68,7 @@ def _warned(act: Callable[[], object]) -> str:
     return str(caught[0].message)
 
 
-#: What leads to each question: a message or a page.
+#: For each question: the message or the page that names it.
 ASKED: dict[QuestionsSection, list[Callable[[], str]]] = {
     QuestionsSection.REFERENCE_FRAMES: [
         _raised(lambda: _ur5().jacobian(np.zeros(6), "tool0", "body")),
@@ -137,7 +137,7 @@ def test_messages_about_common_mistakes_name_an_existing_section(
 
 
 def test_a_message_names_the_section_of_each_common_problem() -> None:
-    """Nothing is said where calls come in any order; a file's errors say their codes, which explain takes."""
+    """No message names `stale-data`; messages about errors in a file contain the codes of findings instead."""
     led = {question.value for question in ASKED}
     assert set(list(answers())[1:16]) - led == {"stale-data", "errors-in-a-file"}
 
@@ -145,13 +145,13 @@ def test_a_message_names_the_section_of_each_common_problem() -> None:
 def test_one_word_is_enough_to_find_a_question() -> None:
     for words, topic in (("mimic", "mimic-joints"), ("Meshes", "packages-and-meshes"), ("unit axes", AXES)):
         assert answer_to(words) == answers()[topic]
-    assert answer_to("frames") is None  # two have it
+    assert answer_to("frames") is None  # two messages name the question
     assert answer_to("") is None
     assert run("explain", "mimic").text.startswith("Mimic joints\n")
     assert run("explain", "frames").code == 2
 
 
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # one answer is about what is warned of
+@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # one answer is about a warning
 @pytest.mark.parametrize("topic", answers())
 def test_an_answer_on_a_terminal_is_wrapped_and_its_code_runs(topic: str) -> None:
     shown = as_text(answers()[topic])
@@ -172,7 +172,7 @@ def test_every_link_to_a_question_points_to_an_existing_one() -> None:
 
 
 def test_the_most_frequent_questions_come_first() -> None:
-    """The fifteen pains that came up most in public trackers, in their order, and what else was asked."""
+    """The page begins with the fifteen most frequent problems in public issue trackers, in this order."""
     assert list(answers())[1:16] == [
         *("reference-frames", "two-accelerations", "joint-order", "continuous-joints", "mimic-joints"),
         *("packages-and-meshes", "urdf-to-dh", "which-dh-convention", "dh-and-urdf-disagree"),

@@ -1,4 +1,4 @@
-"""A robot hands out what was checked, refuses clearly, and says how to compute it again."""
+"""A robot returns checked results; an error is clear, and states how to reproduce the result."""
 
 import inspect
 import io

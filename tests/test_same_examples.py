@@ -1,4 +1,4 @@
-"""Properties are tried on the same examples in every run, whatever else has been imported."""
+"""Property tests have the same examples in every run, independent of the imported modules."""
 
 import os
 import subprocess

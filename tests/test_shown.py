@@ -1,4 +1,4 @@
-"""Objects display safely in a terminal, a notebook, Markdown and LaTeX, whatever names a file has."""
+"""Objects are displayed safely in a terminal, a notebook, Markdown and LaTeX, for all names in a file."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def test_a_robots_view_is_a_page_in_its_own_frame(robot: Robot) -> None:
         robot.view(robot.sample(2))
 
 
-# -- the public face -------------------------------------------------------------------------------------
+# -- public names --------------------------------------------------------------------------------------
 
 
 def test_limits_joints_and_frames_are_those_of_the_file(robot: Robot) -> None:

@@ -1,4 +1,4 @@
-"""Where somebody starts: the README, the page Start, the first five minutes and the tour."""
+"""The README, the page "Start" and the tour are correct, and a user's first steps work."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from urdfkin.model.tree import FloatArray
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
-#: The robot of the page "Start", whose file they have.
+#: The robot of the page "Start".
 OWN = re.search(r'"""(<robot.*?</robot>)"""', blocks("index.md")[1][1], re.DOTALL)
-POSE = np.radians([30.0, 90.0])  # Pinocchio's order: the shoulder first, as it is a chain
+POSE = np.radians([30.0, 90.0])  # Pinocchio's order in this chain begins with the shoulder
 
 
 @pytest.fixture
@@ -74,17 +74,17 @@ def test_why_their_pinocchio_numbers_differ_is_the_first_answer_and_its_example_
     assert names["agrees"] == (True, True)
 
 
-# -- the README is true: its example runs, its commands exist, its transcripts are the real output -----------
+# -- the README: its example, its commands and their output ----------------------------------------------
 
 
 def block(language: str, page: str = README) -> str:
-    """The first fenced block of a language."""
+    """Return the first code block of a language."""
     blocks: list[str] = re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
     return blocks[0]
 
 
 def transcripts() -> list[tuple[list[str], list[str]]]:
-    """Each command of the console blocks, as words, and the lines it prints."""
+    """Yield each command of the console blocks, and the lines of its output."""
     found: list[tuple[list[str], list[str]]] = []
     for text in re.findall(r"```console\n(.*?)```", README, re.DOTALL):
         for line in text.splitlines():
@@ -96,7 +96,7 @@ def transcripts() -> list[tuple[list[str], list[str]]]:
 
 
 def masked(text: str) -> str:
-    """A text without the disagreements, which differ between machines."""
+    """Return a text without the disagreements, which differ between machines."""
     varying = r"worst (error |disagreement )?\S+|\S+% of|Pinocchio \S+|\d\S* of the bound"
     return re.sub(varying, "", text).strip()
 
@@ -142,10 +142,10 @@ def test_each_transcript_is_the_real_output(tmp_path: Path, monkeypatch: pytest.
         assert len(printed) == len(wanted) or expected[-1] == "...", words
 
 
-# -- the first five minutes: one's own robot's Jacobian, its table, and why Pinocchio's numbers differ -------
+# -- first steps with an own robot -----------------------------------------------------------------------
 
 
-#: Somebody's own: joints are not in alphabetical order, a wheel turns without end.
+#: A user's robot with a continuous wheel; its joints are not in alphabetical order.
 MINE = robot_text(
     joint("turntable", "continuous", "floor", "column"),
     joint("shoulder", "revolute", "column", "upper", 'xyz="0 0 0.4"', "0 1 0", limit(-2, 2)),
@@ -195,7 +195,7 @@ def test_a_new_user_finds_why_pinocchios_numbers_differ(mine: Path) -> None:
     assert "not the order of the file" in page
 
 
-# -- docs/tour.md runs, prints what it says, and has its pictures --------------------------------------------
+# -- docs/tour.md ----------------------------------------------------------------------------------------
 
 
 TOUR = (DOCS / "tour.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The page of defects of other libraries: each program shows its defect, until a version mends it."""
+"""Each program on the page about other libraries shows its defect, until a version fixes it."""
 
 from __future__ import annotations
 

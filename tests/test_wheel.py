@@ -1,4 +1,4 @@
-"""A wheel, installed away from the checkout, does the main job with the robots it brings."""
+"""A wheel that is installed outside the checkout computes with the robots in the wheel."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parent.parent
 
 
 def run(*command: str | Path, cwd: Path) -> str:
-    """What a command prints; it sees neither the checkout nor the tests' paths."""
+    """Return the output of a command that has no access to the checkout or the paths of the tests."""
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     how: dict[str, Any] = {"cwd": cwd, "env": environment, "capture_output": True, "text": True}
     done = subprocess.run([*map(str, command)], check=False, **how)
@@ -24,7 +24,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 @pytest.fixture(scope="module")
 def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A virtual environment that holds the wheel; the libraries it needs are lent by this one's."""
+    """Make a virtual environment with the wheel and the libraries of this environment."""
     folder = tmp_path_factory.mktemp("elsewhere")
     pip = [sys.executable, "-m", "pip"]
     run(*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", folder, ROOT, cwd=folder)

@@ -1,1 +1,1 @@
-"""What attacks on urdfkin found, each as a claim that failed once: files, names, numbers, signals, people."""
+"""Attacks on urdfkin by files, names, numbers and signals; each claim of these tests failed once."""

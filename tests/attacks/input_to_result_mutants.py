@@ -89,7 +89,7 @@ URDF = (
 )
 
 
-#: What its coordinates are called, in order.
+#: Names of the robot's coordinates, in order.
 COORDINATES = (
     "b", "slide", "turn", *(f"free.{x}" for x in ("x", "y", "z", "qx", "qy", "qz", "qw")),
     *(f"table.{x}" for x in ("x", "y", "angle")),
@@ -168,7 +168,7 @@ def blind() -> list[str]:
     warnings.simplefilter("ignore")
     found = []
     for name, compute in results():
-        if name in UNCOUNTED:  # nothing but the check itself could tell
+        if name in UNCOUNTED:  # only the check itself can find this error
             continue
         robot = misread()
         try:
@@ -201,7 +201,7 @@ def outcome(right: dict[str, FloatArray] | None) -> tuple[str, dict[str, FloatAr
             continue
         if right is not None and not _alike(found[name], right[name]):
             if robot.verifier.cannot() or not (robot.certificate().verified or name in UNCOUNTED):
-                words.add("caught")  # found at the door: the result is handed out as not verified
+                words.add("caught")  # the result is returned as not verified
             else:
                 wrong.append(name)
     if wrong:
@@ -213,7 +213,7 @@ def _alike(x: FloatArray, y: FloatArray) -> bool:
     return x.shape == y.shape and bool((np.abs(x - y) <= TOLERANCE * max(1.0, float(np.abs(y).max()))).all())
 
 
-# -- making a slip -----------------------------------------------------------------------------------
+# -- making a mutant ---------------------------------------------------------------------------------
 
 
 def _codes(code: types.CodeType) -> Iterator[tuple[str, types.CodeType]]:

@@ -35,7 +35,7 @@ def ur5() -> Robot:
 
 @pytest.fixture(scope="module")
 def free() -> Robot:
-    """A body that stands and turns as it likes: q is its place and quaternion."""
+    """Return a robot with a floating joint; q is its position and quaternion."""
     return urdfkin.load(FREE, root_joint="floating")
 
 
@@ -123,7 +123,7 @@ def test_near_the_singularity_the_analytical_jacobian_is_verified_and_the_bound_
             free.analytical_jacobian(q, "body", name, nearest=0.0)
         except RepresentationSingularityError:
             assert distance < 1e-12
-        # Nobody is told that this was checked.
+        # This result is not counted as checked.
         assert np.isfinite(free.analytical_jacobian(q, "body", name, nearest=0.0, verify=False)).all()
     assert next(x for x in free.certificate().lines if x.quantity == "analytical jacobian").share < 0.5
 
@@ -185,7 +185,7 @@ def test_the_line_of_nodes_is_independent_code_and_quaternion_rates_preserve_the
 
 # -- mutants -----------------------------------------------------------------------------------------
 
-#: Names that are easily confused, and what is written instead.
+#: Names that are easily confused, each with its replacement in a mutant.
 OTHER_NAMES = {
     "cos": "sin", "sin": "cos", "arctan2": "hypot", "cosine": "sine", "sine": "cosine", "first": "second",
     "second": "third", "third": "first", "other": "first", "along": "across", "across": "along",
@@ -193,7 +193,7 @@ OTHER_NAMES = {
 
 
 def mutants(source: str, called: Collection[str]) -> Iterator[tuple[str, ast.Module]]:
-    """Every module that differs in one node of a function that is called, with words on where."""
+    """Yield every module with one changed node in a called function, and a description of the change."""
     right = ast.parse(source)
     for number, slip in enumerate(slips(right)):
         if function_at(right, slip.line) in called:
@@ -211,7 +211,7 @@ def outcome(robot: Robot, q: FloatArray, representation: str) -> FloatArray | No
     before = sum(line.unchecked for line in robot.certificate().lines)
     try:
         J = robot.analytical_jacobian(q, "tool0", representation)
-    except Exception:  # whatever a mutant raises: it hands out nothing
+    except Exception:  # a mutant that raises an error returns no result
         return None
     return J if sum(line.unchecked for line in robot.certificate().lines) == before else None
 
@@ -255,4 +255,4 @@ def test_no_mutant_gives_a_wrong_verified_result(ur5: Robot, name: str) -> None:
     rotation._sequence.cache_clear()
     assert wrong == []
     assert tried > 10
-    assert caught > 0.5 * tried  # the rest computes the same: a check of inputs, a tie, a type
+    assert caught > 0.5 * tried  # other mutants change only a check of inputs, a tie or a type

@@ -1,4 +1,4 @@
-"""A comparison says what it fitted, what it did not compare, and which cell is wrong by how much."""
+"""A comparison states the fitted parameters, the cells not compared, and the error of a wrong cell."""
 
 import json
 import re
@@ -33,7 +33,7 @@ def test_a_wrong_d1_is_reported_in_millimetres_with_and_without_a_fit() -> None:
     path, table = published("ur5")
     wrong = with_cells(table, 0, d=table.rows[0].d + 0.01)
     found = compare(path, wrong)
-    assert found.agrees  # with a base fitted, it does
+    assert found.agrees  # the table agrees after a fit of the base
     assert not found.as_written
     assert found.written_metres == pytest.approx(0.01, rel=1e-6)
     assert found.base.metres == pytest.approx(0.01, rel=1e-6)
@@ -147,7 +147,7 @@ def test_cells_that_differ_are_sorted_by_the_effect_on_the_tip() -> None:
 def test_a_difference_within_the_last_digit_is_distinguished_from_a_larger_one(
     written: str, is_rounding: bool, suffix: str, tmp_path: Path
 ) -> None:
-    """UR5's d5 is 0.09465."""
+    """The cell d5 of the UR5 is 0.09465."""
     lines = (
         "0,pi/2,0.089159,0", "-0.425,0,0,0", "-0.39225,0,0,0", "0,pi/2,0.10915,0", f"0,-pi/2,{written},0",
         "0,0,0.0823,0",

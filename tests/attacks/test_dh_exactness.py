@@ -1,4 +1,4 @@
-"""A table is the robot to rounding, or says by how much it is not; an idle option is an error."""
+"""A table has the robot's poses up to rounding, or states its error; an option without effect is an error."""
 
 import math
 import re
@@ -28,12 +28,12 @@ from urdfkin.urdf.writer import to_urdf
 from urdfkin.urdf.xacro import arguments_of
 from urdfkin.verify.tables import TableCheck, TableError
 
-#: A file that writes a right angle with twelve digits: 2.07e-13 rad off, between parallel axes 0.1 m apart.
+#: A right angle with twelve digits, an error of 2.07e-13 rad; the parallel axes are 0.1 m apart.
 TWELVE_DIGITS = math.pi - 3.14159265359
 
 
 def leaning(tilt: float) -> KinematicTree:
-    """Four joints, the second and third parallel but for a tilt across their offset."""
+    """Return an arm of four joints; the axes of joints 2 and 3 are parallel except for a tilt."""
     return arm(
         shift(0, 0, 0.3),
         shift(0.05, 0.02, 0.1) @ rotation("x", math.pi / 2),
@@ -44,7 +44,7 @@ def leaning(tilt: float) -> KinematicTree:
 
 
 def text_of(tree: KinematicTree) -> str:
-    """The URDF of an arm, its joints without limits."""
+    """Return the URDF of an arm without joint limits."""
     joints = (replace(one, kind=JointKind.CONTINUOUS) if one.kind.turns else one for one in tree.joints)
     return to_urdf(replace(tree, joints=tuple(joints)))
 
@@ -95,7 +95,7 @@ def test_a_wrong_strict_table_with_very_long_rows_is_a_disagreement() -> None:
 
 
 def rack(multiplier: float) -> str:
-    """A slide, a joint that turns with it, and one that turns alone, all askew."""
+    """Return a prismatic joint, a revolute joint that mimics it, and another revolute joint, all oblique."""
     origin, follows = 'xyz="0.1 0.2 0.3" rpy="{} 0.4 0.5"', mimic("rack", multiplier) + limit(-100000, 100000)
     return robot(
         joint("rack", "prismatic", "a", "b", origin.format(0.3), "0.6 0 0.8", limit()),
@@ -130,7 +130,7 @@ def test_a_wrong_multiplier_in_a_table_is_detected(multiplier: float) -> None:
 
 
 def demand_a_plain_table(tree: KinematicTree, near_parallel: str) -> DHTable:
-    """A table without beta and without kilometres, that is the robot to rounding."""
+    """Demand a table without beta and without kilometres that has the robot's poses up to rounding."""
     robot = robot_of(tree)
     table = robot.dh("tip", "l0", near_parallel=near_parallel)
     assert not table.has_hayati_rows
@@ -271,7 +271,7 @@ def test_an_unknown_xacro_argument_is_an_error_that_names_the_similar_one(xacro:
 
 
 def lost(text: str) -> tuple[float, ...]:
-    """Metres measured and guaranteed, as the line says; of a whole tree, the measured ones alone."""
+    """Return the measured and, except for a tree, the guaranteed error (m) of a printed line."""
     (line,) = (line for line in text.splitlines() if line.startswith("printed with"))
     of_a_table = re.search(r"within (\S+) m of its exact .* the proven bound is (\S+) m", line)
     return tuple(map(float, present(of_a_table or re.search(r"within (\S+) m", line)).groups()))
@@ -316,7 +316,7 @@ def test_the_rounding_error_of_printed_digits_is_within_the_stated_bound(
 
 
 def test_the_stated_rounding_error_is_the_distance_to_the_printed_table() -> None:
-    """Cells as `--digits 3 --millimetres --degrees` prints them, typed in again."""
+    """The table is parsed from the output of `--digits 3 --millimetres --degrees`."""
     table = urdfkin.load("ur10").dh("tool0", "base", snap=1e-6)
     text = command("dh ur10 --base base --tip tool0 --snap 1e-6 --digits 3 --millimetres --degrees").text
     lines = [line.split() for line in text.splitlines() if re.match(r"\d  ", line)]

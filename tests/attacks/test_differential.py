@@ -132,7 +132,7 @@ def some_odd_pieces(choose: random.Random) -> bytes:
 
 
 def every_odd_piece() -> Iterator[bytes]:
-    """Each piece alone among plain ones, for each kind of joint and each version that counts."""
+    """Yield texts with one unusual piece, for each kind of joint and each URDF version."""
     plain = {slot: pieces[0] for slot, pieces in SLOTS.items()}
     for kind in SLOTS["kind"][:6]:
         for version in ("", ' version="1.1"', ' version="1.2"'):

@@ -85,7 +85,7 @@ def test_a_command_ends_silently_with_exit_code_141_if_the_pipe_is_closed(words:
     assert (code, err) == (141, "")
 
 
-# -- what the terminal is like -----------------------------------------------------------------------------
+# -- properties of the terminal ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("columns", ["", "abc", "0", "-5", "1_0", "1e3", "9999", "7", "1"])
@@ -114,7 +114,7 @@ ASCII = (
 def test_names_of_any_script_are_printed_on_any_terminal(words: str, env: dict[str, str], arm: Path) -> None:
     code, out, err = shell(f"$URDFKIN {words} arm.urdf", arm.parent, **env)
     assert code == 0, err
-    assert out or "github" in words  # which has nothing to say of a good file
+    assert out or "github" in words  # the command prints nothing about a correct file
 
 
 @pytest.mark.parametrize("form", ["terminal", "latex", "toml", "csv", "urdf", "c"])
@@ -194,10 +194,10 @@ def test_a_pipe_without_a_writer_is_refused_and_reading_ends_at_the_limit(
 def test_a_named_pipe_with_a_slow_writer_is_read_completely(pause: float, tmp_path: Path) -> None:
     path = tmp_path / "pipe"
     os.mkfifo(path)
-    content = bytes(range(256)) * 1000  # more than a pipe holds
+    content = bytes(range(256)) * 1000  # more than the buffer of a pipe
 
     def write() -> None:
-        with path.open("wb") as pipe:  # waits for the reader
+        with path.open("wb") as pipe:  # the command waits for the reader
             threading.Event().wait(pause)
             pipe.write(content[:100])
             pipe.flush()

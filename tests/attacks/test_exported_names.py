@@ -87,7 +87,7 @@ def test_the_self_check_of_an_exported_file_passes_with_any_names(robot: Robot, 
     assert "hacked" not in scope
 
 
-@pytest.mark.long  # a compiler takes seconds for each header
+@pytest.mark.long  # compiling each header takes seconds
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
 def test_the_cuda_header_declares_only_the_exported_functions(robot: Robot, tmp_path: Path) -> None:
     written = code(robot, quantities=("placement",))

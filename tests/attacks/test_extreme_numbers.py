@@ -83,7 +83,7 @@ def test_results_for_inputs_of_any_size_are_verified_or_raise_range_error(
     base = BaseMotion(*fields) if moving else None
     beyond = everything(robot, q, v, a, base)
     used = sizes if moving else sizes[:3]
-    if max(used) < 75:  # Then no product of three or four inputs overflows.
+    if max(used) < 75:  # With inputs of this size, no product of three or four inputs overflows.
         assert beyond == 0
 
 

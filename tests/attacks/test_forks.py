@@ -1,6 +1,6 @@
-"""A forked child computes, whatever threads and locks its parent had: a fork copies neither as it should.
+"""A forked child process can compute, although a fork copies no threads and may copy locked locks.
 
-Each case is a process of its own: Python warns of forks beside threads, and a child that hangs must be ended.
+Each case runs in its own process, because Python warns of forks beside threads, and a child may hang.
 """
 
 import textwrap
@@ -11,7 +11,7 @@ import pytest
 import urdfkin
 from tests.cli.running import python
 
-#: Fork, let the child do `child()`, and say how it ended; one that hangs is ended after a while.
+#: Fork, run `child()` in the child, and print its exit status; a child that hangs is killed after a timeout.
 HARNESS = """
 import os, signal, sys, threading, time, warnings
 warnings.simplefilter("ignore")
@@ -184,7 +184,7 @@ def test_a_forked_child_process_computes(case: str) -> None:
 
 
 def test_every_lock_and_pool_of_the_package_is_listed_as_safe_for_forks() -> None:
-    """A new lock or pool has to say what a fork does to it; those of a validation end with its run."""
+    """A new lock or pool must be listed here; locks of a validation end with the run."""
     made = ("threading.Lock(", "threading.RLock(", "default_factory=threading", "ThreadPoolExecutor(")
     package = Path(str(urdfkin.__file__)).parent
     found = {
@@ -195,6 +195,6 @@ def test_every_lock_and_pool_of_the_package_is_listed_as_safe_for_forks() -> Non
     }
     assert found == {
         "system/locks.py: threading.RLock",
-        "compiled/evaluate.py: ThreadPoolExecutor",  # forgotten in the child
-        "view/viewer.py: threading.RLock",  # a server that does not fork
+        "compiled/evaluate.py: ThreadPoolExecutor",  # the child creates a new pool
+        "view/viewer.py: threading.RLock",  # this server never forks
     }

@@ -52,7 +52,7 @@ def grows_like_its_size(work: Callable[[int], object], size: int) -> None:
     with at_most(ENOUGH):
         small = min(seconds(size) for _ in range(2))
         large = seconds(4 * size)
-        if large >= TIMES * small + MORE:  # once more: it may have been the machine
+        if large >= TIMES * small + MORE:  # measure again, because the machine may have been busy
             large = min(large, seconds(4 * size))
     assert large < TIMES * small + MORE, (small, large)
 

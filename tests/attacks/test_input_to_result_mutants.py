@@ -39,7 +39,7 @@ FRAGMENTS = [
     ("model.configuration_like", "return {at + k: x[..., k] for k in range(size)}",
      "return {at + k: x[..., -1 - k] for k in range(size)}"),
     ("model.configuration_like", "            out[..., i] = x\n", "            out[..., i - 1] = x\n"),
-    # configurations, coordinates, followers
+    # configurations, coordinates, mimic joints
     ("model.configuration", "quaternion[...] = unit_quaternions(", "_ = unit_quaternions("),
     ("kinematics.rotation", "normalised: FloatArray = quat / norms",
      "normalised: FloatArray = quat * norms"),
@@ -118,7 +118,7 @@ def test_each_listed_mutant_between_input_and_result_is_detected(
 def test_no_random_mutant_gives_a_wrong_verified_result_or_disables_the_check(
     right: dict[str, FloatArray], seed: int
 ) -> None:
-    # All of them: python -m tests.attacks.input_to_result_mutants
+    # python -m tests.attacks.input_to_result_mutants runs all mutants
     found = {
         (module, number): attempt(module, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
         for module, number in slips_of(MODULES, 40, seed)

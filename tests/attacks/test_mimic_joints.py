@@ -35,17 +35,17 @@ FAR = (1.0, 1e4, 1e8, 1e12, 1e15)
 
 
 def text(*rules: tuple[object, object]) -> str:
-    """A chain of continuous joints: j0 leads, each further one follows the one before by its rule."""
+    """Write a chain of continuous joints; each joint after j0 mimics the joint before it."""
     return mimic_chain([(i, *rule) for i, rule in enumerate(rules)], 'xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"')
 
 
 def mimic_chain(rules: Iterable[tuple[int, object, object]], origin: str = 'xyz="0.1 0.2 0.3"') -> str:
-    """Joint j0 moves; joint j(i+1) follows the joint of rule i's number, by its multiplier and offset."""
+    """Write a chain; joint j(i+1) mimics the joint with the number in rule i, with multiplier and offset."""
     return chain(["", *(mimic(f"j{leader}", *rule) for leader, *rule in rules)], origin=origin)
 
 
 def misread(document: str, wrong: str) -> Robot:
-    """A robot whose own tree was read from `wrong` and which has Pinocchio check it against `document`."""
+    """Return a robot with the tree of `wrong`, which Pinocchio checks against `document`."""
     return Robot(tree_of(wrong.encode()), document, origin=Origin("<text>"))
 
 
@@ -93,7 +93,7 @@ def test_no_kernel_fuses_the_multiplication_and_the_addition() -> None:
 
 @pytest.mark.parametrize("exponent", [0, 3, 6, 7, 8, 12, 15, 22, 100, 300])
 def test_sine_and_cosine_are_accurate_to_the_last_digit_for_angles_of_any_size(exponent: int) -> None:
-    # What the bound grants a joint for both: one eps. An angle of 1e300 needs 1e300's digits of pi.
+    # The bound allows one eps for each joint. An angle of 1e300 needs pi with 300 more digits.
     robot = urdfkin.load(text())
     x = np.random.default_rng(exponent).uniform(1.0, 10.0, 60) * 10.0**exponent
     level = urdfkin.load(text().replace('rpy="0.1 0.2 0.3"', ""), verify=False)
@@ -123,7 +123,7 @@ def test_chains_of_mimic_joints_are_resolved_to_the_same_joint_and_rule(data: st
     theirs = rules_of_text(text, {f"j{i}" for i in range(n + 1)})
     ours = {joint.name: joint.mimic for joint in tree_of(text.encode()).joints if joint.mimic}
     assert theirs == ours  # the same doubles
-    angles = [0.7]  # by the rules themselves, one after the other
+    angles = [0.7]  # apply the rules one after the other
     for i, (leader, multiplier, offset) in enumerate(rules, start=1):
         angles.append(multiplier * angles[leader] + offset)
         for rule in (theirs[f"j{i}"], ours[f"j{i}"]):
@@ -168,7 +168,7 @@ def test_a_parser_that_loses_all_mimic_rules_is_not_verified() -> None:
 
 def test_joints_in_a_different_order_and_coordinates_of_other_joints_are_detected() -> None:
     text = robot_of(joint("x", "continuous", "a", "b"), joint("y", "continuous", "a", "c"))
-    tree = tree_of(text.replace('"x"', '"z"').encode())  # read so, x stands after y
+    tree = tree_of(text.replace('"x"', '"z"').encode())  # in this order, x comes after y
     for one in tree.joints:
         if one.name == "z":
             object.__setattr__(one, "name", "x")
@@ -176,7 +176,7 @@ def test_joints_in_a_different_order_and_coordinates_of_other_joints_are_detecte
     assert robot.joint_names == ("y", "x")
     with pytest.warns(urdfkin.NotVerifiedWarning, match="other joints .* found the same in another order"):
         robot.placement([0.1, 0.2], "b")
-    # Both sides once took from the tree which number of q is whose.
+    # Both sides once used the tree's assignment of the numbers in q to joints.
     robot = urdfkin.load("ur5")
     first, second, *_ = (i for i, joint in enumerate(robot.tree.joints) if joint.nq)
     places = list(robot.tree.q_index)
@@ -198,7 +198,7 @@ def gripper(kind: str, bounds: tuple[float, float], *rules: tuple[float, float, 
     return loaded(robot_of(*joints))
 
 
-#: As the fingers of a hand of which one mirrors the other.
+#: Two fingers of a hand; the second one moves opposite to the first.
 MIRRORED = ("prismatic", (-0.005, 0.055), (-1.0, 0.0, -0.005, 0.055))
 
 

@@ -24,7 +24,7 @@ ARM = robot(joint("j", "continuous", "a", "b", 'xyz="0.3 0.2 0.1" rpy="1 2 3"', 
 
 
 def orientations(n: int, seed: int) -> FloatArray:
-    """(n, 3, 3), half of them to nine decimals, some quarter and half turns."""
+    """Return rotations (n, 3, 3); half of them have nine decimals, and some are quarter or half turns."""
     vectors = np.random.default_rng(seed).normal(size=(n, 3)) * 2.0
     vectors[::5] = np.pi * np.eye(3)[np.arange(len(vectors[::5])) % 3]
     R = exp_rotation(vectors)
@@ -39,7 +39,7 @@ def at(R: FloatArray) -> FloatArray:
 
 
 def test_a_rotation_with_nine_decimals_is_accepted_and_an_exact_rotation_is_unchanged() -> None:
-    # Of every five such matrices one was refused.
+    # An earlier version refused one in five of these matrices.
     R = np.round(exp_rotation(np.random.default_rng(0).normal(size=(2000, 3))), 9)
     assert BaseMotion(at(R)).placement.shape == (2000, 4, 4)
     with pytest.raises(InputError, match="the rotation of the base's placement must be a rotation"):
@@ -65,7 +65,7 @@ def test_urdfkin_and_the_oracle_find_the_same_nearest_rotation() -> None:
         by_pinocchio = pin.Quaternion(nearest_quaternion(M)).toRotationMatrix()
         for found, R in ((ours, nearest_rotation(M)), (theirs, by_pinocchio)):
             found.append(float(np.linalg.norm((R.astype(object) - truth).astype(np.float64), 2)) / EPS)
-    # Far below what `roundings` derives: 3.2 for urdfkin, 11 for Pinocchio.
+    # The bounds derived in `roundings` are larger: 3.2 for urdfkin, 11 for Pinocchio.
     assert max(ours) < 1.5
     assert max(theirs) < 8.0
 

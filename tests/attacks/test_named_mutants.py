@@ -1,4 +1,4 @@
-"""Slips that nobody noticed once: each is made again, in a process of its own, and its test must fail."""
+"""Mutants that no test detected once: each runs in its own process, and its test must fail."""
 
 from pathlib import Path
 

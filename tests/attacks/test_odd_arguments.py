@@ -129,7 +129,7 @@ ARGUMENTS = [(name, x) for name in FUNCTIONS for x in inspect.signature(getattr(
 def test_an_unusual_argument_of_a_function_gives_a_result_or_an_error_of_urdfkin(
     name: str, parameter: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)  # a word may be a store's
+    monkeypatch.chdir(tmp_path)  # a text may be the path of a store
     function, good = getattr(urdfkin, name), FUNCTIONS[name]
     # A very large number of processes or samples is valid, but takes too long.
     odd = {key: x for key, x in ODD.items() if key != "too large" or parameter not in ("jobs", "samples")}

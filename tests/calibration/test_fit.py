@@ -1,4 +1,4 @@
-"""Known errors are found again, as closely as the noise allows and with the covariance that is stated."""
+"""A calibration finds known errors up to the noise, with the stated covariance."""
 
 from __future__ import annotations
 

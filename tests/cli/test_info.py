@@ -52,7 +52,7 @@ def test_info_reports_the_first_joint_with_a_different_order_in_the_file() -> No
     assert set(guides(build_tree("long", "l0", rows))) == {""}
     urdf = to_urdf(forked())
     assert urdfkin("info", urdf).text.splitlines()[-1].endswith("the file has the same order")
-    swapped = urdf.replace('joint name="a"', 'joint name="z"')  # changes only our order
+    swapped = urdf.replace('joint name="a"', 'joint name="z"')  # changes only urdfkin's order
     assert "differs: z is number 1 in the file and b here; " in urdfkin("info", swapped).text.splitlines()[-1]
     # The file does not contain the root joint.
     assert urdfkin("info", urdf, "--root-joint", "planar").text.splitlines()[-1].endswith("the same order")

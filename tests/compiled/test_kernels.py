@@ -56,7 +56,7 @@ def test_streaming_stores_give_the_same_bits_at_any_address(
 
 @contextmanager
 def _between(expected: FloatArray, offset: int) -> Iterator[FloatArray]:
-    """Memory to be filled with what is expected; what lies before and behind it must stay."""
+    """Yield a part of an array; demand that it then equals `expected`, and that the rest is unchanged."""
     around = np.full(expected.size + 16, np.pi)
     out = around[offset : offset + expected.size].reshape(expected.shape)
     yield out
@@ -114,7 +114,7 @@ def test_a_joint_without_velocity_and_acceleration_contributes_nothing(odd: Kine
     assert parts.joints == ("free", "arm", "slide", "follower")
     assert not parts.by_joint[:, 2].any()
     assert parts.by_joint[:, 1].all()
-    # The wrist turns about its own origin: it moves nothing there, it only turns.
+    # The wrist turns about its own origin, so the origin does not move.
     assert not parts.by_joint[:, 3, :3].any()
     assert parts.by_joint[:, 3, 3:].all()
 

@@ -36,24 +36,24 @@ print("scipy.linalg" in sys.modules)
 
 @pytest.mark.long
 def test_scipy_is_imported_only_for_compiled_code_that_calls_blas() -> None:
-    # Kept from here on: compiling imports more.
+    # Compiling imports more modules, so the list is stored here.
     urdfkin.load("one_link", verify=False).prepare("tip").placement(np.zeros(1))
     done = subprocess.run(own_python(_TRIED), check=True, capture_output=True, text=True)
     assert done.stdout == "False\nTrue\n"
 
 
-# Kernels work with addresses: they write what is theirs and nothing beside it, and read nothing beyond.
+# Kernels use memory addresses; they must not read or write outside their arrays.
 
 
-#: No number that a walk computes.
+#: A number that no forward recursion computes.
 GUARD = -1.2345678901234567e308
-#: Numbers before and behind; more than a block of lanes writes for one configuration.
+#: Number of doubles before and after an array; a kernel writes fewer for one configuration.
 ZONE = 4096
 COUNTS = (0, 1, LANES - 1, LANES, LANES + 1, 2 * LANES + 1)
 
 
 def guarded(shape: tuple[int, ...], filled: float | FloatArray = GUARD) -> tuple[FloatArray, FloatArray]:
-    """An array of that shape in the middle of a larger one, and all of it."""
+    """Return an array of this shape in the middle of a larger array, and the larger array."""
     size = int(np.prod(shape))
     memory = np.full(size + 2 * ZONE + 1, GUARD)
     inside = memory[ZONE + 1 : ZONE + 1 + size].reshape(shape)  # at an odd address
@@ -164,7 +164,7 @@ def test_an_unpickled_plan_has_its_own_addresses() -> None:
     assert anew.constants.tolist() == program.constants.tolist()
     del plan, program
     gc.collect()
-    rubbish = [np.full(256, -1) for _ in range(200)]  # over what the first plan left
+    rubbish = [np.full(256, -1) for _ in range(200)]  # in the memory that the first plan has used
     found = [evaluate.jacobians(again, q), evaluate.accelerations(again, q, v, a)]
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_array_equal(one, other)

@@ -1,4 +1,4 @@
-"""Small serial robots to make tables of, and the comparison of a table's poses with others."""
+"""Small serial robots for tests of tables, and the comparison of a table's poses with other poses."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CONVENTIONS = ("standard", "modified")
 
 
 def arm(*steps: FloatArray, kinds: str = "", tip: FloatArray | None = None) -> KinematicTree:
-    """A serial robot whose joints have their axis along z and stand at the given poses; R or P each."""
+    """Return a serial robot with joint axes along z at the given poses; R is revolute, P is prismatic."""
     named = {"R": JointKind.REVOLUTE, "P": JointKind.PRISMATIC}
     joints = [
         (z_joint(f"j{i + 1}", T, named[kind]), f"l{i}", f"l{i + 1}")
@@ -31,7 +31,7 @@ def arm(*steps: FloatArray, kinds: str = "", tip: FloatArray | None = None) -> K
 
 
 def elbow(kinds: str = "RRRRRR") -> KinematicTree:
-    """Six joints, a parallel pair, skew and meeting ones: every inner cell can be told from the others."""
+    """Return six joints with parallel, skew and intersecting axes; all inner cells have different effects."""
     square = rotation("x", math.pi / 2)
     steps = [
         shift(0, 0, 0.3), shift(0.05, 0.02, 0.1) @ square, shift(0.4, 0, 0.1),
@@ -42,14 +42,14 @@ def elbow(kinds: str = "RRRRRR") -> KinematicTree:
 
 
 def with_cells(table: DHTable, row: int, **cells: Any) -> DHTable:
-    """The table with other values in some cells of a row."""
+    """Return the table with other values in some cells of a row."""
     rows = list(table.rows)
     rows[row] = replace(rows[row], **cells)
     return replace(table, rows=tuple(rows))
 
 
 def disguised(table: DHTable, seed: int) -> DHTable:
-    """The same mechanism with x and z turned round here and there, zeros moved, base and tool dropped.
+    """Return a table of the same mechanism with reversed x and z axes, other zeros, and no base and tool.
 
     Rz(pi) before a step and after it negates a, alpha and beta; reversing z_i-1 by Rx(pi) negates d and theta
     and moves alpha by pi on both sides, and beta, which stands between, changes its sign.
@@ -71,7 +71,7 @@ def disguised(table: DHTable, seed: int) -> DHTable:
 
 
 def published(name: str) -> tuple[FrameChain, DHTable]:
-    """The path of a robot and its published table."""
+    """Return the path of a robot and its published table."""
     table = read_table(reference_path(name))
     return load(table.robot).chain(table.tip_frame, table.base_frame), table
 
@@ -79,7 +79,7 @@ def published(name: str) -> tuple[FrameChain, DHTable]:
 def error_ratio(
     table: DHTable, poses: FloatArray, expected: FloatArray, q: FloatArray, slack: FloatArray | float = 0.0
 ) -> float:
-    """The largest error of the tip in units of the table's tolerance, to whose metres the slack is added."""
+    """Return the largest tip error divided by the sum of the table's tolerance and `slack` (m)."""
     metres, radians = table.tolerance(q)
     error = np.abs(poses - expected)
     lengths = np.linalg.norm(error[..., :3, 3], axis=-1) / np.maximum(metres + slack, 1e-300)

@@ -1,4 +1,4 @@
-"""A comparison forgives what cannot matter, and names the cell that does."""
+"""A comparison of a table with a URDF ignores free choices, and names the wrong cell."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_equivalent_signs_zeros_base_and_tool_are_no_difference(seed: int, conve
     assert found.passes
     assert found.differences == ()
     assert found.residual <= 1e-13
-    # What turns with the base or the tool is told of these, not as an offset besides.
+    # A rotation that base or tool can replace is reported there, and not as a joint offset.
     assert found.offsets[0] == found.offsets[-1] == 0.0
 
 
@@ -87,9 +87,9 @@ def test_a_table_agrees_with_the_chain_of_the_derivation(tree: KinematicTree, se
 
 
 CELLS = [(i, cell) for i in range(6) for cell in ("a", "alpha", "d")]
-#: What base and tool take up, and the offsets along the parallel pair, which only their sum shows.
+#: Cells that base and tool can replace, and offsets along parallel axes, of which only the sum matters.
 FREE = {(0, "d"), (5, "a"), (5, "alpha"), (5, "d")}
-#: A comparison that finds a wrong cell tries every mistake first, which takes seconds: these are not `long`.
+#: Wrong cells of the quick tests; a comparison takes seconds, because it tries every mistake first.
 FEW = {(0, "alpha"), (2, "a"), (3, "d")}
 WRONG = [pytest.param(*one, marks=() if one in FEW else pytest.mark.long) for one in CELLS if one not in FREE]
 
@@ -104,7 +104,7 @@ def test_a_wrong_cell_is_named_with_the_size_of_the_error(row: int, cell: str) -
     named = [(one.row, one.cell) for one in found.differences]
     parallel = {(1, "d"), (2, "d"), (3, "d")} if (row, cell) in {(1, "d"), (2, "d")} else set()
     assert len(named) == 1
-    assert found.mistakes == ()  # the value is wrong, and not its sign or its place
+    assert found.mistakes == ()  # the value is wrong, but its sign and its row are right
     assert named[0] == (row, cell) or (parallel and named[0] in parallel)
     assert abs(found.differences[0].difference) == pytest.approx(2e-3, rel=1e-6)
 
@@ -159,14 +159,14 @@ def test_a_path_whose_square_overflows_is_refused() -> None:
         compare(chain(arm(*[shift(0.1, 0, 1e155)] * 6, kinds="RRRRRR"), "tip"), table)
 
 
-# -- axes that nearly coincide make a comparison hard, not wrong ----------------------------------------
+# -- axes that nearly coincide -------------------------------------------------------------------------
 
-#: What was once said to differ, by 1 mm up to the reach, or not to agree exactly.
+#: Seeds of tables that an earlier version reported as different or as not exactly equal.
 HARD = [2, 4, 9, 42, 66, 91, 104, 129, 143, 197, 261, 262, 292, 334]
 
 
 def nearly_coincident(seed: int) -> KinematicTree:
-    """Two to seven joints; half of the axes at most 1 mm and 1e-3 rad off the one before, or its opposite."""
+    """Return two to seven joints; half of the axes deviate little (1 mm, 1e-3 rad) from the previous one."""
     rng = np.random.default_rng(seed)
     n, steps = int(rng.integers(2, 8)), []
     for i in range(n):
@@ -185,7 +185,7 @@ def nearly_coincident(seed: int) -> KinematicTree:
 
 
 def long(seeds: Iterable[int]) -> list[ParameterSet]:
-    """Seeds whose tests are left to the long tests; the others are tried among the quick ones too."""
+    """Mark the tests of some seeds as long tests."""
     return [pytest.param(seed, marks=pytest.mark.long) for seed in seeds]
 
 

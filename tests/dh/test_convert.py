@@ -1,4 +1,4 @@
-"""There and back: the other convention, a tree, a URDF, a table again; the placement never changes."""
+"""Conversions between conventions, trees, URDFs and tables do not change the placement."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_a_mimicked_joint_outside_the_path_remains_a_coordinate_of_the_tree() ->
 
 
 def placements(text: str, names: tuple[str, ...], q: FloatArray, tip: str) -> FloatArray:
-    """Poses of a frame by Pinocchio's own reading of a URDF, coordinates given by joint name."""
+    """Return poses of a frame by Pinocchio's reading of a URDF; coordinates are given by joint name."""
     model = pin.buildModelFromXML(text)
     data = model.createData()
     poses = []
@@ -112,7 +112,7 @@ def placements(text: str, names: tuple[str, ...], q: FloatArray, tip: str) -> Fl
 
 
 def taken_for_a_coordinate_axis(tree: KinematicTree) -> bool:
-    """Whether Pinocchio rounds an axis: it takes one within 1e-12 of x, y or z for that."""
+    """Return whether Pinocchio replaces an axis by x, y or z, from which it deviates by at most 1e-12."""
     off = [np.sort(np.abs(joint.axis))[1] for joint in tree.joints]
     return any(0.0 < x < 1e-10 for x in off)
 

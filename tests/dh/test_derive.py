@@ -1,4 +1,4 @@
-"""A table is the chain it was made from, in every geometry, and looks as a person would write it."""
+"""A derived table has the poses of its chain for every geometry, and the cells that a person would write."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def reach_of(path: FrameChain) -> float:
 
 
 def demand_exact(table: DHTable, path: FrameChain) -> None:
-    """The table places the tip as the path does, up to rounding."""
+    """Demand that the table's tip has the poses of the path's tip, up to rounding."""
     q = configurations(len(path.joint_names))
     slack = 4 * EPS * (1 + sum(path.folded)) * reach_of(path)
     assert error_ratio(table, table.placement(q), path.placement(q), q, slack) <= 2.0
@@ -87,7 +87,7 @@ def test_equal_chains_give_bitwise_equal_tables(tree: KinematicTree) -> None:
 
 
 def exact_placement(table: DHTable, values: list[float]) -> Any:
-    """The product of the table's own numbers in 60 digits."""
+    """Return the product of the table's transforms at 60 digits."""
     T = mp.matrix(table.base.tolist())
     for row, value in zip(table.rows, values, strict=True):
         moved = row.sense * mp.mpf(value)
@@ -314,7 +314,7 @@ def test_a_flip_of_a_joint_outside_the_path_lists_similar_joints() -> None:
         dh_table(arm(np.eye(4), np.eye(4)), "tip", flip=["j3"])
 
 
-# -- numbers are written as a person writes them, and read back the same -------------------------------------
+# -- numbers that are written and read again -----------------------------------------------------------
 
 
 @pytest.mark.parametrize("twelfths", range(-24, 25))
@@ -362,7 +362,7 @@ def test_units_are_selected_by_name() -> None:
     assert fraction_text(pi_fraction(-math.pi / 12) or pytest.fail("no fraction")) == "-pi/12"
 
 
-# -- a table's Jacobian and acceleration are Pinocchio's, and the derivatives of its own placement -----------
+# -- Jacobian and acceleration of a table --------------------------------------------------------------
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The drawing shows every frame and every joint, and the same table gives the same file."""
+"""A drawing shows every frame and every joint, and equal tables give equal files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A table that was misread is told how it would fit; one that is another robot's is not."""
+"""For a misread table, the fitting interpretation is reported; for a table of another robot, none is."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CRAIG = ("alpha", "a", "d", "theta")
 def written(
     table: DHTable, convention: str, columns: tuple[str, ...] = COLUMNS, mm: bool = False, deg: bool = False
 ) -> dict[str, Any]:
-    """The table's cells as somebody writes them who says nothing but a convention, perhaps the wrong one."""
+    """Return the table's cells as a file that states only a convention, which may be wrong."""
     rows = []
     for row in table.rows:
         cells: dict[str, Any] = {name: getattr(row, name) for name in COLUMNS}
@@ -140,7 +140,7 @@ def test_loading_a_table_that_looks_like_millimetres_causes_a_warning() -> None:
         load(table_from_rows([[0.425, 0, 0, 0], [0.39225, 0, 0, 0]], "standard"), verify=False)
 
 
-#: a and alpha, which the modified convention writes a row later, and d, of the UR5.
+#: Cells a, alpha and d of the UR5; the modified convention writes a and alpha in the next row.
 LINKS: list[list[Any]] = [[0, "pi/2"], [-0.425, 0], [-0.39225, 0], [0, "pi/2"], [0, "-pi/2"]]
 OFFSETS = [0.089159, 0, 0, 0.10915, 0.09465, 0.0823]
 

@@ -1,4 +1,4 @@
-"""A wrong sign, a right angle too many, rows in the wrong order: the change that undoes it is named."""
+"""For a wrong sign, a wrong right angle or a wrong order of rows, the comparison names the correction."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from urdfkin.model.chain import chain
 
 pytestmark = pytest.mark.slow
 
-#: Tables that are the URDF's as they are written. Kinova's has frames of its own.
+#: Tables that agree with the URDF without a fit. Kinova's table has other frames.
 AS_WRITTEN = ("panda", "ur5", pytest.param("xarm7_standard", marks=pytest.mark.long))
 
 
 def with_wrong_signs(table: DHTable) -> Iterator[tuple[int, str, DHTable]]:
-    """Each table with one sign reversed that has an effect."""
+    """Yield each table with one reversed sign that has an effect."""
     for i, row in enumerate(table.rows):
         for cell in ("a", "alpha", "d", "theta"):
             value = getattr(row, cell)
@@ -107,7 +107,7 @@ def test_a_table_in_other_frames_warns_that_a_fit_can_hide_a_wrong_sign() -> Non
 def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
     rows = [[0.1, 0.5, 0.3, 0.0], [0.2, 0.0, 0.05, 0.0], [0.15, 0.9, 0.05, 0.0], [0.1, 0.4, 0.1, 0.0]]
     wrong = table_from_rows(rows, "standard")
-    right = with_cells(wrong, 1, d=-0.05)  # along parallel axes only the sum of the offsets shows
+    right = with_cells(wrong, 1, d=-0.05)  # along parallel axes, only the sum of the offsets matters
     found = compare(chain(to_tree(right), right.tip_frame, right.base_frame), wrong)
     assert [one[:2] for one in named(found)] == [(1, "d"), (2, "d")]
     assert found.differences == ()
@@ -115,7 +115,7 @@ def test_two_changes_that_explain_a_table_equally_well_are_both_named() -> None:
 
 
 def test_a_wrong_sign_is_named_despite_a_smaller_difference() -> None:
-    """A calibrated robot is off by a millimetre; the sign of a sheet is off by a hundred."""
+    """The calibration changes the tip by a millimetre, and the wrong sign by a hundred millimetres."""
     path, table = published("panda")
     near = with_cells(table, 6, a=table.rows[6].a + 1e-3)
     found = compare(path, with_cells(near, 3, a=-near.rows[3].a))

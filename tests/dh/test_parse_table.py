@@ -1,4 +1,4 @@
-"""Tables are read from files as people have them, and a wrong file is told what is wrong with it."""
+"""Tables are read from common file formats, and the error for a wrong file names the mistake."""
 
 from __future__ import annotations
 
@@ -72,10 +72,10 @@ def test_an_invalid_or_missing_file_is_named_in_the_error(tmp_path: Path) -> Non
         read_table(tmp_path / "missing.toml")
 
 
-# -- tables are read as people have them: spreadsheets, READMEs, papers, web pages, what programs print ------
+# -- formats: spreadsheets, READMEs, papers, web pages, output of programs -----------------------------
 
 
-#: A file -> its convention and its rows: a, alpha, d, theta, R or P.
+#: For each file: its convention and its rows (a, alpha, d, theta, R or P).
 SHEETS: dict[str, tuple[str, str, list[tuple[float, float, float, float, str]]]] = {
     "excel.csv": (
         "\ufeffsep=;\r\nconvention: standard;;;;\r\nJoint;a [mm];α [°];d [mm];θ [°]\r\n"
@@ -239,7 +239,7 @@ def test_headings_with_mixed_separators_are_refused(header: str) -> None:
 
 @pytest.mark.parametrize("number", ["1e4000", "nan", "-inf"])
 def test_a_base_with_an_infinite_number_is_refused(number: str) -> None:
-    """LAPACK's singular values of such a matrix never returned."""
+    """LAPACK computed the singular values of such a matrix without end."""
     rows = f" 1 0 0 0\n {number} 1 0 0\n 0 0 1 0\n"
     sheet = f"standard\na  alpha  d  theta\n0  pi/2  0.3  q1\n\nbase (metres):\n{rows}"
     with pytest.raises(InputError, match="the base must be a matrix of finite numbers"):
@@ -275,11 +275,11 @@ def printed_ur5() -> dict[str, str]:
 
 @st.composite
 def damaged(draw: st.DrawFn) -> tuple[str, str]:
-    """The suffix and the text of a table with a few characters changed, removed or repeated."""
+    """Return the suffix and the text of a table with a few characters changed, removed or repeated."""
     suffix = draw(st.sampled_from([*SUFFIXES.values(), ".tsv"]))
     text = printed_ur5()[suffix]
     for _ in range(draw(st.integers(1, 5))):
-        head = max(text.find("theta"), 40) + 20  # damage near the headings is the most instructive
+        head = max(text.find("theta"), 40) + 20  # damage near the headings has the most effects
         k = draw(st.integers(0, min(head, len(text))) | st.integers(0, len(text)))
         piece = draw(st.sampled_from((*PIECES, text[k : k + 4], 3 * text[k : k + 4])))
         text = text[:k] + piece + text[k + draw(st.integers(0, 12)) :]
@@ -306,7 +306,7 @@ def test_a_damaged_table_is_refused_with_a_message_or_compared() -> None:
     assert outcomes["read"] > 10
 
 
-# -- each wrong file gets one error with the file, the row, the column, the value and the remedy -----------
+# -- errors --------------------------------------------------------------------------------------------
 
 UR5 = [
     ["0", "pi/2", "0.089159", "0"], ["-0.425", "0", "0", "0"], ["-0.39225", "0", "0", "0"],
@@ -315,7 +315,7 @@ UR5 = [
 
 
 def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
-    """What reading says, which begins with the file's name."""
+    """Return the message of the error, which must begin with the file's name."""
     file = tmp_path / f"table{suffix}"
     file.write_text(text)
     with pytest.raises(UrdfkinError) as caught:
@@ -325,7 +325,7 @@ def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
 
 
 def of_rows(rows: str, keys: dict[str, str]) -> str:
-    """A TOML file; a key with an empty value is left out."""
+    """Write a TOML file without the keys that have an empty value."""
     lines = {"convention": "'standard'", **keys, "rows": rows}
     return "".join(f"{key} = {value}\n" for key, value in lines.items() if value)
 

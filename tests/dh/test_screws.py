@@ -1,4 +1,4 @@
-"""Screws are the robot: the book's example, the matrix exponential, Pinocchio, and back to a URDF."""
+"""Screws of a robot agree with a textbook example, the matrix exponential, Pinocchio and a written URDF."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SPACE: list[list[float]] = [
 
 
 def exponential(screws: FloatArray, q: FloatArray) -> FloatArray:
-    """The product of matrix exponentials, by SciPy's expm of the (4, 4) matrices."""
+    """Return the product of matrix exponentials, computed by SciPy's expm."""
     T = np.eye(4)
     for (w1, w2, w3, *v), value in zip(screws, q, strict=True):
         S = np.zeros((4, 4))
@@ -109,7 +109,7 @@ def test_exported_code_contains_the_screws_as_columns(tmp_path: Path) -> None:
     np.testing.assert_array_equal(names["Slist"], np.transpose(SPACE))
     T = arm.placement(np.ones(6))
     np.testing.assert_allclose(names["M"] @ exponential(names["Blist"].T, np.ones(6)), T, atol=1e-14)
-    # ik-geo's form: positions P between the axes H, turned one after the other.
+    # ik-geo's notation: vectors P between the axes H.
     R, p = np.eye(3), names["P"][0]
     for h, between in zip(names["H"], names["P"][1:], strict=True):
         R = R @ exp_rotation(h)

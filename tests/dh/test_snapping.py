@@ -1,4 +1,4 @@
-"""What a snapped table declares is a guarantee: no configuration moves the tip further."""
+"""In no configuration does a snapped table move the tip further than the stated bound."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EPS = float(np.finfo(np.float64).eps)
 
 
 def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) -> KinematicTree:
-    """Joints at right angles and parallel, each rotation off by up to `noise`, as a rounded file is."""
+    """Return joints with parallel or perpendicular axes, each rotation with an error of up to `noise`."""
     rng = np.random.default_rng(seed)
     steps = []
     for _ in range(joints):
@@ -37,7 +37,7 @@ def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) 
 
 
 def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far the tip is off, and turned."""
+    """Return the largest position error and orientation error of the tip."""
     exact, found = chain(tree, "tip").placement(q), table.placement(q)
     metres = np.linalg.norm(found[..., :3, 3] - exact[..., :3, 3], axis=-1)
     return metres, rotation_angle(found[..., :3, :3], exact[..., :3, :3])
@@ -54,7 +54,7 @@ def test_no_configuration_moves_the_tip_by_more_than_declared(seed: int, noise: 
     tree = nearly_round(seed, noise)
     table = dh_table(tree, "tip", convention=convention, snap=3 * noise)
     assert table.snap is not None
-    q = configurations(tree.nq, 40, seed) * 2.0  # far beyond the limits too
+    q = configurations(tree.nq, 40, seed) * 2.0  # also configurations far beyond the limits
     metres, radians = worst(table, tree, q)
     allowed_metres, allowed_radians = table.tolerance(q)
     assert (metres <= allowed_metres + 100 * EPS).all()
@@ -72,7 +72,7 @@ def test_snapping_a_random_chain_moves_the_tip_within_the_declared_bound(
     own = chain(tree, "tip").coupling.select(tree, q)
     metres, radians = worst(table, tree, own)
     allowed_metres, allowed_radians = table.tolerance(own)
-    # Offsets of the URDF that cancel are in no cell, but were added up and rounded on the way.
+    # Offsets that cancel are in no cell, but their sum has rounding errors.
     rounding = 20 * EPS * (1 + len(tree.joints)) * chain(tree, "tip").lengths.sum()
     assert (metres <= allowed_metres + rounding).all()
     assert (radians <= allowed_radians).all()
@@ -96,7 +96,7 @@ def test_angles_close_to_multiples_of_fifteen_degrees_are_snapped(seed: int) -> 
     table = dh_table(nearly_round(seed, 1e-6), "tip", snap=1e-4)
     for row in table.rows:
         for angle in (row.alpha, row.theta):
-            # Two skew lines at round angles may still make a theta of any value; what is near is exact.
+            # Between skew axes at round angles, theta can have any value; cells near a round value are exact.
             twelfth = round(angle * 12 / math.pi) * math.pi / 12
             assert angle == twelfth or abs(angle - twelfth) > 1e-4
         assert row.beta == 0.0
@@ -125,7 +125,7 @@ def test_snapping_changes_no_angle_beyond_the_tolerance() -> None:
     assert present(table.snap).changes == ()
 
 
-# -- the bound of a snapped table, number for number: each angle times the way from its pivot to the tip -----
+# -- the bound: each angle times the distance from its pivot to the tip ---------------------------------
 
 
 OFF = 1e-5
@@ -149,7 +149,7 @@ def test_the_lever_of_a_snapped_angle_is_the_length_of_the_remaining_chain() -> 
 
 @pytest.mark.parametrize("beyond", [0.0, 3.0])
 def test_the_lever_of_two_combined_fixed_angles_begins_at_the_next_joint(beyond: float) -> None:
-    """Neither origin is nearly round, both together are."""
+    """Neither angle is nearly round, but their sum is."""
     joints = [
         (z_joint("a"), "l0", "l1"),
         (z_joint("bolt", rotation("x", 0.3), JointKind.FIXED), "l1", "l2"),
@@ -164,7 +164,7 @@ def test_the_lever_of_two_combined_fixed_angles_begins_at_the_next_joint(beyond:
 
 
 def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
-    """A tilt before a joint that turns, then one that slides, then 2 m to the tip."""
+    """Return a tilt, a revolute joint, a prismatic joint, and 2 m to the tip."""
     joints = [
         (z_joint("a", rotation("x", math.pi / 2 + tilt)), "l0", "l1"),
         (z_joint("b", rotation("y", math.pi / 2), JointKind.PRISMATIC, limit=limit), "l1", "l2"),

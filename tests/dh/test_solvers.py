@@ -1,4 +1,4 @@
-"""OPW parameters, and the solvers that other people wrote, place the tip of the arm."""
+"""OPW parameters and solvers of other libraries give the poses of the arm's tip."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ NAMES = ("a1", "a2", "b", "c1", "c2", "c3", "c4")
 
 
 def drawn(rng: np.random.Generator) -> dict[str, float]:
-    """The lengths of an arm."""
+    """Draw the lengths of an arm."""
     lengths = rng.uniform([-0.4, -0.4, -0.3, 0.1, 0.3, 0.3, 0.05], [0.4, 0.4, 0.3, 0.6, 0.9, 0.9, 0.2])
     return dict(zip(NAMES, lengths.tolist(), strict=True))
 
 
 def table(lengths: dict[str, float], offsets: list[float], signs: list[int], tilt: float = 0.0) -> DHTable:
-    """The arm of the parameters, written as Brandstoetter's drawing has it."""
+    """Return the table of an arm with these parameters, as in Brandstoetter's drawing."""
     cells = [
         (lengths["a1"], -H, lengths["c1"], 0.0), (lengths["c2"], tilt, 0.0, -H),
         (lengths["a2"], H, lengths["b"], H), (0.0, -H, lengths["c3"], 0.0), (0.0, H, 0.0, 0.0),
@@ -91,7 +91,7 @@ def test_the_command_prints_opw_parameters_in_the_format_of_the_solvers(tmp_path
     assert all(abs(sign) == 1 for sign in signs)
 
 
-# -- solvers that other people wrote find the tip's poses again with what urdfkin writes for them ------------
+# -- solvers of other libraries, with parameters from urdfkin ------------------------------------------
 
 
 TIPS = {"ur5": "tool0", "ur10": "tool0", "kinova": "j2s6s200_end_effector"}
@@ -99,13 +99,13 @@ Solve = Callable[[FloatArray], Sequence[Any]]
 
 
 def poses(robot: Robot, tip: str, count: int = 10) -> tuple[FloatArray, FloatArray]:
-    """Configurations with their tips in the base, both checked against Pinocchio."""
+    """Return configurations and their tip poses in the base, checked by Pinocchio."""
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (count, 6))
     return q, robot.relative_placement(q, tip, robot.base_frame)
 
 
 def check(robot: Robot, tip: str, solve: Solve) -> None:
-    """Every solution reaches its pose, in Pinocchio too; where the pose came from is among them."""
+    """Demand that every solution reaches its pose, and that the original configuration is a solution."""
     for q, T in zip(*poses(robot, tip), strict=True):
         found = np.array(solve(T)).reshape(-1, 6)
         assert len(found) > 0
@@ -134,7 +134,7 @@ def test_eaik_solves_inverse_kinematics_with_the_exported_h_and_p(name: str) -> 
         pose = T.copy()
         pose[:3, :3] = T[:3, :3] @ given["R6T"].T
         found = solver.IK(pose)
-        # What it calls least squares is an answer to a pose that a branch does not reach.
+        # The solver returns a least-squares solution for a pose that a branch does not reach.
         return [q for q, nearest in zip(found.Q, found.is_LS, strict=True) if not nearest]
 
     check(robot, TIPS[name], solve)
@@ -150,7 +150,7 @@ def test_ik_geo_solves_inverse_kinematics_with_the_exported_h_and_p(name: str) -
     solver = getattr(ik_geo.Robot, family)(given["H"].tolist(), given["P"].tolist())
 
     def solve(T: FloatArray) -> list[Any]:
-        # Its Python takes a rotation column by column (1.0.3).
+        # The Python version 1.0.3 reads a rotation column by column.
         columns = (T[:3, :3] @ given["R6T"].T).T.tolist()
         return [q for q, nearest in solver.get_ik(columns, T[:3, 3].tolist()) if not nearest]
 

@@ -1,4 +1,4 @@
-"""The kind of an arm is told, with how far it is from it, and a wrist's centre really stays where it is."""
+"""The class of an arm is reported with its deviation, and the centre of a spherical wrist does not move."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_puma_has_a_spherical_wrist_and_can_be_solved_by_opw() -> None:
 @pytest.mark.parametrize("offset", [1e-4, 3e-3])
 def test_an_inexact_spherical_wrist_is_reported_with_the_distance(offset: float) -> None:
     rows = [[*row] for row in PUMA]
-    rows[4][0] = offset  # the last axis passes the other two at this distance
+    rows[4][0] = offset  # distance of the last axis from the other two axes
     kind = of_rows(rows).kinds[0]
     assert kind.name == "spherical wrist"
     assert not kind.is_exact
@@ -84,7 +84,7 @@ def test_the_centre_of_a_spherical_joint_does_not_move_according_to_pinocchio(na
     assert len(found.joints) - found.freedoms == (1 if name != "kinova" else 0)
     kind = next(kind for kind in found.kinds if kind.name.startswith("spherical"))
     assert kind.at is not None
-    # A point of the link beyond the three joints, at their centre: no value of the three moves it.
+    # The three joints do not move the point of the last link at their common centre.
     beyond = robot.tree.links[robot.tree.joint_index(kind.joints[-1]) + 1]
     q = np.zeros((20, robot.nq))
     columns = [robot.tree.q_index[robot.tree.joint_index(joint)] for joint in kind.joints]

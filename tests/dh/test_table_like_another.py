@@ -1,4 +1,4 @@
-"""A table in the frames of a published one: its cells, the URDF's numbers, and the URDF's motion exactly."""
+"""A table with the frames of a published table has the numbers and exactly the motion of the URDF."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_table_like_an_equivalent_table_has_the_cells_of_that_table(seed: int,
     reference = disguised(dh_table(tree, "tip"), seed)
     table = dh_table(tree, "tip", like=reference)
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
-        free = {"theta"} if row.kind.turns else {"d"}  # whose zeros are the URDF's
+        free = {"theta"} if row.kind.turns else {"d"}  # this table has the URDF's zeros
         free |= {0: {"d"}, 5: {"a", "alpha", "d"}}.get(i, set())
         for name in {"a", "alpha", "d"} - free:
             off = getattr(row, name) - getattr(other, name)
@@ -90,7 +90,7 @@ def test_a_table_like_kinovas_has_kinovas_zeros_and_the_lengths_of_the_urdf() ->
     assert "q2 - 90" in text
     for row, other in zip(table.rows, reference.rows, strict=True):
         assert (row.alpha, row.a) == pytest.approx((other.alpha, other.a), abs=1e-12)
-        assert row.d == pytest.approx(other.d, abs=6e-5)  # the sheet has D3 + D4 and D5 + D6 to 0.1 mm
+        assert row.d == pytest.approx(other.d, abs=6e-5)  # the sheet rounds D3 + D4 and D5 + D6 to 0.1 mm
     assert table.rows[3].d == pytest.approx(-0.31105, abs=1e-9)
 
 
@@ -163,7 +163,7 @@ def test_the_option_sign_is_refused_with_the_option_like() -> None:
     assert "--sign does nothing with --like" in refused("dh ur5 --like ur5 --sign a")
 
 
-# -- other zeros of slides are no difference, and what they cannot explain is one -------------------------
+# -- zeros of prismatic joints -------------------------------------------------------------------------
 
 #: Of a change of a cell (m or rad) a fifth is a difference: with two slides, one on either side of a tilt
 #: of 1e-8 rad, rounding hides more of where a plane cuts than with one.
@@ -181,7 +181,7 @@ tilts = {
 
 @st.composite
 def step(draw: st.DrawFn) -> FloatArray:
-    """The pose from one axis to the next, tilted about a line beside the one between them or along it."""
+    """Return the pose from one axis to the next, with a tilt."""
     relation = draw(st.sampled_from(sorted(tilts)))
     nearly = relation.startswith("nearly")
     a, b = draw(st.floats(0.05, 0.5)) if nearly else draw(length), draw(length) if nearly else 0.0
@@ -192,7 +192,7 @@ def step(draw: st.DrawFn) -> FloatArray:
 
 @st.composite
 def arms_with_slides(draw: st.DrawFn, *, inner: bool = False) -> KinematicTree:
-    """Two to six joints, one of them a slide at least; with `inner` no slide at either end."""
+    """Return two to six joints, at least one prismatic; with `inner`, the first and last are revolute."""
     kinds = draw(st.lists(st.sampled_from("RRP"), min_size=1 if inner else 2, max_size=4 if inner else 6))
     kinds = ["R", *kinds, "R"] if inner else kinds
     assume("P" in kinds)
@@ -201,7 +201,7 @@ def arms_with_slides(draw: st.DrawFn, *, inner: bool = False) -> KinematicTree:
 
 
 def differences(table: DHTable, other: DHTable) -> dict[tuple[int, str], float]:
-    """Of all cells that no zero, no base and no tool explains, by row and name."""
+    """Return the differences, by row and name, that no zero, base or tool explains."""
     found, last = {}, len(table.rows) - 1
     for i, (row, there) in enumerate(zip(table.rows, other.rows, strict=True)):
         names = ["a", "alpha", "beta"] if i < last else []
@@ -220,7 +220,7 @@ def is_the_urdf(table: DHTable, tree: KinematicTree) -> bool:
 
 @st.composite
 def arms_with_a_slide(draw: st.DrawFn) -> KinematicTree:
-    """One slide between joints that turn, and no tool."""
+    """Return one prismatic joint between revolute joints, without a tool."""
     before, after = (draw(st.integers(1, 3)) for _ in range(2))
     kinds = "R" * before + "P" + "R" * after
     return arm(*(draw(step()) for _ in kinds), kinds=kinds)
@@ -252,7 +252,7 @@ def test_shifted_zeros_of_prismatic_joints_are_no_difference_in_any_convention(
 
 
 def along_slides(reference: DHTable) -> list[int]:
-    """The rows whose d lies along a slide's axis that comes before them or after them, exactly parallel."""
+    """Return the rows whose d is exactly parallel to the axis of a neighbouring prismatic joint."""
     rows, found = reference.rows, list[int]()
     for k, slide in enumerate(rows):
         if slide.kind.turns:

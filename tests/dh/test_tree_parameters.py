@@ -1,4 +1,4 @@
-"""Khalil and Kleinfinger's table places every link; along a chain it is the modified table."""
+"""The table of Khalil and Kleinfinger gives the pose of every link; for a chain, it is the modified table."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EPS = float(np.finfo(np.float64).eps)
 
 @st.composite
 def branching(draw: st.DrawFn) -> KinematicTree:
-    """A robot whose links carry several joints each, some of them fixed."""
+    """Return a robot whose links have several child joints, some of them fixed."""
     kinds = (JointKind.REVOLUTE, JointKind.PRISMATIC, JointKind.CONTINUOUS, JointKind.FIXED)
     joints = []
     for i in range(draw(st.integers(1, 9))):

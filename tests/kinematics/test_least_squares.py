@@ -1,4 +1,4 @@
-"""The solver on Rosenbrock's valley, and its limits on steps."""
+"""The least-squares solver finds the minimum of Rosenbrock's function, and limits its steps."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from urdfkin.model.configuration import draw
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.bounds import magnitudes
 
-#: Every equation of motion; a rotation made of a sine and a cosine has no length.
+#: Every equation of motion, except those that compute a rotation from a sine and a cosine.
 EQUATIONS = sorted(
     name
     for name, value in vars(equations).items()

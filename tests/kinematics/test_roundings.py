@@ -1,4 +1,4 @@
-"""The counts of roundings in the bounds, measured with numbers that record their roundings."""
+"""The rounding errors in the bounds are measured with numbers that record each rounding."""
 
 import ast
 import itertools
@@ -29,7 +29,7 @@ def about_z(angle: float, *, fused: bool) -> Matrix:
 
 
 def of_sines(x: FloatArray) -> Matrix:
-    """Roll, pitch and yaw as urdfkin reads them, unfused; then in the walk's fused numbers."""
+    """Return the rotation of roll, pitch and yaw without fused sums, as fused numbers for the recursion."""
     (sr, cr), (sp, cp), (sy, cy) = (sine_cosine(float(angle), fused=False) for angle in x[:3])
     cc, cs, sc, ss = cr * cy, cr * sy, sr * cy, sr * sy
     R = (
@@ -93,7 +93,7 @@ def matrix_of(q: list[Counted]) -> Matrix:
 
 
 def mujocos(x: FloatArray) -> Matrix:
-    """The orientation so far, the constant, the turn about an axis that was normalised; then the norm."""
+    """Multiply an orientation by a constant rotation and a joint's rotation, and normalise the quaternion."""
     s, c = sine_cosine(0.5 * float(x[3]), fused=False)
     turned = hamilton(quaternion(x[4:], exact=True), quaternion(x, exact=False))
     axis = unit([Counted(float(a)) for a in rotation_from_rpy(x[1:4])[0]])
@@ -101,7 +101,7 @@ def mujocos(x: FloatArray) -> Matrix:
 
 
 def most(measure: Callable[[Matrix], float], part: Callable[[FloatArray], Matrix]) -> float:
-    """The largest of a search: from random angles, and from the worst of these on."""
+    """Return the largest value of a search that starts at random angles."""
     rng = np.random.default_rng(0)
     found = sorted(((measure(part(x)), tuple(x)) for x in rng.uniform(-4.0, 4.0, (60, 7))), reverse=True)[:3]
     for _ in range(80):

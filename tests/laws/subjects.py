@@ -28,7 +28,7 @@ def state(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, Floa
 
 
 def moved(robot: Robot, q: FloatArray, v: FloatArray, times: FloatArray) -> FloatArray:
-    """(times, nq): `q` (nq,) after going on with the rates v, by Pinocchio's `integrate`."""
+    """Return (times, nq): `q` after a motion with the joint velocities v, by Pinocchio's `integrate`."""
     model = model_of(robot)
     full, v_full = robot.to_pinocchio(q), coupling(robot, model) @ v
     rows = np.array([pin.integrate(model, full, float(t) * v_full) for t in times])
@@ -36,7 +36,7 @@ def moved(robot: Robot, q: FloatArray, v: FloatArray, times: FloatArray) -> Floa
 
 
 def rotation_vector(R: FloatArray) -> FloatArray:
-    """(n, 3) axis times angle of small rotations (n, 3, 3)."""
+    """Return the rotation vectors (n, 3) of small rotations (n, 3, 3)."""
     skew = (R - R.swapaxes(-1, -2)) / 2.0
     axis = np.stack((skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]), axis=-1)
     sine = np.linalg.norm(axis, axis=-1, keepdims=True)

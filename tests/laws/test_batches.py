@@ -141,10 +141,10 @@ def test_an_out_of_a_wrong_shape_or_with_memory_of_an_input_is_refused() -> None
 
 
 class Subclass(np.ndarray):
-    """An array whose methods might do anything."""
+    """A subclass of NumPy's array, whose methods may be overridden."""
 
 
-#: What has the kind, the shape and the order of a plain array.
+#: Arrays with the type, the shape and the memory order of a plain array.
 NOT_PLAIN: dict[str, Callable[[tuple[int, ...]], Any]] = {
     "matrix": lambda shape: np.matrix(np.zeros(shape)),
     "masked": np.ma.zeros,
@@ -212,9 +212,7 @@ def test_concurrent_threads_get_the_same_results_as_one_thread() -> None:
             robot.acceleration(q, v, a, frame),
         ]
 
-    fresh = load(
-        "a1"
-    )  # nothing prepared: plans and Pinocchio's models are made by whichever thread comes first
+    fresh = load("a1")  # the first thread creates plans and Pinocchio's models
     with ThreadPoolExecutor(8) as pool:
         threaded = list(pool.map(partial(work, fresh), range(len(batches))))
     for k, results in enumerate(threaded):
@@ -241,7 +239,7 @@ def test_one_configuration_with_many_rates_equals_repeated_configurations(single
             ]
             for x in (once, repeated)
         ]
-        # The first two know nothing of a, and do not grow with it.
+        # The first two do not depend on a.
         for one, other in zip(*ways, strict=True):
             assert not differing(np.broadcast_to(one, other.shape), other)
 
@@ -316,7 +314,7 @@ def test_the_error_of_an_overflow_in_a_breakdown_names_the_samples() -> None:
 
 # -- bits of single configurations and of batches --------------------------------------------------
 
-#: Rows of a block, of the next, and of one that was filled up.
+#: Rows of a block, of the next block, and of a partly filled block.
 SAMPLES = 2 * LANES + 3
 ROWS = (0, 7, 8, LANES - 1, LANES, 2 * LANES, SAMPLES - 1)
 KINDS = ("revolute", "prismatic", "continuous")
@@ -338,7 +336,7 @@ def mixed(floating: bool) -> Robot:
 
 
 def broom(branches: int, joints: int) -> Robot:
-    """Branches from one link: the path to a tip needs some blocks of coordinates, and not others."""
+    """Return branches from one link, so that the path to a tip needs only some blocks of coordinates."""
     urdf = Urdf(f"broom_{branches}_{joints}", branches)
     for branch in range(branches):
         for i in range(joints):

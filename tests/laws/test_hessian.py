@@ -23,7 +23,7 @@ from urdfkin.verify.exact.numbers import about, exact, from_quaternion, precisio
 from urdfkin.verify.quantities import HESSIAN, JACOBIAN
 
 _STEP = exact(2.0**-60)
-#: Of the quotients: their truncation goes with the square of the step, eighty digits lose eighteen.
+#: Step of the difference quotients; the error is proportional to its square, and 18 of 80 digits are lost.
 _ROOM = 1e-30
 _Z = (0, 0, 1)
 
@@ -52,7 +52,7 @@ def stepped(robot: Robot, q: FloatArray, rate: int, step: Any) -> list[Any]:
 
 
 def truths(robot: Robot, q: FloatArray, link: int, reference: Reference) -> tuple[NDArray[Any], NDArray[Any]]:
-    """(6, nv, nv) of the equations, and by difference quotients of the Jacobian, both at fifty digits."""
+    """Return Hessians (6, nv, nv) by the equations and by difference quotients, both at fifty digits."""
     joints, still = read_exact(robot.urdf, robot.tree, robot.tree.path(link)), [0.0] * robot.nv
 
     def at(x: list[Any]) -> recursion.ExactMotion:
@@ -159,7 +159,7 @@ def test_an_error_of_1e_12_in_the_hessian_is_found(monkeypatch: pytest.MonkeyPat
 
 
 def pinocchios(model: Any, q: FloatArray, reference: Any) -> tuple[FloatArray, FloatArray]:
-    """Of the last frame: what it is said to be, and the difference quotient of Pinocchio's own Jacobian."""
+    """Return Pinocchio's Hessian of the last frame, and the difference quotient of Pinocchio's Jacobian."""
     frame, step = model.nframes - 1, 1e-6
 
     def jacobian(rate: int, by: float) -> FloatArray:

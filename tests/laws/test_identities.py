@@ -25,7 +25,7 @@ from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.quantities import ACCELERATION, JACOBIAN, JACOBIAN_RATE
 
 LOCAL, WORLD, ALIGNED = Reference
-#: Room for the rounding of a law's own arithmetic, in eps of the largest number that enters it.
+#: Tolerance for the rounding errors of a law's formula, in eps of its largest number.
 ROOM = 2000.0 * EPS
 
 
@@ -176,7 +176,7 @@ def test_the_jacobian_with_mimic_joints_is_the_jacobian_of_free_joints_times_g(n
 
 
 def test_an_elbow_of_three_and_four_metres_has_its_tip_at_five_metres() -> None:
-    # By hand, in whole numbers: two links of 3 m and 4 m at a right angle.
+    # Computed by hand: two links of 3 m and 4 m at a right angle.
     urdf = Urdf("elbow", 0)
     urdf.add("continuous", axis='<axis xyz="0 0 1"/>', origin="")
     urdf.add("continuous", axis='<axis xyz="0 0 1"/>', origin='<origin xyz="3 0 0"/>')
@@ -211,7 +211,7 @@ def test_the_acceleration_is_the_sum_of_the_terms_of_the_jacobian_and_of_the_jac
         total = np.einsum("nfij,nj->nfi", J, a) + np.einsum("nfij,nj->nfi", J_rate, v)
         expected = evaluate.accelerations(plan, q, v, a, reference)
         if reference is not Reference.LOCAL_WORLD_ALIGNED:
-            # There it is the spatial acceleration that they make.
+            # In this reference frame, the sum is the spatial acceleration.
             velocity = evaluate.velocities(plan, q, v, reference)
             expected[..., :3] -= np.cross(velocity[..., 3:], velocity[..., :3])
         allowed = (
@@ -228,7 +228,7 @@ STEPS = 2.0 ** -np.arange(3.0, 26.0)
 
 
 def errors(name: str, seed: int, order: int) -> tuple[FloatArray, FloatArray, float]:
-    """Errors of the quotients of position and orientation at each step, and the size of what is divided."""
+    """Return errors of the quotients of position and orientation at each step, and the numerators' size."""
     robot = robot_of(name)
     q, v, a = (x[0] for x in state(robot, 1, seed))
     frame = robot.tip_frame
@@ -250,7 +250,7 @@ def errors(name: str, seed: int, order: int) -> tuple[FloatArray, FloatArray, fl
 
 
 def assert_converges(error: FloatArray, reach: float, order: int) -> None:
-    """Falls with h^2 as long as truncation rules, and ends at the rounding floor."""
+    """Demand that the error is proportional to h^2 for large steps, and reaches the rounding error."""
     floor = 200.0 * EPS * reach / STEPS**order
     falling = np.flatnonzero((error[:-1] > 30.0 * floor[:-1]) & (error[1:] > 30.0 * floor[1:]))
     if len(falling) > 2:
@@ -334,7 +334,7 @@ def test_relative_placement_accepts_frames_batches_and_out_as_placement_does() -
     for f, frame in enumerate(("tool0", "base_link")):
         np.testing.assert_array_equal(both[:, :, f], robot.relative_placement(q, frame, "wrist_1_link"))
     line = robot.certificate().lines[0]
-    assert (line.quantity, line.checked) == ("relative placement", 24)  # no result for the frame looked from
+    assert (line.quantity, line.checked) == ("relative placement", 24)  # no result for the reference frame
 
 
 @pytest.mark.parametrize("slip", [1e-12, "transposed", "in the world's axes"])

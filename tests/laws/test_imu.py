@@ -21,14 +21,14 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.oracle import free_flyer
 
 G = np.array([0.3, -0.2, -9.81])
-#: Axes askew, a slide between turns.
+#: Oblique axes, with a prismatic joint between revolute joints.
 SHAKEN = urdfs.robot(
     joint("a", "continuous", "base", "arm", 'xyz="0.1 0.2 0.3" rpy="0.3 -0.4 0.5"', "0.6 0 0.8"),
     joint("b", "prismatic", "arm", "slide", 'xyz="0.3 0 -0.1" rpy="1 0.2 0"', "0 1 0", limit(-9, 9)),
     joint("c", "continuous", "slide", "head", 'xyz="0 0.2 0.1" rpy="0 0.7 0.1"', "0 0.28 0.96"),
 )
 _INERTIA = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-#: The same with masses, which MuJoCo wants.
+#: The robot above with masses, which MuJoCo requires.
 WITH_MASSES = re.sub(r'<link name="(\w+)"/>', rf'<link name="\1">{_INERTIA}</link>', SHAKEN)
 
 

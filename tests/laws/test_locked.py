@@ -34,8 +34,8 @@ from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.oracles import MUJOCO, PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import QUANTITIES, recursive_quantities
 
-#: Robots, and the joints to lock; None: every second joint. There are mimic joints, slides, continuous
-#: joints, oblique axes, and planar and floating joints, which remain.
+#: Robots, and the joints to lock; None: every second joint. There are mimic, prismatic and continuous
+#: joints, oblique axes, and planar and floating joints, which are not locked.
 LOCKS = {
     "panda": ("panda_finger_joint1", "panda_joint4"),
     "a1": ("FL_hip_joint", "RR_calf_joint"),
@@ -166,7 +166,7 @@ def test_the_bound_of_a_prismatic_joint_locked_at_the_parent_origin_includes_rou
     p, origin = np.array([0.1, 0.7, -0.3]), 'xyz="0.1 0.7 -0.3" rpy="0.4 -1.1 2.2"'
     length = math.hypot(*p)
     axis = rotation_from_rpy([0.4, -1.1, 2.2]).T @ p
-    written = " ".join(map(repr, (axis / math.hypot(*axis)).tolist()))  # of unit length to rounding only
+    written = " ".join(map(repr, (axis / math.hypot(*axis)).tolist()))  # a unit vector only up to rounding
     whole = loaded(urdfs.robot(joint("s", "prismatic", "a", "b", origin, written, limit(-9, 9))))
     for value in (-length, np.nextafter(-length, 0.0), 7.3):
         locked = whole.locked({"s": float(value)})

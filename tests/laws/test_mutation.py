@@ -24,12 +24,12 @@ from urdfkin.verify.pinocchio import PinocchioOracle
 
 #: The relative change of a term.
 FACTOR = "1.0000000001"
-#: No bound is as wide: 24 roundings a factor, three or four factors, a dozen joints.
+#: Upper limit of all bounds: 24 rounding errors for each of four factors and each of a dozen joints.
 WIDEST = 24.0 * 4 * 12
 
 
 def terms() -> Iterator[tuple[str, str]]:
-    """(equation, term): each vector that an equation's last line adds, crosses or hands on, by its text."""
+    """Yield (equation, term) for each vector in the last line of an equation."""
     for name, function in vars(equations).items():
         if not inspect.isfunction(function) or name in VECTORS or name not in USED:
             continue
@@ -38,7 +38,7 @@ def terms() -> Iterator[tuple[str, str]]:
                 yield name, ast.unparse(node)
 
 
-#: The equations that a motion goes through; the others are those of points and frames (tests/text).
+#: The equations of a robot's motion; tests/text tests the equations of points and frames.
 USED = (
     "angular_velocity", "tangential", "point_velocity", "sliding_velocity", "transverse", "centripetal",
     "coriolis", "angular_acceleration", "point_acceleration", "sliding_acceleration",
@@ -70,7 +70,7 @@ def farthest(robot: Robot) -> float:
 
 @pytest.fixture(scope="module")
 def robots() -> list[Robot]:
-    # Rotary joints, a sliding one, and planar and floating ones that something moves.
+    # Revolute joints, a prismatic joint, and moving planar and floating joints.
     return [urdfkin.load("panda"), urdfkin.load("polar"), robot_of("planar_and_floating_in_the_middle")]
 
 
@@ -89,7 +89,7 @@ def test_a_relative_error_of_1e_10_in_any_term_of_an_equation_is_detected(
 
 
 def robot_that_misreads(text: str, wrong: str) -> Robot:
-    """A robot whose own tree was read from `wrong` and which has Pinocchio check it against `text`."""
+    """Return a robot with the tree of `wrong`, which Pinocchio checks against `text`."""
     return Robot(tree_of(wrong.encode()), text, origin=Origin("<text>"))
 
 
@@ -104,7 +104,7 @@ def test_a_number_with_a_wrong_12th_digit_is_caught(place: str) -> None:
     q = robot.sample(5, 0)
     with pytest.raises(urdfkin.VerificationError, match="disagrees with Pinocchio's"):
         robot.placement(q, "panda_hand_tcp")
-    if place != "0.333":  # below the first joint, where no Jacobian depends on it
+    if place != "0.333":  # before the first joint, so no Jacobian depends on it
         with pytest.raises(urdfkin.VerificationError):
             robot.jacobian(q, "panda_hand_tcp")
 
@@ -128,7 +128,7 @@ def test_a_wrong_axis_or_mimic_rule_is_caught(before: str, after: str, frame: st
 
 
 def test_the_pinocchio_oracle_reads_the_robots_text_and_not_the_tree() -> None:
-    # What the oracle computes follows the text it was given; of the tree only names and layout enter.
+    # The oracle's results depend on its text; the tree gives only names and layout.
     robot = urdfkin.load("panda")
     moved = robot.urdf.replace('xyz="0 0 0.333"', 'xyz="0 0 0.433"')
     assert moved != robot.urdf

@@ -188,7 +188,7 @@ def test_the_error_about_an_unknown_robot_lists_the_nearest_names() -> None:
     assert "panda" in caught.value.nearest
 
 
-# -- named poses of the catalogue, compared with Pinocchio's limits and the SRDF files of example-robot-data
+# -- named poses of the catalogue ------------------------------------------------------------------------
 # ---
 
 #: Name of the SRDF's pose that the pose `ready` of a robot equals.

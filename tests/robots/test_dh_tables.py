@@ -1,4 +1,4 @@
-"""The tables of the catalogue's robots: Pinocchio's motion, and the vendors' cells."""
+"""Tables of the catalogue's robots have Pinocchio's motion and the vendors' cells."""
 
 from __future__ import annotations
 
@@ -64,10 +64,10 @@ def test_a_path_through_the_common_ancestor_agrees_with_pinocchio(
     assert table.rows
 
 
-# -- the vendors' tables come out of the shipped URDFs, cell by cell, and the shipped references agree -------
+# -- tables of the vendors -----------------------------------------------------------------------------
 
 
-#: Reference -> (snap, last) with which the table is the vendor's, and metres that the tip may then move.
+#: Options (snap, last) with which a table equals the vendor's table, and the tip's displacement (m).
 EXACT = {
     "ur3": (1e-6, "tip", 1e-11),
     "ur5": (1e-6, "tip", 1e-11),
@@ -117,7 +117,7 @@ def test_a_bundled_reference_table_agrees_with_the_urdf_to_the_stated_accuracy(n
 
 @pytest.mark.slow
 def test_an_error_of_0_3_mm_in_a_published_table_is_detected() -> None:
-    """A published xArm7 table (robotkinematicscatalogue 1.1.2) has a3 = 52.2 instead of 52.5 mm."""
+    """The xArm7 table of robotkinematicscatalogue 1.1.2 has a3 = 52.2 mm instead of 52.5 mm."""
     path, reference = published("xarm7_modified")
     rows = list(reference.rows)
     rows[3] = replace(rows[3], a=0.0522, alpha=-math.pi / 2, theta=math.pi)

@@ -1,4 +1,4 @@
-"""J-dot, the breakdown and the manipulator Jacobian, on a still and on a moving base."""
+"""J-dot, the breakdown and the manipulator Jacobian are right for a fixed and for a moving base."""
 
 import numpy as np
 import pytest

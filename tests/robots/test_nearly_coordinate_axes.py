@@ -1,4 +1,4 @@
-"""Pinocchio takes an axis within 1e-12 of x, y or z for that one: the boundary, and what follows."""
+"""Pinocchio replaces an axis within 1e-12 of x, y or z; urdfkin's bounds include this change."""
 
 import itertools
 import pickle
@@ -22,7 +22,7 @@ AXES = np.eye(3)
 
 
 def text(kind: str, *axes: FloatArray) -> str:
-    """A chain whose joints have the axes; every number is written so that it reads back exactly."""
+    """Write a chain with these joint axes, with enough digits to read each number exactly."""
     limit = "" if kind == "continuous" else '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
     joints = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}"><parent link="l{i}"/>'
@@ -34,7 +34,7 @@ def text(kind: str, *axes: FloatArray) -> str:
 
 
 def snaps(kind: str, axis: FloatArray) -> bool:
-    """Whether Pinocchio's model has a joint for x, y or z."""
+    """Return whether Pinocchio's model has a joint about x, y or z."""
     name = pin.buildModelFromXML(text(kind, axis)).joints[1].shortname().removeprefix("JointModel")
     return name in [KINDS[kind] + letter for letter in "XYZ"]
 
@@ -44,7 +44,7 @@ def found(kind: str, axis: FloatArray) -> bool:
 
 
 def near(size: float, seed: int) -> FloatArray:
-    """A unit vector's coordinates, tilted off x, y or z by `size` in a random direction."""
+    """Return a unit vector that is tilted from x, y or z by `size` in a random direction."""
     rng = np.random.default_rng(seed)
     axis: FloatArray = AXES[seed % 3].copy()
     off = rng.normal(size=3)
@@ -100,14 +100,14 @@ def test_urdfkin_uses_the_tilted_axis_of_the_file_and_pinocchio_differs_by_the_t
     ours = robot.placement([2.0], "l1")
     theirs = robot.verifier.oracle().placements(QueryBatch(["l1"], (np.array([[2.0]]),)))[0, 0]
     assert 0.1 * tilt < np.abs(ours - theirs).max() < 2.0 * tilt
-    # Twice as long, the same direction is no longer taken for a coordinate axis: the two agree with ours.
+    # Pinocchio keeps the direction of an axis of length 2, so Pinocchio and urdfkin agree.
     doubled = loaded(text(kind, 2.0 * near(0.99 * tilt, seed)))
     assert np.abs(doubled.placement([2.0], "l1") - ours).max() < 4.0 * EPS
     assert doubled.certificate().verified
 
 
 def untold(robot: Robot) -> Robot:
-    """The robot without what it was told of Pinocchio's axes."""
+    """Return the robot without the correction for Pinocchio's axes."""
     return Robot(with_tilts(robot.tree, {}), robot.urdf, origin=robot.origin)
 
 
@@ -115,7 +115,7 @@ def untold(robot: Robot) -> Robot:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("tilt", [1e-16, 1e-15, 1e-14, 1e-13, 0.99e-12])
 def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, tilt: float) -> None:
-    # Every joint tilted, all of them far from zero.
+    # Every joint is tilted and far from zero.
     robot = loaded(text(kind, *(near(tilt, seed) for seed in range(12))))
     q, v = robot.sample(50, 1), robot.sample(50, 2)
     for reference in ("local", "world", "local_world_aligned"):
@@ -128,7 +128,7 @@ def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, 
     assert certificate.verified
     assert all(line.share < 1.0 for line in certificate.lines)
     if tilt > 1e-15:
-        assert max(line.share for line in certificate.lines) > 0.01  # the allowance is of the right size
+        assert max(line.share for line in certificate.lines) > 0.01  # the bound is not too large
     if tilt > 1e-13:
         with pytest.raises(urdfkin.VerificationError):
             untold(robot).placement(q, "l12")
@@ -192,7 +192,7 @@ def test_bounds_of_tables_and_validation_include_tilted_axes() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_tilt_of_one_eps_in_every_joint_stays_within_the_bound(kind: str) -> None:
-    # All tilts to one side, all joints far from zero: what is not seen adds up as well as it can.
+    # All tilts have the same direction and all joints are far from zero, so the errors add up.
     tilted = [AXES[2] + [EPS, 0.0, 0.0]] * 30
     robot = loaded(text(kind, *tilted))
     q, v = robot.sample(50, 1), robot.sample(50, 2)

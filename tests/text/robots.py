@@ -33,7 +33,7 @@ def robot(name: str) -> Robot:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table such as figure 7.15's; the joint's coordinate is added to theta, or to d."""
+    """A row of a table such as that of figure 7.15; the joint's coordinate is added to theta or d."""
 
     d: Any
     a: Any
@@ -58,7 +58,7 @@ ROWS = {
 
 @dataclass(frozen=True)
 class Motion:
-    """A text robot on its way: q + v t + a t^2 / 2, and everything that follows from it at t = 0."""
+    """A robot of the textbook with the motion q + v t + a t^2 / 2, and its quantities at t = 0."""
 
     name: str
     q: FloatArray
@@ -73,19 +73,19 @@ class Motion:
         return mp.mpf(self.q[i - 1]) + mp.mpf(self.v[i - 1]) * t + mp.mpf(self.a[i - 1]) * t * t / 2
 
     def R(self, i: int) -> Callable[[Any], Any]:
-        """R_0_i over time."""
+        """Return R_0_i as a function of time."""
         return lambda t: self._frames(t)[i][0]
 
     def d(self, i: int) -> Callable[[Any], Any]:
-        """d_0i over time."""
+        """Return d_0i as a function of time."""
         return lambda t: self._frames(t)[i][1]
 
     def between(self, i: int) -> Callable[[Any], Any]:
-        """d_{i-1,i} over time."""
+        """Return d_{i-1,i} as a function of time."""
         return lambda t: self._frames(t)[i][1] - self._frames(t)[i - 1][1]
 
     def _frames(self, t: Any) -> list[tuple[Any, Any]]:
-        """Orientation and origin of frames 0 to n: each row is Rz Tz Tx Rx (7.64)."""
+        """Return orientation and origin of frames 0 to n; each row is Rz Tz Tx Rx (7.64)."""
         R, d = mp.eye(3), column(0, 0, 0)
         frames = [(R, d)]
         for i, row in enumerate(self.rows, start=1):
@@ -99,7 +99,7 @@ class Motion:
     # -- at t = 0, as doubles ------------------------------------------------------------------------
 
     def axis(self, i: int) -> FloatArray:
-        """z_{i-1}, the axis of joint i."""
+        """Return z_{i-1}, the axis of joint i."""
         return array(self.R(i - 1)(mp.mpf(0)))[:, 2]
 
     def x(self, i: int) -> FloatArray:
@@ -131,7 +131,7 @@ class Motion:
         return array(second_rate(self.d(i), 0.0))
 
     def between_rate(self, i: int) -> FloatArray:
-        """d-dot_{i-1,i} as frame 0 sees it."""
+        """Return d-dot_{i-1,i} as seen from frame 0."""
         return array(rate(self.between(i), 0.0))
 
 

@@ -1,4 +1,4 @@
-"""Section 7.1: one link in the plane, equations 7.1 to 7.5 and 7.7, on figure 7.1's link."""
+"""Section 7.1: equations 7.1 to 7.5 and 7.7 for one link in the plane (figure 7.1)."""
 
 from typing import Any
 

@@ -28,7 +28,7 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 def R(t: Any) -> Any:
-    """The text's R_z(phi) R_y(theta) R_z(psi)."""
+    """Return the textbook's R_z(phi) R_y(theta) R_z(psi)."""
     phi, theta, psi = (mp.mpf(a) + t * mp.mpf(r) for a, r in zip(ANGLES, RATES, strict=True))
     return turn("z", phi) * turn("y", theta) * turn("z", psi)
 
@@ -71,7 +71,7 @@ def test_7_56_the_inverse_of_omega_gives_zyz_rates_and_is_singular_at_theta_zero
 
 
 def quaternion(t: Any) -> Any:
-    """Scalar last, at 60 digits, of a rotation whose trace is positive."""
+    """Return the quaternion (scalar last, 60 digits) of a rotation with a positive trace."""
     matrix = about(column(1, 2, -2), 1 + t) * about(column(3, 0, 4), mp.sin(2 * t) / 2)
     q0 = mp.sqrt(1 + matrix[0, 0] + matrix[1, 1] + matrix[2, 2]) / 2
     parts = (matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1])
@@ -88,7 +88,7 @@ def test_7_57_quaternion_rates_are_the_derivative_of_the_quaternion() -> None:
     quat, exact = array(quaternion(mp.mpf(t))), array(rate(quaternion, t))
     assert close(quaternion_rates(quat, w), exact)
     assert close(angular_velocity_from_quaternion_rates(quat, exact), w)
-    # The text's own matrix, rows put in our order: the vector first.
+    # The textbook's matrix, with its rows in urdfkin's order: the vector first.
     q, q0 = quat[:3], quat[3]
     assert close(quaternion_rate_matrix(quat), 0.5 * np.vstack((q0 * np.eye(3) - skew(q), -q)))
 
@@ -99,7 +99,7 @@ QUARTER = np.pi / 2
 
 
 def turning(first: str) -> Any:
-    """Angular velocity of case 1 (x, then y) or case 2 (y, then x)."""
+    """Return the angular velocity of case 1 (x, then y) or case 2 (y, then x)."""
     order = {"x": (0, 1), "y": (1, 0)}[first]
     return lambda t: QUARTER * np.eye(3)[order[0] if t < 1.0 else order[1]]
 
@@ -113,7 +113,7 @@ def test_example_7_3_angular_velocities_with_equal_integrals_give_different_orie
     middles = (np.arange(200) + 0.5) / 100.0
     assert np.abs(sum(w(t) for t in middles) / 100.0 - [QUARTER, QUARTER, 0.0]).max() < 1e-12
     quats = integrate_orientation(w, [0.0, 0.0, 0.0, 1.0], np.linspace(0.0, 2.0, 401))
-    # Fourth order with 200 steps a quarter turn: an error near 1e-11.
+    # A method of fourth order with 200 steps for a quarter turn has an error near 1e-11.
     assert np.abs(rotation_of(quats[-1]) @ Z - z1_ends_as).max() < 1e-9
     assert (
         np.abs(rotation_of(quaternion_of(rotation_of(quats[-1]))) - rotation_of(quats[-1])).max() <= ROUNDING

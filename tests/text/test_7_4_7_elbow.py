@@ -1,4 +1,4 @@
-"""Section 7.4.7: the elbow robot of figure 7.16, equations 7.109 to 7.114, and what they save.
+"""Section 7.4.7: the elbow robot of figure 7.16, equations 7.109 to 7.114, and the saved operations.
 
 d1 = 0.6 m, a2 = 0.5 m, d4 = 0.45 m, as in robots/elbow.urdf.
 """
@@ -26,7 +26,7 @@ def jacobian() -> FloatArray:
 
 
 def arm(i: int) -> FloatArray:
-    """d_i6 by the recursion of 7.110, from the wrist inwards."""
+    """Return d_i6 by the recursion of 7.110, which begins at the wrist."""
     vector = np.zeros(3)
     for k in range(6, i, -1):
         row = MOVING.rows[k - 1]
@@ -103,7 +103,7 @@ def values(columns: list[Any]) -> FloatArray:
 
 
 def linear_rows_by_7_110(nonzero: int) -> tuple[FloatArray, int]:
-    """Linear rows with every arm by 7.110; columns beyond `nonzero` are known to vanish (7.109)."""
+    """Return the linear rows by 7.110; columns from `nonzero` on are zero (7.109)."""
     Counted.multiplications = 0
     z, vector, columns = [counted(axis) for axis in Z], counted(np.zeros(3)), []
     for k in range(6, 0, -1):
@@ -128,7 +128,7 @@ def test_the_substitution_in_7_114_saves_two_thirds_of_the_multiplications() -> 
     shortest, substituted = linear_rows_by_7_114()
     for rows in (full, shorter, shortest):
         assert close(rows, jacobian()[:3])
-    # Six for each cross product and interorigin vector; substituted: three crosses and two scaled axes.
+    # Six products for each cross product and interorigin vector; with 7.114, fewer of both.
     assert (all_of_them, with_zeros, substituted) == (72, 54, 24)
 
 

@@ -35,7 +35,7 @@ R_06 = MOVING.rotation(6)
 
 
 def pose(moving: Motion, t: Any) -> Any:
-    """X = (x1, x2, x3, phi, theta, psi): position and ZYZ angles of frame 6."""
+    """Return X = (x1, x2, x3, phi, theta, psi), the position and ZYZ angles of frame 6."""
     R, d = moving.R(6)(t), moving.d(6)(t)
     theta = mp.atan2(mp.sqrt(R[0, 2] ** 2 + R[1, 2] ** 2), R[2, 2])
     phi, psi = mp.atan2(R[1, 2], R[0, 2]), mp.atan2(R[2, 1], -R[2, 0])
@@ -43,7 +43,7 @@ def pose(moving: Motion, t: Any) -> Any:
 
 
 def derivative_by_joint(j: int) -> FloatArray:
-    """Column j of the derivative of f: the rates of x with joint j alone moving, by its rate."""
+    """Return column j of f's derivative: the rates of x if only joint j moves, divided by its velocity."""
     alone = only(MOVING, j)
     slope: FloatArray = array(rate(lambda t: pose(alone, t), 0.0)) / alone.v[j - 1]
     return slope
@@ -92,7 +92,7 @@ def test_7_122_the_manipulator_jacobian_is_the_inverse_of_C_times_the_velocity_j
 
 
 def test_7_122_a_singular_omega_is_refused_and_a_quaternion_has_no_singularity() -> None:
-    # At zero the elbow's wrist stands upright: theta = 0, and ZYZ cannot say how it turns.
+    # In the zero configuration, theta is 0, which is a singularity of the ZYZ angles.
     with pytest.raises(RepresentationSingularityError, match="ZYZ"):
         robot("elbow").analytical_jacobian(np.zeros(6), "wrist", "ZYZ")
     assert robot("elbow").analytical_jacobian(np.zeros(6), "wrist", "quaternion").shape == (7, 6)
@@ -118,7 +118,7 @@ def test_7_123_a_fixed_point_has_a_transverse_and_a_centripetal_acceleration() -
     assert not parts.relative.any()
     p_0 = frame(0).R_0_1 @ array(p_1)
     assert agree(parts.transverse, np.cross(frame(0).alpha_0_1, p_0))
-    # By the identity w x (w x p) = w (w . p) - p (w . w), computed the other way.
+    # The identity w x (w x p) = w (w . p) - p (w . w) gives an independent result.
     w = frame(0).w_0_1
     assert agree(parts.centripetal, w * (w @ p_0) - p_0 * (w @ w), room=256)
 
@@ -133,7 +133,7 @@ def test_7_125_the_acceleration_of_a_moving_point_includes_coriolis_and_relative
     p_1, v_1, a_1 = array(point(mp.mpf(T))), array(rate(point, T)), array(second_rate(point, T))
     parts = point_acceleration(frame(0), p_1, v_1, a_1)
     assert agree(parts.total, array(second_rate(moving, T)), room=256)
-    # Coriolis stands at right angles to w and to the relative velocity, as seen in frame 0.
+    # The Coriolis term is perpendicular to w and to the relative velocity, as seen in frame 0.
     assert abs(parts.coriolis @ frame(0).w_0_1) <= 64 * ROUNDING
     assert abs(parts.coriolis @ (frame(0).R_0_1 @ v_1)) <= 64 * ROUNDING
 
@@ -238,7 +238,7 @@ def test_7_130_each_part_of_the_breakdown_has_the_value_of_a_named_term() -> Non
 
 
 def test_the_motion_of_the_base_is_the_initial_condition_of_the_recursion() -> None:
-    # Frame -1 of the text: the base turns about an axis and falls, and the polar robot goes on as before.
+    # Frame -1 of the textbook: the base rotates and falls, while the polar robot moves as before.
     generator = np.random.default_rng(11)
     R, p = exp_rotation([0.3, -0.4, 0.5]), np.array([0.2, 0.1, 0.7])
     w, vel, alpha, acc = generator.normal(size=(4, 3))

@@ -83,7 +83,7 @@ def passes(test: str) -> bool:
 
 @cache
 def passes_as_it_is(test: str) -> bool:
-    """The same while nothing is wrong: equations share tests, and each need pass but once."""
+    """Return whether the tests pass without a mutant; equations share tests, so each test runs once."""
     return passes(test)
 
 
@@ -112,7 +112,7 @@ def test_the_tests_of_an_equation_detect_a_slightly_wrong_function(number: str) 
     for name in equation.functions:
         with slightly_wrong(resolve(name)):
             assert not all(passes(test) for test in equation.tests), f"{name} may be wrong unnoticed"
-    # What failed did so because of that function alone: with all of them right again everything passes.
+    # Only the changed function caused the failures, because all tests pass without the change.
     assert all(passes(test) for test in equation.tests)
 
 
@@ -142,7 +142,7 @@ def test_explain_describes_each_equation_and_states_the_lost_equations() -> None
 
 
 _WORDS = {r"\times": "x", r"\cdot": ".", r"\ldots": "...", r"\omega": "w", r"\left": "", r"\right": ""}
-#: Brackets and signs between entries, which the two notations write differently.
+#: Brackets and signs between entries, which are different in the two notations.
 _BETWEEN = re.compile(r"[\s_{}()\[\],;&\\]")
 
 
@@ -158,7 +158,7 @@ def of_latex(latex: str) -> str:
 
 
 def of_statement(statement: str) -> str:
-    """Plain characters, dots before subscripts as LaTeX has them."""
+    """Return the plain characters, with dots before subscripts as in LaTeX."""
     return _BETWEEN.sub("", re.sub(r"\b(theta|[a-zA-Z])(_?[0-9a-z])((?:-dot)+)", r"\1\3\2", statement))
 
 
@@ -232,7 +232,7 @@ def test_the_moment_arm_begins_at_the_origin_on_the_joints_axis() -> None:
 def test_7_121_holds_for_a_robot_that_is_not_the_elbow() -> None:
     polar = motion("polar")
     J_v, R = robot("polar").jacobian(polar.q, "slider"), polar.rotation(2)
-    # ZYZ angles are singular for a robot that turns about z alone; rpy are not.
+    # For a robot that rotates only about z, ZYZ angles are singular; roll, pitch and yaw are not.
     assert close(velocity_jacobian("xyz", R, analytical_jacobian("xyz", R, J_v)), J_v)
     assert J_v.shape != (6, 6)
 

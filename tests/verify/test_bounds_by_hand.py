@@ -1,4 +1,4 @@
-"""The bounds, number for number, as derived, and the sizes of terms."""
+"""The bounds and the sizes of terms equal numbers that are derived by hand."""
 
 from typing import Any
 
@@ -63,7 +63,7 @@ def test_the_bound_of_a_placement_has_the_path_length_and_one_as_scales(plan: Co
     assert bound.k.ravel().tolist() == [24.0 * JOINTS]
 
 
-#: The turn `a` comes before the slides `b` and `c` of three times the coordinate.
+#: The revolute joint `a` comes before the prismatic joints `b` and `c`, which move by three times its value.
 BY_HAND: list[tuple[Quantity, Reference, Any, Any, int]] = [
     (VELOCITY, ALIGNED, VEL, W, 2),
     (VELOCITY, LOCAL, VEL, W, 3),
@@ -124,10 +124,10 @@ def test_the_bound_of_a_relative_placement_includes_both_paths() -> None:
 @pytest.mark.parametrize(
     ("frame", "reference", "linear"),
     [
-        ("l1", ALIGNED, [False, False]),  # on the axis of the turn, with no length behind it
+        ("l1", ALIGNED, [False, False]),  # on the axis of the revolute joint, with no length after it
         ("l2", ALIGNED, [True, True]),
         ("l3", LOCAL, [True, True]),
-        ("l3", WORLD, [False, True]),  # the axis of the turn goes through the world's origin
+        ("l3", WORLD, [False, True]),  # the axis of the revolute joint passes through the world's origin
         ("l0", ALIGNED, [False, False]),
     ],
 )
@@ -238,11 +238,11 @@ def of_the_arm(q: list[float], v: list[float], a: list[float]) -> Magnitudes:
 
 def test_magnitudes_are_reached_if_all_terms_have_the_same_direction() -> None:
     size = of_the_arm([0.0, 0.0, 0.25], [2.0, 3.0, 0.0], [0.0, 0.0, 0.0])
-    # Stretched out: 2 m turn with 2 rad/s, 1.75 m with 5 rad/s.
+    # In the outstretched arm, 2 m rotate with 2 rad/s, and 1.75 m with 5 rad/s.
     assert size.p == 3.75
     assert size.w == 5.0
     assert size.vel == 2.0 * 2.0 + 5.0 * 1.75
-    assert size.alpha == 2.0 * 2.0 + 3.0 * (2.0 + 3.0)  # Pinocchio's v w x z, before it vanishes
+    assert size.alpha == 2.0 * 2.0 + 3.0 * (2.0 + 3.0)  # Pinocchio's term v w x z, which cancels later
     assert size.acc == (4.0 + 4.0) * 2.0 + (size.alpha + 25.0) * 1.75
     assert size.roundings == 5 * ROUNDINGS
 

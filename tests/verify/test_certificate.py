@@ -41,7 +41,7 @@ def often() -> Iterator[None]:
 
 
 def counts(robot: Robot) -> dict[str, tuple[int, int]]:
-    """Checked and unchecked results of each quantity."""
+    """Return the checked and unchecked results of each quantity."""
     return {str(line.quantity): (line.checked, line.unchecked) for line in robot.certificate().lines}
 
 
@@ -52,7 +52,7 @@ def test_the_certificate_counts_calls_of_every_kind(robot: Robot) -> None:
     for _ in range(3):
         fast.placement(one[0])
         fast.velocity(*one[:2])
-        fast.jacobian(one[0].tolist())  # the long way
+        fast.jacobian(one[0].tolist())  # without the fast function
         fast.acceleration(*one)
     assert counts(robot) == dict.fromkeys(("placement", "velocity", "jacobian", "acceleration"), (0, 3))
     robot.placement(one[0], FRAME)

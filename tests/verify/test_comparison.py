@@ -1,4 +1,4 @@
-"""The compiled comparison is its definition, `disagreement`, whatever the numbers are."""
+"""The compiled comparison equals its definition, `disagreement`, for all numbers."""
 
 from collections.abc import Iterator
 
@@ -29,21 +29,21 @@ def _in_both_ways(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 def definition(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes: int) -> FloatArray:
-    """The largest disagreement over the axes of each result; none where a result has no numbers."""
+    """Return the largest disagreement of each result; 0 for a result without numbers."""
     units = disagreement(ours, theirs, scale)
     return np.asarray(units.reshape(*ours.shape[:axes], -1).max(axis=-1, initial=0.0))
 
 
 @st.composite
 def cases(draw: st.DrawFn) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-    """Results, some of them equal or a rounding apart, and a scale that may have to be broadcast."""
+    """Return results, some equal or different by rounding, and a scale that may need broadcasting."""
     shape = draw(st.sampled_from([(1,), (7,), (1, 6), (3, 2, 6), (2, 2, 6, 3), (17, 1, 4, 4)]))
     size = int(np.prod(shape))
     pool = draw(st.lists(numbers, min_size=1, max_size=24))
     ours = np.resize(np.array(pool), size).reshape(shape)
     change = np.resize(np.array(draw(st.lists(st.integers(0, 3), min_size=1, max_size=16))), size)
     other = np.resize(np.array(draw(st.lists(numbers, min_size=1, max_size=5))), size)
-    with np.errstate(over="ignore"):  # before NumPy 2.2 the number after the largest raised a flag
+    with np.errstate(over="ignore"):  # before NumPy 2.2, the number after the largest one raised a flag
         up = np.nextafter(ours, np.inf).ravel()
     theirs = np.choose(change, [ours.ravel(), ours.ravel(), up, other]).reshape(shape)
     own = draw(st.sampled_from([shape, shape[-1:], (1,) * len(shape)]))

@@ -33,7 +33,7 @@ from urdfkin.verify.bounds import Magnitudes
 from urdfkin.verify.oracle import Oracle, QueryBatch, coupled
 from urdfkin.verify.quantities import QUANTITIES, VELOCITY, Quantity, by_command, recursive_quantities
 
-# -- an invented row: the angular velocity -------------------------------------------------------------
+# -- a new row: the angular velocity -------------------------------------------------------------------
 
 
 def turning(*x: Any, out: FloatArray | None = None, **how: Any) -> FloatArray:

@@ -63,7 +63,7 @@ def test_the_check_of_a_single_call_records_the_results_of_the_check_of_a_batch(
 
 
 def planted(robot: Robot, method: str, place: int, by: float) -> Any:
-    """Return the checked function of a method with one number that is wrong by `by`; 0: by one double."""
+    """Return the checked function of a method with one number that is wrong by `by`, or by one ulp for 0."""
     frame = robot.tip_frame
     plan = robot.plan([robot.tree.frame_link(frame)])
     compute, _ = single(method, plan, Reference.LOCAL_WORLD_ALIGNED)
@@ -94,7 +94,7 @@ def test_an_error_in_any_number_of_a_single_result_is_detected(name: str, method
     inputs = (q, v, a)[: METHODS[method]]
     quantity = QUANTITIES[method]
     bounds = bound_of_one(robot, quantity, inputs)
-    step = max(1, len(bounds) // 60)  # of a Hessian some
+    step = max(1, len(bounds) // 60)  # some entries of a Hessian
     for place in range(0, len(bounds), step):
         check = planted(robot, method, place, 2.0 * bounds[place])
         with pytest.raises(VerificationError) as caught:

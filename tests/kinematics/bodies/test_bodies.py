@@ -1,4 +1,4 @@
-"""Moving points and frames against positions at 60 digits, and the manipulator Jacobian."""
+"""Motions of points and frames agree with positions at 60 digits; also the manipulator Jacobian."""
 
 from typing import Any
 
@@ -81,7 +81,7 @@ def test_the_derivative_of_a_planar_rotation_is_the_rotation_by_a_further_right_
     assert np.abs(planar_rotation_derivative(thetas) - planar_rotation(thetas + np.pi / 2)).max() <= ROUNDING
 
 
-# The manipulator Jacobian against the velocity Jacobian, for every representation, and its singularity.
+# -- the manipulator Jacobian --------------------------------------------------------------------------
 
 
 R = exp_rotation([0.5, -0.8, 0.3])
@@ -128,7 +128,7 @@ def test_at_a_representation_singularity_the_jacobian_is_refused_with_the_distan
         with pytest.raises(RepresentationSingularityError, match=f"{sequence}.*rad from it") as caught:
             analytical_jacobian(sequence, singular, np.ones((6, 3)))
         assert caught.value.distance < 1e-9
-        # The other way there is no singularity: angular velocities of Euler rates always exist.
+        # The angular velocity of Euler rates exists in every configuration.
         assert np.isfinite(velocity_jacobian(sequence, singular, np.ones((6, 3)))).all()
 
 

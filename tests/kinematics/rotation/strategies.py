@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from urdfkin.kinematics.inputs import FloatArray
 
-#: A few units in the last place of numbers of size one, which is what rounding gives.
+#: A few units in the last place of numbers of size one, as rounding causes.
 ROUNDING = 16 * np.finfo(np.float64).eps
 
 
@@ -19,7 +19,7 @@ def close(found: Any, expected: Any, room: float = 4.0) -> bool:
 
 _components = st.one_of(st.sampled_from([0.0, 1.0, -1.0, 1e-9, -1e-17]), st.floats(-1.0, 1.0))
 
-#: Vectors with components in [-1, 1], zeros and tiny ones included.
+#: Vectors with components in [-1, 1], including zero and tiny components.
 vectors3 = st.tuples(_components, _components, _components).map(np.array)
 
 
@@ -28,10 +28,10 @@ def _normalised(vector: FloatArray) -> FloatArray:
     return unit
 
 
-#: Unit vectors, the coordinate axes and their near neighbours among them.
+#: Unit vectors, including the coordinate axes and vectors close to these axes.
 axes = vectors3.filter(lambda v: bool(np.linalg.norm(v) > 1e-3)).map(_normalised)
 
-#: Angles, multiples of a right angle and their near neighbours among them.
+#: Angles, including multiples of a right angle and angles close to these multiples.
 angles = st.one_of(
     st.floats(-10.0, 10.0),
     st.builds(

@@ -1,4 +1,4 @@
-"""Rates of a rotation, of Euler angles and of quaternions, against derivatives at 60 digits."""
+"""Rates of rotations, Euler angles and quaternions agree with derivatives at 60 digits."""
 
 from collections.abc import Callable
 from typing import Any, Literal
