@@ -12,7 +12,7 @@ draws constants from the imported modules, which depend on the tests of the run.
 `pytest --hypothesis-profile=search` tries new examples, including these constants.
 
 Collected tests exist until the end of the run, so the garbage collector ignores them. It is also disabled
-while pytest collects ten thousand tests, because it took a third of this time.
+while pytest collects ten thousand tests, because it makes the collection a third longer.
 """
 
 import gc

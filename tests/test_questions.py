@@ -137,7 +137,7 @@ def test_messages_about_common_mistakes_name_an_existing_section(
 
 
 def test_a_message_names_the_section_of_each_common_problem() -> None:
-    """No message names `stale-data`; messages about errors in a file contain the codes of findings instead."""
+    """No message names `stale-data`; messages about a file contain the codes of findings instead."""
     led = {question.value for question in ASKED}
     assert set(list(answers())[1:16]) - led == {"stale-data", "errors-in-a-file"}
 
