@@ -32,7 +32,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
 
-from scripts.mutating.operators import function_at, slips
+from scripts.mutating.operators import changes_of, function_at
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
@@ -104,7 +104,7 @@ class Named:
 
 def named_mutants() -> list[Named]:
     text = (TESTS / "attacks" / "named_mutants.toml").read_text(encoding="utf-8")
-    return [Named(**slip) for slip in tomllib.loads(text)["slip"]]
+    return [Named(**mutant) for mutant in tomllib.loads(text)["mutant"]]
 
 
 @cache
@@ -144,9 +144,9 @@ def mutants(parts: list[str]) -> list[Mutant]:
             module_of(path),
             path.relative_to(ROOT),
         )
-        for number, slip in enumerate(slips(tree)):
-            place = ".".join(filter(None, (module, function_at(tree, slip.line))))
-            found.append(Mutant(f"{module}:{number}", str(file), slip.line, slip.what, place))
+        for number, change in enumerate(changes_of(tree)):
+            place = ".".join(filter(None, (module, function_at(tree, change.line))))
+            found.append(Mutant(f"{module}:{number}", str(file), change.line, change.what, place))
     return found
 
 
@@ -163,14 +163,14 @@ def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool 
     return Outcome(mutant, word, by)
 
 
-def evaluate_named(slip: Named, *, timeout: float) -> Outcome:
+def evaluate_named(named: Named, *, timeout: float) -> Outcome:
     """Run the test that must fail for this mutant."""
-    texts = json.dumps([slip.before, slip.after])
-    word, by = _run({"URDFKIN_MUTANT": slip.module, "URDFKIN_MUTANT_TEXTS": texts}, [slip.test], timeout)
-    if word == "noticed" and not by.startswith(f"FAILED {slip.test}"):
+    texts = json.dumps([named.before, named.after])
+    word, by = _run({"URDFKIN_MUTANT": named.module, "URDFKIN_MUTANT_TEXTS": texts}, [named.test], timeout)
+    if word == "noticed" and not by.startswith(f"FAILED {named.test}"):
         word = "not run"  # the test failed, but not because of the mutant
-    file = slip.file.relative_to(ROOT).as_posix()
-    mutant = Mutant(slip.claim, file, 0, f"{slip.before}  ->  {slip.after}", slip.module)
+    file = named.file.relative_to(ROOT).as_posix()
+    mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.module)
     return Outcome(mutant, word, by)
 
 
@@ -179,9 +179,9 @@ _READY = multiprocessing.get_context("forkserver")
 _READY.set_forkserver_preload(["numba", "pinocchio", "pytest"])
 
 
-def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, str]:
+def _run(change: dict[str, str], tests: list[str], timeout: float) -> tuple[str, str]:
     with tempfile.NamedTemporaryFile("r") as output:
-        process = _READY.Process(target=_ask, args=(slip, tests, output.name))
+        process = _READY.Process(target=_ask, args=(change, tests, output.name))
         process.start()
         process.join(timeout)
         if process.exitcode is None:
@@ -195,14 +195,17 @@ def _run(slip: dict[str, str], tests: list[str], timeout: float) -> tuple[str, s
     return "noticed", next(failed, lines[-1] if lines else "")[:300]
 
 
-def _ask(slip: dict[str, str], tests: list[str], output: str) -> None:
+def _ask(change: dict[str, str], tests: list[str], output: str) -> None:
     """Inject a mutant into this new process and its children, run the tests, and exit with pytest's code."""
     import pytest
 
     hook = ROOT / "scripts" / "mutating" / "hook"
     paths = [str(hook), str(ROOT), os.environ.get("PYTHONPATH", "")]
     os.chdir(ROOT)
-    os.environ |= slip | {"PYTHONPATH": os.pathsep.join(filter(None, paths)), "PYTHONDONTWRITEBYTECODE": "1"}
+    os.environ |= change | {
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
     sys.dont_write_bytecode = True
     with open(output, "w") as to, open(os.devnull) as nothing:  # noqa: PTH123  the next lines need descriptors
         os.dup2(nothing.fileno(), 0)
@@ -232,8 +235,8 @@ def main() -> int:
         parser.error(str(error))
     asks: list[Callable[[], Outcome]]
     if options.named:
-        named = [slip for slip in named_mutants() if not options.parts or slip.module in modules]
-        asks = [partial(evaluate_named, slip, timeout=options.timeout) for slip in named]
+        named = [one for one in named_mutants() if not options.parts or one.module in modules]
+        asks = [partial(evaluate_named, one, timeout=options.timeout) for one in named]
     else:
         chosen = [mutant for mutant in mutants(options.parts) if options.only in (None, mutant.name)]
         if options.sample is not None and options.sample < len(chosen):

@@ -24,7 +24,7 @@ from scripts.mutate import (
     mutants,
     near_tests,
 )
-from scripts.mutating.operators import function_at, mutated, slips
+from scripts.mutating.operators import changes_of, function_at, mutated
 
 SOURCE = '''
 """A text is left alone: 1 < 2."""
@@ -48,7 +48,7 @@ WHAT = {
 
 
 def test_every_kind_of_mutant_is_made_once_and_only_in_executed_code() -> None:
-    found = [slip.what for slip in slips(ast.parse(SOURCE))]
+    found = [change.what for change in changes_of(ast.parse(SOURCE))]
     assert sorted(found) == sorted(WHAT)
 
 
@@ -72,8 +72,8 @@ def test_every_mutant_of_the_package_compiles_and_has_a_test() -> None:
     for path in files([]):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for statement in tree.body:
-            for slip in slips(ast.Module([statement], []))[::20]:
-                with slip.made():
+            for change in changes_of(ast.Module([statement], []))[::20]:
+                with change.made():
                     compile(ast.fix_missing_locations(ast.Module([statement], [])), str(path), "exec")
         if path.stem not in ("__init__", "__main__"):
             assert near_tests(path), path

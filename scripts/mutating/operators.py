@@ -25,7 +25,7 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
 @dataclass(frozen=True)
-class Slip:
+class Change:
     """One mutant: a new value in a list or in a field of a node."""
 
     shown: ast.AST  # the node whose text is printed
@@ -63,15 +63,15 @@ class Slip:
         return old
 
 
-def slips(tree: ast.Module) -> list[Slip]:
+def changes_of(tree: ast.Module) -> list[Change]:
     """Return all mutants of a file in a fixed order; applying a mutant changes the given tree."""
-    return [slip for node in _code(tree) for slip in (*_of_expression(node), *_of_statement(node))]
+    return [change for node in _code(tree) for change in (*_of_expression(node), *_of_statement(node))]
 
 
 def mutated(source: str, number: int) -> ast.Module:
     tree = ast.parse(source)
-    slip = slips(tree)[number]
-    slip.put(slip.value)
+    change = changes_of(tree)[number]
+    change.put(change.value)
     return ast.fix_missing_locations(tree)
 
 
@@ -110,38 +110,38 @@ def _for_types(node: ast.AST) -> bool:
     return isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
 
 
-def _of_expression(node: ast.AST) -> Iterator[Slip]:
+def _of_expression(node: ast.AST) -> Iterator[Change]:
     match node:
         case ast.Compare():
             for i, op in enumerate(node.ops):
-                yield Slip(node, node.ops, i, _COMPARISONS[type(op)]())
+                yield Change(node, node.ops, i, _COMPARISONS[type(op)]())
         case ast.BoolOp():
-            yield Slip(node, node, "op", ast.Or() if isinstance(node.op, ast.And) else ast.And())
+            yield Change(node, node, "op", ast.Or() if isinstance(node.op, ast.And) else ast.And())
         case ast.BinOp() | ast.AugAssign() if type(node.op) in _OPERATIONS and not _of_text(node):
-            yield Slip(node, node, "op", _OPERATIONS[type(node.op)]())
+            yield Change(node, node, "op", _OPERATIONS[type(node.op)]())
         case ast.UnaryOp(op=ast.USub()):
-            yield Slip(node, node, "op", ast.UAdd())
+            yield Change(node, node, "op", ast.UAdd())
         case ast.UnaryOp(op=ast.Not()):
-            yield Slip(node, node, "operand", ast.UnaryOp(ast.Not(), node.operand))
+            yield Change(node, node, "operand", ast.UnaryOp(ast.Not(), node.operand))
         case ast.Constant(value=bool() | int() | float() as value):
-            yield Slip(node, node, "value", _other(value))
+            yield Change(node, node, "value", _other(value))
         case ast.Name(id=name) if name in _NAMES:
-            yield Slip(node, node, "id", _NAMES[name])
+            yield Change(node, node, "id", _NAMES[name])
 
 
-def _of_statement(node: ast.AST) -> Iterator[Slip]:
+def _of_statement(node: ast.AST) -> Iterator[Change]:
     match node:
         case ast.If(test=test) | ast.IfExp(test=test) if isinstance(
             test, ast.Name | ast.Attribute | ast.Call
         ):
-            yield Slip(node, node, "test", ast.UnaryOp(ast.Not(), test))
+            yield Change(node, node, "test", ast.UnaryOp(ast.Not(), test))
         case ast.Expr(value=ast.Call()):
-            yield Slip(node, node, "value", ast.Constant(None))
+            yield Change(node, node, "value", ast.Constant(None))
     for field in ("body", "orelse", "finalbody"):
         statements = getattr(node, field, None)
         for i, statement in enumerate(statements if isinstance(statements, list) else ()):
             if (other := _STATEMENTS.get(type(statement))) is not None:
-                yield Slip(statement, statements, i, other())
+                yield Change(statement, statements, i, other())
 
 
 def _short(node: ast.AST) -> str:

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 
 import urdfkin
-from scripts.mutating.operators import mutated, slips
+from scripts.mutating.operators import changes_of, mutated
 from tests.reading import tree_of
 from urdfkin import BaseMotion
 from urdfkin.dh import table_from_rows
@@ -299,9 +299,9 @@ def truth() -> dict[str, FloatArray]:
     return found
 
 
-def slips_of(names: Sequence[str], sample: int | None, seed: int) -> list[tuple[str, int]]:
+def mutants_of(names: Sequence[str], sample: int | None, seed: int) -> list[tuple[str, int]]:
     """Return mutants as (module, number): all mutants of some modules, or a sample."""
-    places = [(name, i) for name in names for i in range(len(slips(ast.parse(source_of(name)))))]
+    places = [(name, i) for name in names for i in range(len(changes_of(ast.parse(source_of(name)))))]
     return places if sample is None else random.Random(seed).sample(places, min(sample, len(places)))
 
 
@@ -313,10 +313,10 @@ def main() -> None:
     arguments.add_argument("--seed", type=int, default=0)
     asked = arguments.parse_args()
     right = truth()
-    for name, number in slips_of(asked.modules or MODULES, asked.sample, asked.seed):
-        slip = slips(ast.parse(source_of(name)))[number]
+    for name, number in mutants_of(asked.modules or MODULES, asked.sample, asked.seed):
+        mistake = changes_of(ast.parse(source_of(name)))[number]
         answer = attempt(name, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
-        row = {"slip": f"{name}:{number}", "line": slip.line, "what": slip.what, "outcome": answer}
+        row = {"mistake": f"{name}:{number}", "line": mistake.line, "what": mistake.what, "outcome": answer}
         print(json.dumps(row), flush=True)
 
 

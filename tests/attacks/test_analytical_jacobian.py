@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from scripts.mutating.operators import function_at, mutated, slips
+from scripts.mutating.operators import changes_of, function_at, mutated
 from tests.attacks.input_to_result_mutants import make
 from urdfkin.errors import RepresentationSingularityError
 from urdfkin.kinematics import bodies as module
@@ -136,8 +136,8 @@ def test_an_error_far_above_rounding_is_caught_near_the_singularity(
     for distance in (1e-1, 1e-2, 1e-3):
         middle = distance if name == "ZYZ" else np.pi / 2 - distance
         quat = quaternion_of(rotation_from_euler(name, [0.4, middle, 0.9]))
-        slip = 200.0 * 24.0 * EPS / distance
-        monkeypatch.setattr(module, "representation_inverse", lambda *x, s=slip: right(*x) * (1.0 + s))
+        mistake = 200.0 * 24.0 * EPS / distance
+        monkeypatch.setattr(module, "representation_inverse", lambda *x, s=mistake: right(*x) * (1.0 + s))
         with pytest.raises(urdfkin.VerificationError):
             free.analytical_jacobian([0.0, 0.0, 0.0, *quat], "body", name)
         monkeypatch.undo()
@@ -195,9 +195,9 @@ OTHER_NAMES = {
 def mutants(source: str, called: Collection[str]) -> Iterator[tuple[str, ast.Module]]:
     """Yield every module with one changed node in a called function, and a description of the change."""
     right = ast.parse(source)
-    for number, slip in enumerate(slips(right)):
-        if function_at(right, slip.line) in called:
-            yield f"{slip.line}: {slip.what}", mutated(source, number)
+    for number, mistake in enumerate(changes_of(right)):
+        if function_at(right, mistake.line) in called:
+            yield f"{mistake.line}: {mistake.what}", mutated(source, number)
     for number, node in enumerate(ast.walk(right)):
         field = "attr" if isinstance(node, ast.Attribute) else "id"
         name = getattr(node, field, "")

@@ -3,7 +3,7 @@
 import pytest
 
 from scripts.mutating.operators import mutated, rewritten
-from tests.attacks.input_to_result_mutants import MODULES, attempt, slips_of, source_of, truth
+from tests.attacks.input_to_result_mutants import MODULES, attempt, mutants_of, source_of, truth
 from urdfkin.model.tree import FloatArray
 
 #: Mutants that change an order, a direction or an assignment: the module, its code, and the replacement.
@@ -121,7 +121,7 @@ def test_no_random_mutant_gives_a_wrong_verified_result_or_disables_the_check(
     # python -m tests.attacks.input_to_result_mutants runs all mutants
     found = {
         (module, number): attempt(module, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
-        for module, number in slips_of(MODULES, 40, seed)
+        for module, number in mutants_of(MODULES, 40, seed)
     }
-    assert [slip for slip, word in found.items() if word.startswith(("WRONG", "BLIND"))] == []
+    assert [mistake for mistake, word in found.items() if word.startswith(("WRONG", "BLIND"))] == []
     assert "caught" in found.values()

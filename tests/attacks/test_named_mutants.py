@@ -10,22 +10,22 @@ from scripts.mutating.operators import rewritten
 SLIPS = named_mutants()
 
 
-def _source(slip: Named) -> str:
-    return slip.file.read_text(encoding="utf-8")
+def _source(mistake: Named) -> str:
+    return mistake.file.read_text(encoding="utf-8")
 
 
 def test_every_listed_mutant_can_be_made_and_names_an_existing_test() -> None:
-    assert len({slip.claim for slip in SLIPS}) == len(SLIPS)
-    for slip in SLIPS:
-        rewritten(_source(slip), slip.before, slip.after)
-        file, _, name = slip.test.partition("::")
-        assert f"def {name}(" in Path(ROOT / file).read_text(encoding="utf-8"), slip.test
+    assert len({mistake.claim for mistake in SLIPS}) == len(SLIPS)
+    for mistake in SLIPS:
+        rewritten(_source(mistake), mistake.before, mistake.after)
+        file, _, name = mistake.test.partition("::")
+        assert f"def {name}(" in Path(ROOT / file).read_text(encoding="utf-8"), mistake.test
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("slip", SLIPS, ids=[slip.claim.replace(" ", "-") for slip in SLIPS])
-def test_the_named_test_of_each_listed_mutant_fails(slip: Named) -> None:
-    outcome = evaluate_named(slip, timeout=300.0)
+@pytest.mark.parametrize("mistake", SLIPS, ids=[mistake.claim.replace(" ", "-") for mistake in SLIPS])
+def test_the_named_test_of_each_listed_mutant_fails(mistake: Named) -> None:
+    outcome = evaluate_named(mistake, timeout=300.0)
     assert outcome.word == "noticed", outcome.by
 
 

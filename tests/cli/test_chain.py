@@ -53,18 +53,18 @@ def test_the_table_and_the_csv_have_the_same_joints_in_the_order_of_the_path(
     assert lines[-1].startswith("Pinocchio 4")
 
 
-@pytest.mark.parametrize("slip", ["an origin", "an axis", "the tip"])
+@pytest.mark.parametrize("mistake", ["an origin", "an axis", "the tip"])
 def test_a_wrong_axis_or_origin_of_a_chain_is_a_disagreement(
-    slip: str, monkeypatch: pytest.MonkeyPatch
+    mistake: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = FrameChain.frames
 
     def wrong(path: FrameChain, q: FloatArray) -> FloatArray:
         poses = right(path, q)
-        if slip == "an axis":
+        if mistake == "an axis":
             poses[..., 2, :3, 2] *= -1.0
         else:
-            poses[..., -1 if slip == "the tip" else 1, 0, 3] += 1e-12
+            poses[..., -1 if mistake == "the tip" else 1, 0, 3] += 1e-12
         return poses
 
     monkeypatch.setattr(FrameChain, "frames", wrong)

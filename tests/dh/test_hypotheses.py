@@ -44,7 +44,7 @@ def written(
     return {"convention": convention, "rows": rows}
 
 
-SLIPS: dict[str, tuple[dict[str, Any], str]] = {
+MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     "other convention": ({}, "{}"),
     "millimetres": ({"mm": True}, "{}, millimetres"),
     "degrees": ({"deg": True}, "{}, degrees"),
@@ -57,11 +57,11 @@ SLIPS: dict[str, tuple[dict[str, Any], str]] = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slip", SLIPS)
+@pytest.mark.parametrize("mistake", MISTAKES)
 @pytest.mark.parametrize("name", ["kinova", "panda", "ur5"])
-def test_each_mistake_of_units_or_columns_is_named_with_the_wrong_convention(name: str, slip: str) -> None:
+def test_each_mistake_of_units_or_columns_is_named_with_the_wrong_convention(name: str, mistake: str) -> None:
     path, reference = published(name)
-    options, words = SLIPS[slip]
+    options, words = MISTAKES[mistake]
     wrong = "modified" if str(reference.convention) == "standard" else "standard"
     found = present(diagnose(path, written(reference, wrong, **options), TOLERANCE))
     assert found.interpretation.differences(found.stated).startswith(words.format(reference.convention))

@@ -125,7 +125,7 @@ def test_a_wrong_sign_is_named_despite_a_smaller_difference() -> None:
 
 
 def test_the_command_exits_with_1_for_a_wrong_sign_and_names_the_correction(tmp_path: Path) -> None:
-    file = tmp_path / "slip.toml"
+    file = tmp_path / "mistake.toml"
     text = reference_path("ur5").read_text()
     file.write_text(text.replace("d = 0.10915", "d = -0.10915"))
     result = run("ur5", "--compare", str(file), "--millimetres")

@@ -337,19 +337,19 @@ def test_relative_placement_accepts_frames_batches_and_out_as_placement_does() -
     assert (line.quantity, line.checked) == ("relative placement", 24)  # no result for the reference frame
 
 
-@pytest.mark.parametrize("slip", [1e-12, "transposed", "in the world's axes"])
+@pytest.mark.parametrize("mistake", [1e-12, "transposed", "in the world's axes"])
 def test_an_error_in_a_relative_placement_is_found_and_reproducible(
-    slip: Any, monkeypatch: pytest.MonkeyPatch
+    mistake: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     face: Any = bodies
     right = face.seen_from
 
     def wrong(T_a: FloatArray, T_b: FloatArray, out: FloatArray | None) -> FloatArray:
         T: FloatArray = right(T_a, T_b, out)
-        if slip == "transposed":
+        if mistake == "transposed":
             T[..., :3, :3] = T[..., :3, :3].swapaxes(-1, -2).copy()
-        elif isinstance(slip, float):
-            T[..., 0, 3] += slip
+        elif isinstance(mistake, float):
+            T[..., 0, 3] += mistake
         else:
             T[..., :3, 3] = T_b[..., :3, 3] - T_a[..., :3, 3]
         return T

@@ -64,24 +64,24 @@ def test_an_imu_measures_gravity_at_rest_and_zero_in_free_fall() -> None:
     assert np.abs(robot.imu(q, still, still, "panda_hand", gravity=[0, 0, 0])).max() == 0.0
 
 
-@pytest.mark.parametrize("slip", ["sign", "spatial", "none"])
+@pytest.mark.parametrize("mistake", ["sign", "spatial", "none"])
 def test_an_imu_with_reversed_gravity_or_spatial_acceleration_is_found(
-    slip: str, monkeypatch: pytest.MonkeyPatch
+    mistake: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, original = urdfkin.load("ur5"), evaluate.imus
     x = robot.sample(3)
 
     def wrong(plan: Any, q: FloatArray, v: FloatArray, a: FloatArray, **how: Any) -> FloatArray:
-        if slip == "sign":
+        if mistake == "sign":
             how["gravity"] = -np.asarray(how["gravity"])
         found = original(plan, q, v, a, **how)
-        if slip == "spatial":
+        if mistake == "spatial":
             local = robot.velocity(q, v, "tool0", "local", verify=False)
             found[:, 0, :3] -= np.cross(local[:, 3:], local[:, :3])
         return found
 
     monkeypatch.setattr(evaluate, "imus", wrong)
-    if slip == "none":
+    if mistake == "none":
         robot.imu(x, x, x, "tool0")
         return
     with pytest.raises(urdfkin.VerificationError, match="the imu of tool0") as caught:

@@ -192,8 +192,8 @@ def test_pinocchio_reads_the_complete_text_and_reduces_the_model_of_a_locked_rob
 
 
 @pytest.mark.parametrize("oracle", [PINOCCHIO, MUJOCO])
-@pytest.mark.parametrize("slip", ["value", "mimic", "sense", "free"])
-def test_both_oracles_detect_a_wrongly_locked_tree(slip: str, oracle: OracleLibrary) -> None:
+@pytest.mark.parametrize("mistake", ["value", "mimic", "sense", "free"])
+def test_both_oracles_detect_a_wrongly_locked_tree(mistake: str, oracle: OracleLibrary) -> None:
     robot = robot_of("panda").locked({"panda_finger_joint1": 0.03, "panda_joint7": 0.5})
     robot.verifier.library = oracle
     other = {
@@ -201,9 +201,9 @@ def test_both_oracles_detect_a_wrongly_locked_tree(slip: str, oracle: OracleLibr
         "mimic": {"panda_finger_joint1": 0.0300001, "panda_joint7": 0.5},
         "sense": {"panda_finger_joint1": 0.03, "panda_joint7": -0.5},
         "free": {"panda_finger_joint1": 0.03},
-    }[slip]
+    }[mistake]
     robot.tree = robot.verifier.tree = robot_of("panda").locked(other).tree
-    if slip == "free":
+    if mistake == "free":
         with pytest.raises(OracleError, match="finds other joints"):
             robot.verifier.oracle(None, oracle)
         return

@@ -47,20 +47,20 @@ USED = (
 )  # fmt: skip
 
 
-def with_a_slip(equation: str, term: str) -> ModuleType:
+def with_a_mistake(equation: str, term: str) -> ModuleType:
     tree = ast.parse(inspect.getsource(equations))
     (function,) = [node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == equation]
 
-    class Slip(ast.NodeTransformer):
+    class Mistake(ast.NodeTransformer):
         def visit_Call(self, node: ast.Call) -> ast.AST:
             found = ast.unparse(node)
             self.generic_visit(node)
             larger = f"times({FACTOR}, {ast.unparse(node)})"
             return ast.parse(larger, mode="eval").body if found == term else node
 
-    Slip().visit(function)
-    module = ModuleType("slipped")
-    exec(compile(ast.fix_missing_locations(tree), "slipped", "exec"), vars(module))
+    Mistake().visit(function)
+    module = ModuleType("mistaken")
+    exec(compile(ast.fix_missing_locations(tree), "mistaken", "exec"), vars(module))
     return module
 
 
@@ -84,7 +84,7 @@ def test_the_unmodified_equations_agree_with_pinocchio(robots: list[Robot]) -> N
 def test_a_relative_error_of_1e_10_in_any_term_of_an_equation_is_detected(
     robots: list[Robot], equation: str, term: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
+    monkeypatch.setattr(recursion._RECURSION, "eq", with_a_mistake(equation, term))
     assert any(farthest(robot) > WIDEST for robot in robots)
 
 

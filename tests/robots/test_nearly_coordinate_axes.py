@@ -143,7 +143,7 @@ def test_errors_above_the_tilt_bound_and_errors_before_tilted_axes_are_detected(
     assert [joint.tilt > 0.0 for joint in robot.tree.joints] == [False, False, True, False]
     q = robot.sample(20, 1)
 
-    def slipped(by: float) -> Robot:
+    def with_an_error(by: float) -> Robot:
         joints = [
             replace(joint, axis=joint.axis + (by * AXES[1] if i == 0 else 0.0))
             for i, joint in enumerate(robot.tree.joints)
@@ -153,10 +153,10 @@ def test_errors_above_the_tilt_bound_and_errors_before_tilted_axes_are_detected(
 
     allowed = 2.0 * tilt + 24.0 * 5 * EPS
     with pytest.raises(urdfkin.VerificationError):
-        slipped(6.0 * allowed).placement(q, "l4")
+        with_an_error(6.0 * allowed).placement(q, "l4")
     with pytest.raises(urdfkin.VerificationError):
-        slipped(100.0 * 24.0 * EPS).placement(q, "l2")  # Pinocchio's axes on this path are the file's
-    slipped(0.0).placement(q, robot.link_frames)
+        with_an_error(100.0 * 24.0 * EPS).placement(q, "l2")  # Pinocchio's axes on this path are the file's
+    with_an_error(0.0).placement(q, robot.link_frames)
 
 
 def test_the_tilt_of_a_joint_is_stored_and_survives_pickling() -> None:

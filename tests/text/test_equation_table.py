@@ -169,8 +169,8 @@ def test_both_notations_have_the_same_symbols_in_the_same_order(equation: Equati
 
 def test_a_changed_sign_dot_or_index_of_a_notation_is_detected() -> None:
     equation = equations()["7.130"]
-    for slip in (("+ 2", "- 2"), (r"\ddot", r"\dot"), ("i-1,i", "i,i-1")):
-        assert of_latex(equation.latex.replace(*slip, 1)) != of_statement(equation.statement)
+    for mistake in (("+ 2", "- 2"), (r"\ddot", r"\dot"), ("i-1,i", "i,i-1")):
+        assert of_latex(equation.latex.replace(*mistake, 1)) != of_statement(equation.statement)
 
 
 # -- misprints of the chapter: the printed equation is wrong, the corrected one holds --------------

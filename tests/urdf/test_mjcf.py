@@ -394,15 +394,15 @@ def wrong_multiplier(right: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @pytest.mark.parametrize(
-    ("where", "name", "slip"),
+    ("where", "name", "mistake"),
     [(mjcf._MjcfReader, "_rule", wrong_offset), (mjcf, "resolve", wrong_multiplier)],
     ids=["an offset", "the multiplier of a mimic of a mimic"],
 )
 def test_the_residual_of_mujocos_equality_finds_an_error_of_a_mimic_rule(
-    where: Any, name: str, slip: Any, monkeypatch: pytest.MonkeyPatch
+    where: Any, name: str, mistake: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     in_this_process(monkeypatch)
-    monkeypatch.setattr(where, name, slip(getattr(where, name)))
+    monkeypatch.setattr(where, name, mistake(getattr(where, name)))
     with pytest.raises(OracleError, match=r"mimic joint [bc]: .* from the file: found MuJoCo \S+ differs by"):
         loaded(coupled(*_CHAIN))
 

@@ -905,24 +905,24 @@ def loaded_in_this_process(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfk
     return loaded(path)
 
 
-@pytest.mark.parametrize("slip", ["unit", "degrees", "swapped", "axis"])
+@pytest.mark.parametrize("mistake", ["unit", "degrees", "swapped", "axis"])
 def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
-    write: Write, monkeypatch: pytest.MonkeyPatch, slip: str
+    write: Write, monkeypatch: pytest.MonkeyPatch, mistake: str
 ) -> None:
     path = write(stage(LINKS + JOINTS, unit=0.5))
     assert loaded_in_this_process(monkeypatch, path).nq == 2
     side, motion = usd._StageReader._side, usd._StageReader._motion
 
     def wrong_side(self: Any, prim: Any, i: int, target: str | None) -> Any:
-        found = present(side(self, prim, 1 - i if slip == "swapped" else i, target))
+        found = present(side(self, prim, 1 - i if mistake == "swapped" else i, target))
         T = found[1].copy()
-        T[:3, 3] *= 2.0 if slip == "unit" else 1.0
+        T[:3, 3] *= 2.0 if mistake == "unit" else 1.0
         return found[0], T, *found[2:]
 
     def wrong_motion(self: Any, prim: Any) -> Any:
         kind, axis, (lower, upper), free = motion(self, prim)
-        factor = 180.0 / math.pi if slip == "degrees" else 1.0
-        return kind, axis, (lower * factor, upper * factor), "rotX" if slip == "axis" else free
+        factor = 180.0 / math.pi if mistake == "degrees" else 1.0
+        return kind, axis, (lower * factor, upper * factor), "rotX" if mistake == "axis" else free
 
     monkeypatch.setattr(usd._StageReader, "_side", wrong_side)
     monkeypatch.setattr(usd._StageReader, "_motion", wrong_motion)
@@ -935,14 +935,14 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
 
 
 @dataclass(frozen=True)
-class Slip:
+class Mistake:
     """A mistake of a converter, in one joint."""
 
     kind: str
     joint: str
 
 
-def as_usd(robot: urdfkin.Robot, spell: Callable[[str], str] = str, slip: Slip | None = None) -> str:
+def as_usd(robot: urdfkin.Robot, spell: Callable[[str], str] = str, mistake: Mistake | None = None) -> str:
     """Write a robot of revolute, continuous, prismatic and fixed joints as a stage, as a converter would."""
     tree = robot.tree
     prims = [
@@ -953,7 +953,7 @@ def as_usd(robot: urdfkin.Robot, spell: Callable[[str], str] = str, slip: Slip |
         for link, T in zip(tree.links, robot.placement(np.zeros(robot.nq), list(tree.links)), strict=True)
     ]  # fmt: skip
     joints = (
-        _joint_in_usd(tree, k, spell, slip.kind if slip and slip.joint == one.name else "")
+        _joint_in_usd(tree, k, spell, mistake.kind if mistake and mistake.joint == one.name else "")
         for k, one in enumerate(tree.joints)
     )
     return stage("".join([*prims, 'def Scope "joints" {\n', *joints, "}\n"]))
@@ -968,27 +968,27 @@ def _quaternion(T: Any) -> tuple[float, ...]:
     return tuple(np.roll(quaternion_of(T[:3, :3]), 1).tolist())
 
 
-def _joint_in_usd(tree: KinematicTree, k: int, spell: Callable[[str], str], slip: str) -> str:
+def _joint_in_usd(tree: KinematicTree, k: int, spell: Callable[[str], str], mistake: str) -> str:
     one = tree.joints[k]
-    R = _with_first_axis(-one.axis if slip == "axis sign" else one.axis)
+    R = _with_first_axis(-one.axis if mistake == "axis sign" else one.axis)
     A, B = one.T_parent_joint @ pose(R), pose(R)
-    A[:3, 3] *= {"centimetres": [100.0] * 3, "mirrored frame": [1.0, -1.0, 1.0]}.get(slip, [1.0] * 3)
-    A = A @ _MOVED.get(slip, np.eye(4))
-    B = B @ _MOVED[slip] if slip == "other frames on the axis" else B
+    A[:3, 3] *= {"centimetres": [100.0] * 3, "mirrored frame": [1.0, -1.0, 1.0]}.get(mistake, [1.0] * 3)
+    A = A @ _MOVED.get(mistake, np.eye(4))
+    B = B @ _MOVED[mistake] if mistake == "other frames on the axis" else B
     frames: dict[str, Any] = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
     frames |= {f"localRot{i}": _quaternion(T) for i, T in enumerate((A, B))}
     ends = [spell(tree.links[one.parent]), spell(tree.links[k + 1])]
     degrees = 180.0 / math.pi if one.kind.turns else 1.0
-    rule = one.mimic if slip != "mimic dropped" else None
+    rule = one.mimic if mistake != "mimic dropped" else None
     words, limits = "", list[float]()
     if rule is not None:
-        multiplier = rule.multiplier * (1.000001 if slip == "a millionth" else 1.0)
+        multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
         words = FOLLOWS.format(f"joints/{spell(rule.leader)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
     if one.limit is not None and one.kind.bounded:
-        limits = [x * (1.0 if slip == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
+        limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
     name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
-    first, second = ends[::-1] if slip == "exchanged bodies" else ends
+    first, second = ends[::-1] if mistake == "exchanged bodies" else ends
     schema = NEWTON if rule else ""
     return joint(spell(one.name), name, first, second, words, schema, limits=limits, **frames)
 
@@ -1113,7 +1113,7 @@ def test_rounding_never_explains_an_error_above_the_rounding_of_the_joint(
     if (kind, name) == ("another zero", "slide"):
         kind = "a microradian"
     robot = urdfkin.load(LONG_SLIDE)
-    found = urdfkin.same(robot, loaded(write(as_usd(robot, slip=Slip(kind, name)))), bounds=False)
+    found = urdfkin.same(robot, loaded(write(as_usd(robot, mistake=Mistake(kind, name)))), bounds=False)
     assert not found
     assert [one.place for one in found.unexplained] == [f"joint {name}"]
 
@@ -1121,7 +1121,7 @@ def test_rounding_never_explains_an_error_above_the_rounding_of_the_joint(
 def test_a_joint_frame_at_another_point_of_the_axis_is_the_same_joint(write: Write) -> None:
     robot = urdfkin.load(LONG_SLIDE)
     for name in ("slide", "elbow", "wrist"):
-        stage_text = as_usd(robot, slip=Slip("other frames on the axis", name))
+        stage_text = as_usd(robot, mistake=Mistake("other frames on the axis", name))
         found = urdfkin.same(robot, loaded(write(stage_text)), boxes=0)
         assert found.up_to_single, found.unexplained
         assert not urdfkin.same(loaded(write(stage_text)), robot, bounds=False).unexplained
@@ -1130,7 +1130,9 @@ def test_a_joint_frame_at_another_point_of_the_axis_is_the_same_joint(write: Wri
 def test_rounding_does_not_explain_an_error_of_a_millionth_in_a_mimic_multiplier(write: Write) -> None:
     robot = loaded("panda")
     name = next(one.name for one in robot.tree.joints if one.mimic is not None)
-    found = urdfkin.same(robot, loaded(write(as_usd(robot, slip=Slip("a millionth", name)))), bounds=False)
+    found = urdfkin.same(
+        robot, loaded(write(as_usd(robot, mistake=Mistake("a millionth", name)))), bounds=False
+    )
     assert not found
     assert str(found.unexplained[0]).startswith(f"joint {name}: mimic multiplier 1.00000")
 
@@ -1151,7 +1153,7 @@ def test_a_certificate_up_to_single_precision_is_rechecked(write: Write) -> None
     assert recheck(document, *robots) == ["`verdict`: the models give same up to single precision, not same"]
 
 
-SLIPS = {
+MISTAKES = {
     "axis sign": "senses", "centimetres": "USD304", "radians": "USD303",
     "mimic dropped": "independent joint in B", "exchanged bodies": "USD304", "mirrored frame": "USD304",
 }  # fmt: skip
@@ -1174,8 +1176,8 @@ def with_mimic(robot: urdfkin.Robot) -> urdfkin.Robot:
 @pytest.mark.parametrize("name", ROBOTS)
 def test_each_mistake_of_a_converter_is_detected_and_described(write: Write, name: str) -> None:
     robot = loaded(name)
-    for kind, slip_word in SLIPS.items():
-        word = slip_word
+    for kind, mistake_word in MISTAKES.items():
+        word = mistake_word
         moving = [one for one in robot.tree.joints if one.kind.nq == 1]
         if kind == "mimic dropped":
             robot = with_mimic(robot)
@@ -1188,9 +1190,9 @@ def test_each_mistake_of_a_converter_is_detected_and_described(write: Write, nam
             moving = [one for one in moving if np.linalg.norm(one.T_parent_joint[:3, 3]) > 1e-3]
         assert moving, kind
         spoilt = moving[len(moving) // 2]
-        slipped_stage = loaded(write(as_usd(robot, transcoded, Slip(kind, spoilt.name))))
-        found = urdfkin.same(robot, slipped_stage, boxes=0)
-        said = [*found.up_to, *codes(slipped_stage)]
+        wrong_stage = loaded(write(as_usd(robot, transcoded, Mistake(kind, spoilt.name))))
+        found = urdfkin.same(robot, wrong_stage, boxes=0)
+        said = [*found.up_to, *codes(wrong_stage)]
         said += [one.words for one in (*found.differences, *found.remarks)]
         if kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > LARGEST_ANGLE:
             word = ": limits "  # the limits are too large for radians, so only `same` reports the mistake
@@ -1233,13 +1235,13 @@ def test_diff_with_a_stage_lists_a_mistake_at_its_joint_and_no_rounding(write: W
     unbounded = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded))), effects=False)
     assert headline(unbounded) == "nothing changed, apart from rounding to single precision"
     assert as_data(unbounded)["rounding"] == {"metres": None, "radians": None}
-    stage_file = write(as_usd(robot, transcoded, Slip("a micrometre", "elbow-1")))
+    stage_file = write(as_usd(robot, transcoded, Mistake("a micrometre", "elbow-1")))
     found = urdfkin.diff(robot, loaded(stage_file))
     assert [str(one) for one in found.changes] == ["joint elbow-1: origin 0.997 µm off"]
     assert [one.element for one in found.effects] == ["joint elbow-1"]
     assert 0.9e-6 < found.effects[0].interval.lower < 1.3e-6
     assert found.rounding is None
-    flipped = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded, Slip("axis sign", "elbow-1")))))
+    flipped = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded, Mistake("axis sign", "elbow-1")))))
     assert [str(one) for one in flipped.changes] == ["joint elbow-1: axis turned by 3.142 rad"]
 
 
@@ -1422,8 +1424,8 @@ def test_locked_joints_may_differ_only_by_the_rounding_of_their_numbers(
         found = urdfkin.same(a, b, bounds=False)
         assert found.up_to_single, found.unexplained
     for name in ("slide", "elbow", "wrist"):
-        slipped_stage = as_usd(urdfkin.load(text), slip=Slip("a micrometre", name))
-        found = urdfkin.same(robot, loaded(write(slipped_stage), lock=lock), bounds=False)
+        wrong_stage = as_usd(urdfkin.load(text), mistake=Mistake("a micrometre", name))
+        found = urdfkin.same(robot, loaded(write(wrong_stage), lock=lock), bounds=False)
         assert not found.up_to_single
         assert found.unexplained
 
@@ -1451,8 +1453,8 @@ def test_a_free_base_must_have_the_same_frame_and_the_joints_after_it_may_be_rou
     for models in ((loaded(urdf), loaded(write(text))), (loaded(write(text)), loaded(urdf))):
         found = urdfkin.same(*models, bounds=False)
         assert found.up_to_single, found.unexplained
-    slipped_hinge = text.replace("(0.1, 0.2, 0.3)", "(0.100001, 0.2, 0.3)")
-    found = urdfkin.same(loaded(urdf), loaded(write(slipped_hinge)), bounds=False)
+    wrong_hinge = text.replace("(0.1, 0.2, 0.3)", "(0.100001, 0.2, 0.3)")
+    found = urdfkin.same(loaded(urdf), loaded(write(wrong_hinge)), bounds=False)
     assert [one.place for one in found.unexplained] == ["joint j"]
     if kind == "planar":  # 0.1 in single precision is 1.5e-9 from 0.1
         urdf, text = free_base(kind, (0.0, 0.0, 0.1))
@@ -1467,7 +1469,7 @@ def test_two_rounded_stages_of_a_robot_are_the_same_up_to_the_roundings_of_both(
 ) -> None:
     first = loaded(write(as_usd(loaded(name), transcoded)))
     moving = [one.name for one in first.tree.joints if one.kind.nq == 1]
-    elsewhere = Slip("other frames on the axis", moving[len(moving) // 2])
+    elsewhere = Mistake("other frames on the axis", moving[len(moving) // 2])
     second = loaded(write(as_usd(first, transcoded, elsewhere), "second.usda"))
     for a, b in ((first, second), (second, first)):
         found = urdfkin.same(a, b, bounds=False)
@@ -1475,11 +1477,11 @@ def test_two_rounded_stages_of_a_robot_are_the_same_up_to_the_roundings_of_both(
         assert found.single is not None
         alone = [one.single.links.max(axis=0) for one in (first, second) if one.single is not None]
         assert max(alone[0][0], alone[1][0]) < found.single[0] <= (alone[0][0] + alone[1][0]) * 1.0001
-    slip = Slip("a micrometre", elsewhere.joint)
-    third = loaded(write(as_usd(first, transcoded, slip), "third.usda"))
+    mistake = Mistake("a micrometre", elsewhere.joint)
+    third = loaded(write(as_usd(first, transcoded, mistake), "third.usda"))
     for a, b in ((first, third), (third, first)):
         found = urdfkin.same(a, b, bounds=False)
-        assert [one.place for one in found.unexplained] == [f"joint {slip.joint}"]
+        assert [one.place for one in found.unexplained] == [f"joint {mistake.joint}"]
 
 
 def _angle_between(T: Any, U: Any) -> float:

@@ -19,7 +19,7 @@ from tests.attacks.test_exact_quaternions import quaternions, text
 from tests.high_precision import mp, true_motion
 from tests.laws.everything import by_the_robot
 from tests.laws.subjects import robot_of, state
-from tests.laws.test_mutation import with_a_slip
+from tests.laws.test_mutation import with_a_mistake
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic
 from urdfkin import BaseMotion, Reference
@@ -136,7 +136,7 @@ def test_an_enclosure_contains_the_results_of_the_pinocchio_oracle(base: BaseMot
 
 
 #: A term of an equation and the quantity that the equation computes, by the name of the equation.
-SLIPS = {
+MISTAKES = {
     "centripetal": ("cross(w, cross(w, d))", "acceleration"),
     "angular_acceleration": ("times(v, cross(w, z))", "acceleration"),
     "turning_column": ("cross(z, d)", "jacobian"),
@@ -145,13 +145,13 @@ SLIPS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("equation", SLIPS)
+@pytest.mark.parametrize("equation", MISTAKES)
 def test_results_of_wrong_equations_lie_outside_the_interval(
     equation: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot, (term, quantity) = robot_of("panda"), SLIPS[equation]
+    robot, (term, quantity) = robot_of("panda"), MISTAKES[equation]
     x, frame = sample(robot), robot.tip_frame
-    monkeypatch.setattr(recursion._RECURSION, "eq", with_a_slip(equation, term))
+    monkeypatch.setattr(recursion._RECURSION, "eq", with_a_mistake(equation, term))
     for one in quantities(robot.enclose(*x, frame, digits=15)):
         assert one.pinocchio is not None
         if one.quantity == quantity:
