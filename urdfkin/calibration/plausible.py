@@ -155,10 +155,7 @@ class FitWithData:
             yield f"the fit scales the values of joint {_list(gained.values())}"
 
     def turned_zeros(self) -> list[str]:
-        """Return the joints whose zero changed by about half a turn.
-
-        A reversed sign of the next joint can cause such a change.
-        """
+        """Return the joints whose zero changed by about half a turn."""
         return [
             f"{parameter.where!r} by {angle(abs(change))}"
             for parameter, change, least in self._changes()
@@ -222,10 +219,7 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
 
 
 def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], list[str]]:
-    """Return the joints with values that look like degrees, and other joints with values far outside limits.
-
-    The first list contains the joints about which `configuration.warn_of_degrees` warns.
-    """
+    """Return joints with values that look like degrees, and other joints with values far outside limits."""
     like_degrees, outside = list[str](), list[str]()
     for (name, is_angle, lower, upper), column in zip(_coordinates(model), q.T, strict=True):
         largest = float(np.abs(column).max(initial=0.0))

@@ -432,10 +432,7 @@ class CheckRun:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
-        """Load a USD or MJCF file; add the findings about the robot or, if loading fails, about the error.
-
-        With --changed-since, unchanged files are skipped; all findings about a changed file are reported.
-        """
+        """Load a USD or MJCF file; add the findings about the robot or, if loading fails, about the error."""
         suffixes = USD if is_usd(file) else _MJCF
         if self.version is not None and self._is_unchanged(file, suffixes, self.version):
             self.outcome.unchanged += 1

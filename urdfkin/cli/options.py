@@ -98,10 +98,7 @@ def is_given(context: click.Context, name: str) -> bool:
 
 
 def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
-    """Raise InputError if the user wrote an option that has no effect.
-
-    With the reason "with --opw", the message is "--format does nothing with --opw".
-    """
+    """Raise InputError if the user wrote an option that has no effect."""
     for parameter in context.command.params:
         if parameter.name in unused and is_given(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])

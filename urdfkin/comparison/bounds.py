@@ -199,10 +199,7 @@ class DistanceSearch:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Maximize each frame's distance by coordinate search, from start values (frames, starts, variables).
-
-        Each frame is searched separately, but all searches are evaluated in one batch.
-        """
+        """Maximize each frame's distance by coordinate search from values (frames, starts, variables)."""
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]

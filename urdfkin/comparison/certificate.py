@@ -479,11 +479,7 @@ def _interval_errors(
 def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Check a lower bound, and yield a message for each error.
-
-    An error is yielded if `q_a` and `q_b` do not correspond or exceed the limits. An error is also yielded if
-    the distance or the angle there is smaller than stated.
-    """
+    """Check a lower bound, and yield a message for each error."""
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.correspond(q_a, q_b):

@@ -802,10 +802,7 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
 
 
 def _on_matched_bodies(alignment: Alignment, link: str) -> bool:
-    """Return whether a link's body in A and its body in B each have a matching body in the other model.
-
-    If a body has no matching body, `differences` already reports its joint as a joint of only one model.
-    """
+    """Return whether a link's body in A and its body in B each have a matching body in the other model."""
     return all(
         mechanism.body_of[mechanism.tree.link_index(link)] not in {mechanism.body_of[j + 1] for j in only}
         for mechanism, only in ((alignment.a, alignment.only_a), (alignment.b, alignment.only_b))

@@ -276,10 +276,7 @@ class Comparator:
         return metres, radians
 
     def _unexplained_differences(self, alignment: Alignment) -> tuple[JointDifference, ...]:
-        """Return the differences of the unchanged models that rounding does not explain, joint by joint.
-
-        A is compared with B, and B with A, because the bounds differ (`JointComparison`).
-        """
+        """Return the differences of the unchanged models that rounding does not explain, joint by joint."""
         errors = [
             np.zeros((len(tree.joints), 3)) if robot.single is None else robot.single.joints
             for tree, robot in zip(self.trees, self.robots, strict=True)
@@ -765,10 +762,7 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle between two axes, and the distance of a point of one axis from the other axis.
-
-        The two models may define an axis by different points on it.
-        """
+        """Return the angle between two axes, and the distance of a point of one axis from the other axis."""
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 

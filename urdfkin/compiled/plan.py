@@ -210,10 +210,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the number of joints between the root and each link on the paths to the given links.
-
-    Each joint is visited once, so the time is not proportional to the number of links times the depth.
-    """
+    """Return the number of joints between the root and each link on the paths to the given links."""
     met = {0}
     for end in links:
         link = end
@@ -479,11 +476,7 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a joint, if a later event needs the state.
-
-        `last[i]` is the index of the last event that uses the state after joint i. The event with index
-        `following` comes next and uses the state in the registers, so only later events need the saved state.
-        """
+        """Write an instruction that saves the state after a joint, if a later event needs the state."""
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 

@@ -94,10 +94,7 @@ def seen(axes, R, x):
 
 
 def seen_after(axes, S, x):
-    """Return a link's velocity or acceleration x after the link's frame is rotated by S.
-
-    In world axes, the components of x do not change. In the link's axes, they are rotated.
-    """
+    """Return a link's velocity or acceleration x after the link's frame is rotated by S."""
     return axes(eq.rotate(eq.transposed(S), x), x)
 
 

@@ -250,7 +250,7 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, carry: float) -> float:
-        """Return this joint's `carry` (metres; see `step`) if d is 0, given `carry` of the next joint."""
+        """Return the `carry` (see `step`) of this joint for d = 0 from the `carry` of the next joint."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
@@ -260,8 +260,8 @@ def steps_like(
     """Compute transforms between a path's axes, and theta of each row, as close to a reference as possible.
 
     `phi_in` (rad) is the angle about the first axis, and `carry` (metres) is the offset along it, from frame
-    0 to the first joint's frame. `tip` is the `carry` (metres) that the last row needs so that its d equals d
-    in the reference; None if d may differ.
+    0 to the first joint's frame. `tip` is the `carry` (metres) of the last row for which d equals the
+    reference's d; None if d may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):

@@ -232,10 +232,7 @@ def _rounded_down(x: float) -> str:
 
 
 def _rounded_up(x: float) -> str:
-    """Return a bound with seven digits, rounded up.
-
-    The error of a constant in single precision can be equal to its bound, which must not be rounded down.
-    """
+    """Return a bound with seven digits, rounded up."""
     return _rounded(x, 7, ROUND_CEILING)
 
 

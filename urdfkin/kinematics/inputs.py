@@ -79,10 +79,7 @@ def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> Fl
 
 
 def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as unit vectors (..., 3); a vector with another norm raises InputError.
-
-    Normalising such a vector would hide a user's mistake.
-    """
+    """Return `value` as unit vectors (..., 3); a vector with another norm raises InputError."""
     array = vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))
     if (np.abs(norms - 1.0) > UNIT_TOLERANCE).any():

@@ -42,7 +42,7 @@ def least_squares(
         start: The state from which the iteration starts.
         residuals: Returns the residuals (rows,) of a state, and intermediate results for `derivatives`.
         derivatives: Returns the negative derivatives (rows, parameters) of the residuals.
-        move: Returns the new state after a step (parameters,) from a state.
+        move: Returns the state that a step (parameters,) reaches from a state.
         longest: Largest component of a step.
         patience: Number of consecutive slow steps that end the iteration; 0 means no limit.
     """

@@ -228,10 +228,7 @@ def rotation_of(quat: ArrayLike) -> FloatArray:
 
 
 def quaternion_of(R: ArrayLike) -> FloatArray:
-    """Return the unit quaternion with qw >= 0 of a rotation.
-
-    Shepperd's method avoids cancellation: it divides by the component with the largest absolute value.
-    """
+    """Return the unit quaternion with qw >= 0 of a rotation."""
     R = rotations(R, "R")
     # The entries of K = 4 q q^T are sums of entries of R (and of 1 on the diagonal).
     # Each row of K is a multiple of q.

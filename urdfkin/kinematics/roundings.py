@@ -237,14 +237,14 @@ SUMMED = 4.0
 ANGLE = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #: The entry is a difference of two products, which has an error of 0.75.
-#: A factor of these products is also a difference of two products, with another error of 0.75.
+#: One factor of each product is also a difference of two products, which adds an error of 0.75.
 ENTRY = 2.0
 #: Error of a length that is rounded to twelve digits, in the unit of `SUMMED`.
 DIGITS = SUMMED / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
 #: The second rotation is a product of three rotations.
-#: The product's errors are 0.5 for the sines, 0.5 for the cosines, and 1.4 and 1.8 for two multiplications.
+#: The product's error is the sum of 0.5 (sines), 0.5 (cosines), 1.4 and 1.8 (the two multiplications).
 TURN = 8.0
 
 #: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.

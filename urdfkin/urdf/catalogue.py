@@ -9,8 +9,8 @@ The folder of a package `name` is the first of these folders that exists:
 1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself if the folder has the name of the
    package, then `src/name`, then `src/*/name`.
 2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
-3. For each folder above the file: the folder itself if the folder or its `package.xml` has the name of the
-   package, then the subfolder `name`.
+3. For each folder above the file: the folder itself if it or its `package.xml` has the package's name,
+   then the subfolder with the package's name.
 """
 
 from __future__ import annotations

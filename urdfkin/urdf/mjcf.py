@@ -201,10 +201,11 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """Return s(y) (k + 1) for each mimic rule (n, equalities), for bounds on rounding errors.
+        """Return the size (n, equalities) of each mimic rule, which bounds the rule's rounding error.
 
-        For the rule y = y0 + c0 + c1 (x - x0), s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). For an independent
-        joint x, s(x) = |x|. Here k is the number of rules from the mimic joint y to an independent joint.
+        The size of a rule for joint y is s(y) (k + 1). For the rule y = y0 + c0 + c1 (x - x0), s(y) is
+        |y0| + |c0| + |c1| (s(x) + |x0|). For an independent joint x, s(x) is |x|. The number k counts the
+        rules from the mimic joint y to an independent joint.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}

@@ -456,7 +456,7 @@ class _StageReader:
     def _value(self, prim: Any, name: str) -> Any:
         """Return the value of an attribute, or else its default, or else None.
 
-        A value that a stronger layer blocks (`None` in the file) is treated as missing.
+        If an overriding layer sets the value to `None`, the value is treated as missing.
         """
         attribute = prim.GetAttribute(name)
         if not attribute:

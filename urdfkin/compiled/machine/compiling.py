@@ -174,12 +174,7 @@ def compiling_allowed() -> Iterator[None]:
 
 
 def _skip_blas_check() -> None:
-    """Prevent Numba from importing SciPy only to check that its linear algebra is available.
-
-    The import would take a fifth of a command's running time, and no kernel calls linear algebra. For other
-    compiled functions that call linear algebra, Numba still imports and checks SciPy. If a version of Numba
-    makes this check in a different function, `_skip_blas_check` has no effect.
-    """
+    """Prevent Numba from importing SciPy only to check that its linear algebra is available."""
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return
     with suppress(ImportError, AttributeError):
@@ -215,10 +210,7 @@ STATES = types.Array(types.float64, 3, "C")
 
 
 class Kernel:
-    """A function that is compiled, or read from disk, when it is first called.
-
-    Calling the attribute `compiled` directly, without `Kernel`, saves a tenth of a microsecond.
-    """
+    """A function that is compiled, or read from disk, when it is first called."""
 
     compiled: Any
 

@@ -141,10 +141,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether all types are number types of this module or integers, and at least one is no integer.
-
-    Equations contain integers as factors, for example the 2 in 2 (w x u).
-    """
+    """Return whether all types are integers or types of this module, and at least one is no integer."""
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)

@@ -177,11 +177,7 @@ class Pairing:
         ]
 
     def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
-        """Return a sort key that is smaller for more similar joints.
-
-        The key compares three differences, in this order: the branches of the subtrees, the distance of the
-        axes, and the directions and origins of the joint frames.
-        """
+        """Return a sort key that is smaller for more similar joints."""
         angle, shift = one.mismatch(other)
         axes = 0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, LEAST_SIZE) + shift
         origins = math.dist(one.origin, other.origin)

@@ -480,7 +480,7 @@ class MechanismMatcher:
         return replace(step, offset=with_bodies[0], before=back @ K @ place.G), *with_bodies[1:]
 
     def _exact_pose(self, place: BodyPair, there: BodyPair) -> FloatArray | None:
-        """Return `XC` of the bodies after two joints if their subtrees match exactly, else None."""
+        """Return the pose `XC` of the bodies after two joints if the subtrees match exactly, else None."""
         if self.exact is None:
             return None
         X = self.exact.pose_after(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)

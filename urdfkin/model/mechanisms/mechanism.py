@@ -732,10 +732,7 @@ class _VariablesBuilder:
         self.deepest = alignment.deepest
 
     def _leaders(self) -> dict[str, LinearFunction]:
-        """Return each coordinate of B: a linear function of a coordinate of A, or a new variable.
-
-        Joints that are independent in A are processed before joints that are mimic joints in A.
-        """
+        """Return each coordinate of B: a linear function of a coordinate of A, or a new variable."""
         tree, used, lines = self.trees[1], set[str](), dict[str, LinearFunction]()
         own = [i for i, joint in enumerate(tree.joints) if joint.kind.nq == 1 and joint.mimic is None]
         followers_last = sorted(own, key=self._follows_in_a)
