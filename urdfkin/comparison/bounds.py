@@ -228,7 +228,7 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances for `z`, an array (frames, starts, values, variables)."""
+        """Return the distances for the array `z` (frames, starts, values, variables)."""
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # the size -1 fails for an empty array
         distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))

@@ -42,7 +42,7 @@ LARGEST_HAYATI_TILT = 0.35
 
 @dataclass(frozen=True, slots=True)
 class AxisTransform:
-    """The seven numbers of the transform between two joint axes, in metres and radians.
+    """The seven parameters (metres and radians) of the transform between two joint axes.
 
     Coinciding axes do not determine phi; `phi_is_free` is then True.
     """

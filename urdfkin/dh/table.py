@@ -238,7 +238,7 @@ def nearest_twelfth(angle: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """One snapped angle, and the rotation of the chain that it causes.
+    """One rounded angle, and the rotation of the chain that the rounding causes.
 
     Attributes:
         row: Index of the row that contains the angle, from 0; -1 is the base, and the number of rows is the

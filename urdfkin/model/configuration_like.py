@@ -177,7 +177,7 @@ class CoordinateLayout:
         return out
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
-        """Return the numbers of a joint with several coordinates, by index; other names raise an error."""
+        """Return index and value of each number of a joint with several coordinates."""
         if not isinstance(name, str) or name not in self.spans:
             raise self._not_a_coordinate(name, where)
         at, size = self.spans[name]

@@ -1227,7 +1227,7 @@ class Robot(Displayable):
                 joint before the frame. With 15 digits, the intervals are about as wide as the rounding errors
                 of doubles.
             hessian: Whether to compute intervals for the Hessian too; this takes less than 0.1 ms for each
-            pair of joints.
+                pair of joints.
 
         Raises:
             InputError: an argument is a batch or has a wrong length, or `digits` is below 15.

@@ -349,7 +349,7 @@ class _FunctionResults:
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Return the differences between `found` and `other` in eps * scale; inf if not finite."""
+        """Return the differences between `found` and `other`, divided by eps * scale; inf if not finite."""
         return disagreement(self.found, other, self.scale)
 
 

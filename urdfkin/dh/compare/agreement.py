@@ -225,7 +225,7 @@ def _mask(reference: DHTable) -> FloatArray:
 def _hidden(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of each cell that a change of base, tool or joint offsets can replace."""
+    """Return row and name of each cell with the same effect as a change of base, tool or offsets."""
     hidden = []
     for i, k in hidden_cells(fitted, check_targets):
         at = _reference_row(reference, i, CELLS[k])

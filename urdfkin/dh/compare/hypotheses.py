@@ -38,7 +38,7 @@ _DIFFERENCE_COST = 0.1
 _BETTER = 0.05
 #: Keys of a row that `diagnose` uses; it ignores limits and mimic rules.
 _CELLS = ("joint", "kind", "sense", "beta", *COLUMNS)
-#: Keys of a table that `diagnose` ignores, because base and tool are fitted.
+#: `diagnose` ignores these keys of a table, because it fits base and tool.
 _ENDS = ("base", "tool", "coordinates")
 #: Plausible lengths of an arm (metres)
 _LONGEST, _SHORTEST = 20.0, 1e-3

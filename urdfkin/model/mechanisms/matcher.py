@@ -436,7 +436,7 @@ class MechanismMatcher:
             plane: (4, 4) one possible N of a planar joint; every possible N is the product of this N and a
                 planar pose. None for a floating joint.
             poses_after: Poses (4, 4) of B's body after the joint; at each pose, some of the body's axes
-            coincide with axes of A.
+                coincide with axes of A.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]

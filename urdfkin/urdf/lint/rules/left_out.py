@@ -97,7 +97,7 @@ def _finding(
 
 
 def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
-    """Return the position of each element that `search` yields; the first if elements have the same name."""
+    """Return the position of each element that `search` yields; of elements with one name, the first."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_SEARCHED]):
         found.setdefault((element, name), (first, last))
