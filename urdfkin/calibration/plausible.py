@@ -155,7 +155,10 @@ class FitWithData:
             yield f"the fit scales the values of joint {_list(gained.values())}"
 
     def turned_zeros(self) -> list[str]:
-        """Return the joints whose zero changed by about half a turn."""
+        """Return the joints whose zero changed by about half a turn.
+
+        A reversed sign of the next joint can cause such a change.
+        """
         return [
             f"{parameter.where!r} by {angle(abs(change))}"
             for parameter, change, least in self._changes()

@@ -29,7 +29,10 @@ _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Estimates the speed of a validation, in chunks of samples per second, and the remaining time."""
+    """Estimates the speed of a validation, in chunks of samples per second, and the remaining time.
+
+    The time until the first chunk is finished is not counted, because urdfkin may compile kernels meanwhile.
+    """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()

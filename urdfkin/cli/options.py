@@ -98,7 +98,10 @@ def is_given(context: click.Context, name: str) -> bool:
 
 
 def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
-    """Raise InputError if the user wrote an option that has no effect."""
+    """Raise InputError if the user wrote an option that has no effect.
+
+    With the reason "with --opw", the message is "--format does nothing with --opw".
+    """
     for parameter in context.command.params:
         if parameter.name in unused and is_given(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])

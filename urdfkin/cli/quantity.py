@@ -219,7 +219,7 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 
 
 def _head(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
-    """Return the entries of a JSON result that identify the robot, `about`, the inputs and the settings."""
+    """Return the first entries of a JSON result: the robot, the entries `about`, inputs and settings."""
     times = {} if x.t is None else {"t": x.t.tolist()}
     return {
         "robot": x.robot.name,

@@ -419,7 +419,7 @@ class Sameness(Displayable):
 
     @property
     def within_single(self) -> bool:
-        """True if the models differ, but only by what rounding to single precision can cause.
+        """Whether the models differ, but each frame by no more than single precision can cause.
 
         The models are compared as they are written. The limit is the sum of the rounding errors of all
         joints. A real error in one joint can be smaller than this sum. Therefore, only `up_to_single` proves
@@ -711,7 +711,7 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return two sets of links of the root body: links with all moving joints, and links with none.
+    """Return the links of the root body that carry all moving joints, and those that carry none.
 
     A link before the robot, such as a pedestal, has a fixed child link that carries all moving joints. A link
     beside the robot, such as a table, carries no moving joint. If the robot has no moving joint, both sets

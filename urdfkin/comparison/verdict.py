@@ -276,7 +276,10 @@ class Comparator:
         return metres, radians
 
     def _unexplained_differences(self, alignment: Alignment) -> tuple[JointDifference, ...]:
-        """Return the differences of the unchanged models that rounding does not explain, joint by joint."""
+        """Return the differences of the unchanged models that rounding does not explain, joint by joint.
+
+        A is compared with B, and B with A, because the bounds differ (`JointComparison`).
+        """
         errors = [
             np.zeros((len(tree.joints), 3)) if robot.single is None else robot.single.joints
             for tree, robot in zip(self.trees, self.robots, strict=True)

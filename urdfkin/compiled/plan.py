@@ -117,7 +117,7 @@ class CompiledTree:
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
-            fixed joints. The first entries are the transforms from the previous moving joint to each moving
+            fixed joints. The first entries are the lengths from the previous moving joint to each moving
             joint. The other entries are from the last moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum of `Joint.tilt` (rad) over the joints between the root and each frame, in output
@@ -476,7 +476,11 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a joint, if a later event needs the state."""
+        """Write an instruction that saves the state after a joint, if a later event needs the state.
+
+        `last[i]` is the index of the last event that uses the state after joint i. The event with index
+        `following` comes next and uses the state in the registers, so only later events need the saved state.
+        """
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 

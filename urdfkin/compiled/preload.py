@@ -200,7 +200,11 @@ def are_on_disk() -> bool:
 
 
 def load_kernels() -> None:
-    """Load every kernel before several processes start, so that these processes compile no kernel."""
+    """Load every kernel before several processes start; otherwise, each process would compile every kernel.
+
+    A process compiles on one processor only, so a second process compiles half of the kernels, and this
+    process reads them from disk.
+    """
     missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
     helper = _compile_elsewhere(_OTHER_HALF) if missing else None
     try:

@@ -94,7 +94,10 @@ def seen(axes, R, x):
 
 
 def seen_after(axes, S, x):
-    """Return a link's velocity or acceleration x after the link's frame is rotated by S."""
+    """Return a link's velocity or acceleration x after the link's frame is rotated by S.
+
+    In world axes, the components of x do not change. In the link's axes, they are rotated.
+    """
     return axes(eq.rotate(eq.transposed(S), x), x)
 
 

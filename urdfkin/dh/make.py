@@ -34,7 +34,10 @@ _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """Return a chain's table with the frames of a reference table."""
+    """Return a chain's table with the frames of a reference table.
+
+    `choices.flip` must be the result of `reversed_like`.
+    """
     standard = replace(choices, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
 

@@ -211,7 +211,10 @@ def _bars(lines: list[str]) -> _Grid | None:
 
 
 def _separated(lines: list[str]) -> _Grid | None:
-    """Parse cells separated by semicolons, tabs or commas."""
+    """Parse cells separated by semicolons, tabs or commas.
+
+    If semicolons or tabs separate the cells, a comma inside a cell is a decimal comma.
+    """
     lines = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
     grids = (_grid(lines, partial(_csv_cells, mark=mark), mark) for mark in (";", "\t", ","))
     return next(filter(None, grids), None)

@@ -256,7 +256,7 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Recommend, in one line, the tolerance that leaves the fewest cells with rounding noise.
+    """Recommend the tolerance that leaves the fewest noisy cells, in one line; None if no tolerance helps.
 
     A noisy cell differs slightly from 0 or from a multiple of 15 degrees, because an angle in the file is
     rounded. For example, 1.5708 may cause a tilt of 5e-12 rad and offsets of about 1e-12 m. `snapped` is

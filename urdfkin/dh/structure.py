@@ -204,7 +204,7 @@ def _arm_kinds(
 
 
 def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the known closed-form solutions; approximately parallel axes give approximate solutions."""
+    """Return the known closed-form solutions; an approximate property makes a solution approximate."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:

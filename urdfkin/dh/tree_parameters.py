@@ -217,8 +217,7 @@ class _LinkAxis:
 def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
     """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
     links = list[_LinkAxis]()
-    # For each link: its antecedent (the previous link of the table), T_antecedent_link, and the number of
-    # joints between them.
+    # For each link: its antecedent, T_antecedent_link, and the number of joints without an axis between them.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -237,7 +236,7 @@ def _steps(
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
-    The transform leads from the axis of the previous joint on the path to the joint's axis. The angle and the
+    The transform leads from the axis of the antecedent (`_LinkAxis`) to the joint's axis. The angle and the
     offset lead from the axis frame of a link to the frame of its row. The first moving child of a link
     defines the link's x axis. For a link without a moving child, x is chosen so that theta = 0.
     """

@@ -232,7 +232,10 @@ def _rounded_down(x: float) -> str:
 
 
 def _rounded_up(x: float) -> str:
-    """Return a bound with seven digits, rounded up."""
+    """Return a bound with seven digits, rounded up.
+
+    The error of a constant in single precision can be equal to its bound, which must not be rounded down.
+    """
     return _rounded(x, 7, ROUND_CEILING)
 
 

@@ -168,12 +168,12 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration after a joint with angular velocity o, whose derivative is b."""
+    """7.129: angular acceleration after a joint with angular velocity o; b: derivative of o's components."""
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """Acceleration (7.130) after a joint with velocities u and o; b is the derivative of u's components."""
+    """7.130: acceleration after a joint with velocities u and o; b: derivative of u's components."""
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 

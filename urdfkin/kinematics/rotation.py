@@ -228,7 +228,10 @@ def rotation_of(quat: ArrayLike) -> FloatArray:
 
 
 def quaternion_of(R: ArrayLike) -> FloatArray:
-    """Return the unit quaternion with qw >= 0 of a rotation."""
+    """Return the unit quaternion with qw >= 0 of a rotation.
+
+    Shepperd's method avoids cancellation: it divides by the component with the largest absolute value.
+    """
     R = rotations(R, "R")
     # The entries of K = 4 q q^T are sums of entries of R (and of 1 on the diagonal).
     # Each row of K is a multiple of q.
@@ -409,9 +412,8 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    small = (
-        sine < 1e-150
-    )  # If the components are tiny, their squares lose digits, so phi k is computed as 2 `vector`.
+    # The squares of tiny components lose digits, so phi k is then computed as 2 `vector`.
+    small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 

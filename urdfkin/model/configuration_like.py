@@ -91,7 +91,7 @@ class CoordinateLayout:
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values of a text or mapping, and the name of the pose at the start of the text, or None.
+        """Return the values of a text or mapping by name, and the pose at the start of the text, or None.
 
         Numbers without names, or a repeated name, raise InputError; an unknown pose raises UnknownNameError.
 
@@ -177,7 +177,7 @@ class CoordinateLayout:
         return out
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
-        """Return index and value of each number of a joint with several coordinates."""
+        """Return each number of a joint with several coordinates, by its index in the vector."""
         if not isinstance(name, str) or name not in self.spans:
             raise self._not_a_coordinate(name, where)
         at, size = self.spans[name]

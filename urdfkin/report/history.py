@@ -103,7 +103,7 @@ class HistoryDocument(Header):
     runs: Annotated[list[ValidationRun], says("The runs, the oldest first.")]
     robots: Annotated[list[RobotHistory], says("The robots; worse verdicts first.")]
     unusable: Annotated[list[Unused], says("Files that cannot be used, each with the reason.")]
-    repeated: Annotated[list[Unused], says("Files with the same validation run as another file.")]
+    repeated: Annotated[list[Unused], says("Files that contain the same validation run as another file.")]
 
 
 HISTORY = DocumentKind(
@@ -123,7 +123,7 @@ class History:
         robots: For each robot, the results in each run. The key is the robot's source in the latest run.
             Worse verdicts come first.
         unusable: Files that cannot be used, with the reason.
-        repeated: Files for which the validation runs in the same way as for another file.
+        repeated: Files that contain the same validation run as another file.
     """
 
     runs: list[ValidationRun] = field(default_factory=list)

@@ -57,7 +57,7 @@ def installed_version(package: str) -> str | None:
         return None
 
 
-#: Requirement of each optional extra that is meant for users; pyproject.toml lists them all.
+#: Requirement of each extra that is meant for users; pyproject.toml defines all extras.
 EXTRAS = {
     "xacro": "xacrodoc>=2",
     "plots": "matplotlib>=3.10.7",

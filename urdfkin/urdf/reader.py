@@ -110,8 +110,8 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return the mimic rule of each mimic joint, relative to a joint that moves independently.
 
     A mimic joint z may follow another mimic joint y, which follows x. This function combines the chain into
-    one rule: z = m2 (m1 x + b1) + b2. Pinocchio combines the rules in the
-    same order, first those of x and y, so urdfkin and Pinocchio have equal rounding errors.
+    one rule: z = m2 (m1 x + b1) + b2. Pinocchio combines the rules in the same order, from x upwards, so
+    urdfkin and Pinocchio have equal rounding errors.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

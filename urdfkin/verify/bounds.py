@@ -342,8 +342,8 @@ class DecimalErrors(NamedTuple):
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
         rules: Number of mimic rules of the joints on the path; a joint that mimics a mimic joint counts as
             two rules.
-        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. The length is positive even if
-            offsets in a chain of mimic rules cancel, because their rounding errors do not cancel.
+        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if offsets in
+            a chain of mimic rules cancel, because the rounding errors of the offsets do not cancel.
     """
 
     angles: FloatArray
@@ -568,8 +568,7 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     The position rows have the same bound as the rows of the velocity Jacobian. For the rows of angles, let w
     be the angular part of a column of the velocity Jacobian. The rotation axes of the three angles are e_i, u
     and t = R e_k (`urdfkin.verify.analytical_reference`). With s = |e_i x t|, the sine or cosine of the
-    middle
-    angle:
+    middle angle:
 
     | Row | Element | Length of the vector |
     |---|---|---|

@@ -191,7 +191,7 @@ def _measured(
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """Return the largest ratio of a number in `found` to its reference in the unit; 0 if both are 0."""
+    """Return the largest number in `found` as a multiple of its unit; 0 if number and unit are 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 

@@ -225,7 +225,10 @@ def _mask(reference: DHTable) -> FloatArray:
 def _hidden(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of each cell with the same effect as a change of base, tool or offsets."""
+    """Return row and name of each cell with the same effect on the tip as base, tool or joint offsets.
+
+    Cells beta with the value 0 are not included.
+    """
     hidden = []
     for i, k in hidden_cells(fitted, check_targets):
         at = _reference_row(reference, i, CELLS[k])

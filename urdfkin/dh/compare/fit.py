@@ -261,7 +261,10 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes of cells that remove the error; as few cells as possible then differ from `start`."""
+    """Return changes of cells that remove the error; as few cells as possible then differ from `start`.
+
+    A cell does not change if a free parameter, for example the joint offset of its row, has the same effect.
+    """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)
     earlier = ((model.cells - start.cells) * np.where(_IS_ANGLE, scale, 1.0)).ravel()
@@ -405,7 +408,10 @@ def _least_squares_fit(
 
 
 def _with_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Return models with an angle added to one joint offset and subtracted from the next joint offset."""
+    """Return models with an angle added to one joint offset and subtracted from the next joint offset.
+
+    If the axes of the two joints nearly coincide, this change has little effect on the tip.
+    """
     models = []
     for i in range(len(model.cells) - 1):
         sense = math.copysign(1.0, math.cos(float(model.cells[i, CELLS.index("alpha")])))

@@ -2,8 +2,7 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape; the shape consists of the distances and angles between consecutive axes, and the
-offsets along these axes. `diagnose` fits only the few interpretations whose distances and angles between axes
-are closest to the URDF's.
+offsets along these axes. `diagnose` fits only the few interpretations with a shape close to the URDF's shape.
 """
 
 from __future__ import annotations
@@ -210,7 +209,7 @@ class Interpretation:
         return len(self._convention_and_units(other)) + (columns + 1) // 2
 
     def differences(self, other: Interpretation) -> str:
-        """Describe the differences from another interpretation: "modified, millimetres"."""
+        """Describe the differences from another interpretation, for example "modified, millimetres"."""
         names = self._convention_and_units(other)
         if self.columns != other.columns:
             names.append(f"its columns {', '.join(COLUMNS)} as {', '.join(self.columns)}")

@@ -804,7 +804,7 @@ def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, t
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # Only joint pairs with the most frequent ratio alpha of joint velocities get a new zero offset.
+        # Only joint pairs with the most frequent alpha (of y = alpha x + beta) get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )

@@ -130,7 +130,7 @@ class JointTransform:
     """The conversion of a planar or floating joint: P_b = before P_a behind.
 
     `before` is M and `behind` is N, both (4, 4). If the joint is reversed in one model (`back`), the
-    conversion is P_b = `before` @ inverse(P_a) @ `behind`.
+    conversion is P_b = before P_a^-1 behind.
     """
 
     before: FloatArray
@@ -281,7 +281,7 @@ class Mechanism:
         return known
 
     def reordered(self, names: Sequence[str]) -> Mechanism:
-        """Return a mechanism with consecutive joints in another order, which starts at the inner body.
+        """Return a mechanism with consecutive joints in the order `names`, from the inner body outwards.
 
         The motion stays the same. The result does not contain the links between these joints.
         """

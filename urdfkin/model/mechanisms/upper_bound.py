@@ -353,7 +353,10 @@ def d_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support function of the difference between two matched prismatic joints' translations."""
+    """Return the support function of the difference between the translations by two matched prismatic joints.
+
+    The difference is largest if each joint value is at a limit.
+    """
     if (name := pair.variable) is not None:
         ends = variables.ranges.get(name, (0.0, 0.0))
         values = [(pair.a.at({name: z}), pair.b.at({name: z})) for z in ends]
@@ -525,7 +528,10 @@ def _derivatives(
 
 
 def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
-    """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B."""
+    """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
+
+    If u and u' differ, their difference is added to the bound on u x d.
+    """
     G, axis, other = d.grid.points, step.axis, step.other
     by_axes = 0.0
     if other is not axis:

@@ -87,8 +87,8 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
     # A reporter stores only some of the findings if a code has very many.
-    # After a fix, the file may store other numbers, whose findings would look new, so these codes are not
-    # compared.
+    # After a fix, the reporter may store other findings of such a code, which would look new.
+    # Therefore, these codes are not compared.
     many = {finding.code for finding in before.findings if finding.also}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)

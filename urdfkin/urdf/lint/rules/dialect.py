@@ -155,7 +155,7 @@ EXTENSIONS = frozenset(_COMMON.split())
 
 #: Lines of the form `element: attributes > child elements`.
 #: A line without a colon means that the attributes of the element are not checked.
-#: The content of an element without a known line number is not checked.
+#: If an element has no line in this table, its content is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
