@@ -1,4 +1,4 @@
-"""Numbers that record each of their rounding errors, so that the equations' code determines its errors."""
+"""Numbers that record each rounding error of the equations that compute with them."""
 
 from __future__ import annotations
 

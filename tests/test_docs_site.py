@@ -148,7 +148,7 @@ def test_the_pages_of_commands_and_library_contain_every_name() -> None:
 
 
 def _documented() -> list[str]:
-    """Yield the full path of each name on the library pages, and of each public member of its classes."""
+    """Return the full path of each name on the library pages, and of each public member of its classes."""
     found = []
     for name in " ".join(names for _, _, names in LIBRARY.values()).split():
         path = address(name)

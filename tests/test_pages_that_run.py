@@ -107,7 +107,7 @@ def test_a_page_that_another_test_runs_is_named_in_that_test(page: str) -> None:
 
 
 def rows(library: str) -> list[tuple[str, FloatArray]]:
-    """Yield the call and the bead's numbers of a library in the table."""
+    """Return the calls and the bead's numbers of a library in the table."""
     found, owner = [], ""
     for line in PAGE.splitlines():
         cells = [cell.strip() for cell in line.split("|")[1:-1]]

@@ -145,7 +145,7 @@ def test_a_message_names_the_section_of_each_common_problem() -> None:
 def test_one_word_is_enough_to_find_a_question() -> None:
     for words, topic in (("mimic", "mimic-joints"), ("Meshes", "packages-and-meshes"), ("unit axes", AXES)):
         assert answer_to(words) == answers()[topic]
-    assert answer_to("frames") is None  # two messages name the question
+    assert answer_to("frames") is None  # two questions contain the word
     assert answer_to("") is None
     assert run("explain", "mimic").text.startswith("Mimic joints\n")
     assert run("explain", "frames").code == 2

@@ -84,7 +84,7 @@ def block(language: str, page: str = README) -> str:
 
 
 def transcripts() -> list[tuple[list[str], list[str]]]:
-    """Yield each command of the console blocks, and the lines of its output."""
+    """Return each command of the console blocks, and the lines of its output."""
     found: list[tuple[list[str], list[str]]] = []
     for text in re.findall(r"```console\n(.*?)```", README, re.DOTALL):
         for line in text.splitlines():

@@ -314,9 +314,9 @@ def main() -> None:
     asked = arguments.parse_args()
     right = truth()
     for name, number in mutants_of(asked.modules or MODULES, asked.sample, asked.seed):
-        mistake = changes_of(ast.parse(source_of(name)))[number]
+        change = changes_of(ast.parse(source_of(name)))[number]
         answer = attempt(name, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
-        row = {"mistake": f"{name}:{number}", "line": mistake.line, "what": mistake.what, "outcome": answer}
+        row = {"mutant": f"{name}:{number}", "line": change.line, "what": change.what, "outcome": answer}
         print(json.dumps(row), flush=True)
 
 

@@ -195,9 +195,9 @@ OTHER_NAMES = {
 def mutants(source: str, called: Collection[str]) -> Iterator[tuple[str, ast.Module]]:
     """Yield every module with one changed node in a called function, and a description of the change."""
     right = ast.parse(source)
-    for number, mistake in enumerate(changes_of(right)):
-        if function_at(right, mistake.line) in called:
-            yield f"{mistake.line}: {mistake.what}", mutated(source, number)
+    for number, change in enumerate(changes_of(right)):
+        if function_at(right, change.line) in called:
+            yield f"{change.line}: {change.what}", mutated(source, number)
     for number, node in enumerate(ast.walk(right)):
         field = "attr" if isinstance(node, ast.Attribute) else "id"
         name = getattr(node, field, "")

@@ -114,7 +114,7 @@ ASCII = (
 def test_names_of_any_script_are_printed_on_any_terminal(words: str, env: dict[str, str], arm: Path) -> None:
     code, out, err = shell(f"$URDFKIN {words} arm.urdf", arm.parent, **env)
     assert code == 0, err
-    assert out or "github" in words  # the command prints nothing about a correct file
+    assert out or "github" in words  # this format has no output for a correct file
 
 
 @pytest.mark.parametrize("form", ["terminal", "latex", "toml", "csv", "urdf", "c"])
@@ -197,7 +197,7 @@ def test_a_named_pipe_with_a_slow_writer_is_read_completely(pause: float, tmp_pa
     content = bytes(range(256)) * 1000  # more than the buffer of a pipe
 
     def write() -> None:
-        with path.open("wb") as pipe:  # the command waits for the reader
+        with path.open("wb") as pipe:  # `open` waits until the command opens the pipe
             threading.Event().wait(pause)
             pipe.write(content[:100])
             pipe.flush()

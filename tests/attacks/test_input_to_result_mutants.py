@@ -123,5 +123,5 @@ def test_no_random_mutant_gives_a_wrong_verified_result_or_disables_the_check(
         (module, number): attempt(module, lambda source, number=number: mutated(source, number), right)  # type: ignore[misc]
         for module, number in mutants_of(MODULES, 40, seed)
     }
-    assert [mistake for mistake, word in found.items() if word.startswith(("WRONG", "BLIND"))] == []
+    assert [mutant for mutant, word in found.items() if word.startswith(("WRONG", "BLIND"))] == []
     assert "caught" in found.values()

@@ -7,25 +7,25 @@ import pytest
 from scripts.mutate import ROOT, Named, evaluate_named, named_mutants
 from scripts.mutating.operators import rewritten
 
-SLIPS = named_mutants()
+MUTANTS = named_mutants()
 
 
-def _source(mistake: Named) -> str:
-    return mistake.file.read_text(encoding="utf-8")
+def _source(mutant: Named) -> str:
+    return mutant.file.read_text(encoding="utf-8")
 
 
 def test_every_listed_mutant_can_be_made_and_names_an_existing_test() -> None:
-    assert len({mistake.claim for mistake in SLIPS}) == len(SLIPS)
-    for mistake in SLIPS:
-        rewritten(_source(mistake), mistake.before, mistake.after)
-        file, _, name = mistake.test.partition("::")
-        assert f"def {name}(" in Path(ROOT / file).read_text(encoding="utf-8"), mistake.test
+    assert len({mutant.claim for mutant in MUTANTS}) == len(MUTANTS)
+    for mutant in MUTANTS:
+        rewritten(_source(mutant), mutant.before, mutant.after)
+        file, _, name = mutant.test.partition("::")
+        assert f"def {name}(" in Path(ROOT / file).read_text(encoding="utf-8"), mutant.test
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("mistake", SLIPS, ids=[mistake.claim.replace(" ", "-") for mistake in SLIPS])
-def test_the_named_test_of_each_listed_mutant_fails(mistake: Named) -> None:
-    outcome = evaluate_named(mistake, timeout=300.0)
+@pytest.mark.parametrize("mutant", MUTANTS, ids=[mutant.claim.replace(" ", "-") for mutant in MUTANTS])
+def test_the_named_test_of_each_listed_mutant_fails(mutant: Named) -> None:
+    outcome = evaluate_named(mutant, timeout=300.0)
     assert outcome.word == "noticed", outcome.by
 
 

@@ -301,9 +301,11 @@ def test_in_a_pipe_no_name_is_folded_and_no_line_ends_in_blanks(
         "chain panda",
     ],
 )
-def test_json_states_the_locked_joints_and_the_motion_of_the_base(words: str) -> None:
+def test_json_states_the_file_the_locked_joints_and_the_motion_of_the_base(words: str) -> None:
     data = good(f"{words} --lock panda_joint1=0.3 --format json").data
     assert data["lock"] == {"panda_joint1": 0.3}
+    if not words.startswith("chain"):
+        assert data["sha256"] == library.load("panda").sha256
     if "--base-velocity" in words:
         assert data["base_velocity"] == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
 

@@ -25,14 +25,14 @@ LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0) @ rotation("z", 0.4)
 
 
 def coupled() -> KinematicTree:
-    """Return a table with revolute and prismatic joints, a mimic joint, and nearly parallel axes."""
+    """Return an arm with revolute and prismatic joints, a mimic joint, and nearly parallel axes."""
     near = shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4)
     tree = arm(LINK, near, LINK, LINK, kinds="RRPR", tip=LINK)
     return with_joint(tree, 3, replace(tree.joints[3], mimic=Mimic("j1", -0.5, 0.2)))
 
 
 def nearly_parallel() -> KinematicTree:
-    """Return a table without mimic joints in which one row has a fifth parameter."""
+    """Return an arm without mimic joints; one row of its table has a fifth parameter."""
     return arm(LINK, shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4), LINK, tip=LINK)
 
 

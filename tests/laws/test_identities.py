@@ -334,7 +334,7 @@ def test_relative_placement_accepts_frames_batches_and_out_as_placement_does() -
     for f, frame in enumerate(("tool0", "base_link")):
         np.testing.assert_array_equal(both[:, :, f], robot.relative_placement(q, frame, "wrist_1_link"))
     line = robot.certificate().lines[0]
-    assert (line.quantity, line.checked) == ("relative placement", 24)  # no result for the reference frame
+    assert (line.quantity, line.checked) == ("relative placement", 24)  # `relative_to` has no result
 
 
 @pytest.mark.parametrize("mistake", [1e-12, "transposed", "in the world's axes"])

@@ -67,7 +67,7 @@ def test_a_path_through_the_common_ancestor_agrees_with_pinocchio(
 # -- tables of the vendors -----------------------------------------------------------------------------
 
 
-#: Options (snap, last) with which a table equals the vendor's table, and the tip's displacement (m).
+#: Options (snap, last) with which a table equals the vendor's, and the allowed displacement of the tip (m).
 EXACT = {
     "ur3": (1e-6, "tip", 1e-11),
     "ur5": (1e-6, "tip", 1e-11),

@@ -100,7 +100,7 @@ def test_urdfkin_uses_the_tilted_axis_of_the_file_and_pinocchio_differs_by_the_t
     ours = robot.placement([2.0], "l1")
     theirs = robot.verifier.oracle().placements(QueryBatch(["l1"], (np.array([[2.0]]),)))[0, 0]
     assert 0.1 * tilt < np.abs(ours - theirs).max() < 2.0 * tilt
-    # Pinocchio keeps the direction of an axis of length 2, so Pinocchio and urdfkin agree.
+    # Pinocchio does not replace an axis of length 2, so Pinocchio and urdfkin agree.
     doubled = loaded(text(kind, 2.0 * near(0.99 * tilt, seed)))
     assert np.abs(doubled.placement([2.0], "l1") - ours).max() < 4.0 * EPS
     assert doubled.certificate().verified
