@@ -165,7 +165,8 @@ class SameCertificate(Header):
     joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
     links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
     tools: Annotated[
-        list[ToolEntry], says("Matched links with different poses, which count as different tools.")
+        list[ToolEntry],
+        says("Matched links whose poses differ; each counts as a different tool."),
     ]
     orders: Annotated[
         list[list[str]], says("Consecutive joints of B whose order was changed, in the new order.")

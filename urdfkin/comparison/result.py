@@ -543,7 +543,7 @@ class Sameness(Displayable):
                 )
             if one.conversion is not None:
                 raise InputError(
-                    "a planar or floating joint has another frame in B",
+                    "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
                     remedy="convert q with to_b, because a convention cannot describe another joint frame",

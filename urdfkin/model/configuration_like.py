@@ -79,8 +79,8 @@ class CoordinateLayout:
         ([0.0, 2.0], [[0.5, 1.0], [0.5, 2.0]])
         >>> arm.read("elbow=30deg")
         Traceback (most recent call last):
-        urdfkin.errors.InputError: q: no value for shoulder; give a value for each, or begin with a pose: \
-'neutral, elbow=...'
+        urdfkin.errors.InputError: q: no value for shoulder; give a value for each joint, or begin \
+with a configuration: 'neutral, elbow=...'
         """
         where = where or self.what
         if not isinstance(value, Mapping) and self._is_in_order(cells := _cells(value)):
@@ -161,7 +161,7 @@ class CoordinateLayout:
             raise InputError(
                 f"no value for {listed(missing)}",
                 where=where,
-                remedy=f"give a value for each, or begin with a pose: {begin}",
+                remedy=f"give a value for each joint, or begin with a configuration: {begin}",
             )
         shapes = [x.shape for x in found.values()]
         try:

@@ -1157,8 +1157,8 @@ class _StageReader:
         up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
         if root.HasInfo(tokens.upAxis) and root.GetInfo(tokens.upAxis) != up and not self._is_resolved(prim):
             what = f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up}"
-            remedy = "turn this prim, or write the layer with the up axis of the stage"
-            self._report("up-axis", path, f"{what}; the layer is not turned", remedy)
+            remedy = "rotate this prim, or write the layer again with the up axis of the stage"
+            self._report("up-axis", path, f"{what}; the layer is not rotated", remedy)
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
         """Return whether a prim's scale in the world is `factor`, up to rounding to single precision."""
