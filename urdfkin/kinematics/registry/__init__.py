@@ -41,10 +41,7 @@ class Equation:
     """One numbered equation.
 
     Attributes:
-        number: The printed number, for example "7.130".
         statement: The equation in urdfkin's notation, in plain characters.
-        latex: The statement in LaTeX.
-        meaning: One or two sentences.
         written: Names of the functions of `urdfkin.kinematics.equations` that state the equation.
         functions: Functions that compute the equation, as "module:name".
         tests: Tests that fail if the equation is computed wrongly, as "file::name".
@@ -74,10 +71,7 @@ class Section:
 class Misprint:
     """A wrong or incomplete statement in the chapter.
 
-    Attributes:
-        where: The place of the misprint in the chapter.
-        proof: The reason why the printed statement is wrong, in one sentence.
-        test: The test that proves the misprint, as "file::name".
+    The test, as "file::name", proves the misprint; `proof` states the reason in one sentence.
     """
 
     where: str
@@ -184,11 +178,7 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page of plain text about "7.130", "(7.130)" or "eq. 7.130"; None if there is no such equation.
-
-    >>> print(explain("7.5").splitlines()[2])
-    R_0_1 = R(theta1) = [[cos, -sin], [sin, cos]]
-    """
+    """Return a page of text about "7.130", "(7.130)" or "eq. 7.130"; None for other text."""
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST:
         return None
