@@ -132,7 +132,7 @@ def odd_factor(rng: random.Random) -> float:
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Return random limits of a joint; the limits may be equal, infinite or, rarely, reversed."""
+    """Return random limits of a joint: equal, adjacent, far apart or, rarely, reversed."""
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:

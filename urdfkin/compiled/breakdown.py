@@ -47,14 +47,10 @@ _MOST_SHOWN = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccelerationBreakdown(Displayable):
-    """Contributions of the joints to a frame's acceleration.
+    """Contributions of the joints to a frame's acceleration; six numbers are [linear; angular].
 
-    Attributes:
-        joints: Names of the moving joints from the base to the frame.
-        base: (..., 6) acceleration that the frame would have if all joints were fixed and only the base
-            moved.
-        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of `KINDS`,
-            and the six numbers are [linear; angular].
+    `base` (..., 6) is the acceleration that the frame would have if only the base moved. `terms` (...,
+    joints, 4, 6) are the contributions of the joints, with the kinds in the order of `KINDS`.
     """
 
     joints: tuple[str, ...]
@@ -125,9 +121,7 @@ def acceleration_breakdown(
 ) -> AccelerationBreakdown:
     """Split the classical acceleration of a link's frame into contributions, for n configurations.
 
-    `base` (1 or n, 24) is the state of the base, see `BaseMotion.state`; `out` is (n, joints, 4, 6). A number
-    of q, v or a that is not finite raises NotFiniteError. A contribution beyond the range of double precision
-    raises RangeError.
+    `base` (1 or n, 24) is the state of the base, see `BaseMotion.state`; `out` is (n, joints, 4, 6).
     """
     if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")

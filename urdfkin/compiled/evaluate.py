@@ -50,11 +50,8 @@ _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, Ker
 class EvaluateOptions(TypedDict, total=False):
     """Keyword arguments of every function of this module.
 
-    Attributes:
-        base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
-        out: C-contiguous float64 array of the result's size.
-        threads: Largest number of threads; None uses all processors for large batches.
-        read: Whether the caller reads the results immediately, so that they should stay in the caches.
+    `base` is the state of the base, (n, 24) or (1, 24). `out` is a C-contiguous array for the result. `read`
+    is true if the caller reads the results immediately, so that the results stay in the caches.
     """
 
     base: FloatArray
@@ -246,11 +243,7 @@ def task_of(
     *,
     staged: bool,
 ) -> tuple[NDArray[np.int64], object]:
-    """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished.
-
-    `inputs` are the base's state, q and, if needed, v and a. Each array has one row for all configurations,
-    or one row for each configuration.
-    """
+    """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished."""
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
@@ -324,10 +317,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
-    """Compute `n` rows in parts, so that the memory for intermediate results does not grow with n.
-
-    For an empty batch, `compute` is called once, with an empty slice.
-    """
+    """Compute `n` rows in parts, so that the memory for intermediate results does not grow with n."""
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
     count = min(threads, len(parts), _processors())

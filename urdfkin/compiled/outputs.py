@@ -1,8 +1,7 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-A function `mask_...` marks the vectors of a link's state that an output does not need. A function `emit_...`
-writes the output of a frame. Jacobian columns are computed in world axes; for LOCAL they are rotated to the
-axes of the frame.
+A function `mask_...` marks the vectors of a link's state that an output does not need. Jacobian columns are
+computed in world axes; for LOCAL they are rotated to the axes of the frame.
 """
 
 from __future__ import annotations

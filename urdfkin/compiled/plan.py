@@ -2,10 +2,7 @@
 
 A moving joint is called a step. As in the textbook, every joint frame is rotated so that the joint's axis is
 z: a revolute joint is then Rz, and a prismatic joint is Tz. Fixed joints are merged into the constant offsets
-between moving joints. A compiled tree contains only the joints that move one of its frames.
-
-A kernel executes the program once for each block of configurations. The state of a link stays in registers
-until the next link is computed. At a branch of the tree, the state is saved to memory and read again later.
+between moving joints. At a branch of the tree, a program saves the state of a link to memory.
 """
 
 from __future__ import annotations
@@ -271,11 +268,7 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 
 
 class Op(IntEnum):
-    """Instructions of a program; the suffix X, Y or Z is the axis.
-
-    CARRY is a constant translation, and TURN is a constant rotation. STORE stores the data that the Jacobian
-    column of a joint needs.
-    """
+    """Instructions of a program: CARRY translates, TURN rotates, and the suffix X, Y or Z is the axis."""
 
     END = 0
     CARRY_X = 1
@@ -345,10 +338,7 @@ _JOINTS = {
 
 @dataclass(frozen=True, eq=False)
 class KernelProgram:
-    """The program of a kernel; `rows` is the number of scratch memory rows that it needs.
-
-    The array `words` contains the integers that `Head` names, then lists, and then the instructions.
-    """
+    """A program: `words` are the integers that `Head` names, then lists, and then the instructions."""
 
     words: IntArray
     constants: FloatArray
@@ -522,11 +512,7 @@ class _Writer:
         return sources.ravel().tolist()
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the list of Jacobian columns from which the kernel computes a frame's Hessian.
-
-        The list contains the number of columns, `PAIR_WIDTH` integers for each column, and the scratch row of
-        each element of the result.
-        """
+        """Return the number of columns, `PAIR_WIDTH` integers for each column, and the scratch rows."""
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]

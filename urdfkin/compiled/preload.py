@@ -90,10 +90,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 
 
 def single_pays(name: str) -> bool:
-    """Return whether to load the function that computes one configuration with the kernel `name`.
-
-    Each call adds the time that this function would save to a total.
-    """
+    """Return whether to load the function that computes one configuration with the kernel `name`."""
     if _only:
         return _only[-1] == "compiled"
     if name not in _loaded and f"local_{name}" not in _loaded:
@@ -133,10 +130,7 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Let a second process compile a kernel, and return whether a second process runs.
-
-    At most one second process runs at a time, and at most one is started for each kernel.
-    """
+    """Start at most one second process for each kernel; return whether a second process runs."""
     if cache_folder() is None:
         return False
     if any(process.poll() is None for process in _beside.values()):

@@ -1,7 +1,6 @@
 """Number types for the recursion of one configuration in plain Python, without compilation.
 
-Results are exactly the same doubles as those of compiled kernels; `urdfkin.compiled.machine.numbers` explains
-the types. Scratch memory is a list with one number for each row.
+Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`).
 """
 
 from __future__ import annotations

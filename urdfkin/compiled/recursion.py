@@ -19,8 +19,7 @@ world axes. The joint axis and the interorigin vector have constant components i
 The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
 add the rounding errors of another rotation.
 
-A vector that a result does not need is `nothing()` and costs no time. The kernels are copies of these
-functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
+A vector that a result does not need is `nothing()` and costs no time.
 """
 
 from __future__ import annotations
@@ -148,10 +147,9 @@ def prismatic(axes, state, slide, v, a):
 
 
 def free(axes, state, o, u, o_rate, u_rate):
-    """Add the velocity and the acceleration of a planar or floating joint to the state.
+    """Add the velocity and the acceleration of a planar or floating joint, in the child link's axes.
 
-    The state already contains the joint's translation and rotation. The joint's velocity and acceleration are
-    given in the child link's axes.
+    The state already contains the joint's translation and rotation.
     """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
@@ -259,11 +257,9 @@ def _resume(s, row, state):
 
 
 def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
-    """Read the numbers of `m` configurations from index b on into scratch memory.
+    """Read the listed blocks of eight numbers of `m` configurations into scratch memory.
 
-    Only the listed blocks of eight numbers are read. If x has one row, all configurations use this row. A
-    block may contain surplus numbers of the next configuration; they are overwritten when later inputs are
-    read.
+    A block may contain surplus numbers of the next configuration; later inputs overwrite the surplus numbers.
     """
     for i in range(begin, end):
         at = blocks[i]

@@ -29,8 +29,8 @@ def rebound(
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls copies, or the entries of `others`, instead of the functions with these names. List a module
-    after the modules whose functions it uses.
+    Inside a copy, each name refers to its entry in `others`, or to another copy. List a module after the
+    modules whose functions it uses.
     """
     copies: dict[str, Any] = {}
     for module in modules:

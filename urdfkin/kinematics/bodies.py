@@ -127,10 +127,7 @@ class VelocityParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """Terms of a point's acceleration (7.125), (..., 3), m/s^2 in frame 0.
-
-    The fields are alpha x p, w x (w x p), 2 w x R v_1, R a_1 and d-dot-dot, in this order.
-    """
+    """Terms of a point's acceleration (7.125), (..., 3), m/s^2 in frame 0; see `point_acceleration`."""
 
     transverse: FloatArray
     centripetal: FloatArray
@@ -191,7 +188,7 @@ def interorigin_velocity(
 ) -> FloatArray:
     """Return the time derivative of the interorigin vector d_{i-1,i}, `d_vector` (7.73, 7.74).
 
-    It is d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
+    The derivative is w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
     angular velocity w_0i of link i is w_{i-1,i}, and the equations are 7.66 and 7.67.
     """
     rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
@@ -202,8 +199,8 @@ def interorigin_velocity(
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
     """Return a joint's column of the velocity Jacobian (7.80, 7.85).
 
-    It is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. The moment arm `arm` is the
-    vector d_{i-1,n} (..., 3) from the joint's origin to the endpoint.
+    The column is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. `arm` is the vector
+    d_{i-1,n} (..., 3) from the joint's origin to the endpoint.
     """
     z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
@@ -274,7 +271,7 @@ def representation_inverse(representation: str, R: ArrayLike, nearest: float = N
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122): 6 by 6, or 7 by 6 for a quaternion.
 
     For a quaternion, C has several right inverses. The function returns the right inverse for which the
-    quaternion's time derivative is perpendicular to the quaternion, so that its length stays constant.
+    quaternion's time derivative is perpendicular to the quaternion.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))
@@ -310,7 +307,6 @@ def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) 
 
 
 def _blocks(lower: FloatArray) -> FloatArray:
-    """Return the block-diagonal matrix of the 3 by 3 identity and `lower`."""
     rows, columns = lower.shape[-2:]
     C = np.zeros((*lower.shape[:-2], 3 + rows, 3 + columns))
     C[..., :3, :3] = np.eye(3)

@@ -1,6 +1,6 @@
 """Rotations of rigid bodies, and the time derivatives of rotation matrices, quaternions and Euler angles.
 
-The module computes the equations 7.11 to 7.57 of section 7.2 of the textbook.
+The module computes equations of section 7.2 of the textbook (7.11 to 7.57).
 
 | Argument | Shape | Meaning |
 |---|---|---|
@@ -13,14 +13,13 @@ The module computes the equations 7.11 to 7.57 of section 7.2 of the textbook.
 | `name` | | Euler sequence with SciPy's name |
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-The dots stand for any batch shape; results have the batch shape of the arguments.
-Functions that take an `ArrayLike` raise InputError for a wrong shape, for a value that is not finite, and for
-a matrix that is not a rotation. An axis or a quaternion whose length is not 1 raises InputError too, and so
-does an unknown `frame`.
+The dots stand for any batch shape; results have the batch shape of the arguments. Functions that take an
+`ArrayLike` raise InputError for a wrong shape, a value that is not finite, a matrix that is not a rotation,
+an axis or a quaternion whose length is not 1, and an unknown `frame`.
 
-A user's matrix often has only a few digits, so its columns are only approximately orthogonal.
-`nearest_rotation` and `polar_factor` return the rotation that is nearest to the matrix in the Frobenius norm.
-This rotation is unique: it is the orthogonal factor U of the polar decomposition M = U H.
+`nearest_rotation` and `polar_factor` return the rotation that is nearest to a matrix in the Frobenius norm.
+`nearest_rotation` requires small errors; `polar_factor` accepts errors of any size. The nearest rotation is
+unique: it is the orthogonal factor U of the polar decomposition M = U H.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
 quaternion and its negative are the same rotation. Functions with the argument `frame` express the angular
@@ -101,10 +100,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant.
-
-    Unlike `nearest_rotation`, the function accepts errors of any size, as in a matrix with few digits.
-    """
+    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant."""
     U, _, Vt = np.linalg.svd(M)
     return np.asarray(U @ Vt)
 
@@ -218,7 +214,7 @@ def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def conjugate(quat: ArrayLike) -> FloatArray:
-    """Return the conjugate (-q, q0) of a quaternion; for a unit quaternion, it is the inverse rotation."""
+    """Return the conjugate (-q, q0); the conjugate of a unit quaternion is the inverse rotation."""
     conjugated: FloatArray = vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
 
@@ -344,10 +340,7 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
-    """Return the rotation vector phi k of a rotation, with phi in [0, pi].
-
-    At phi = pi, the vectors pi k and -pi k are both correct, and the function returns one of them.
-    """
+    """Return the rotation vector phi k, with phi in [0, pi]; for phi = pi, k may have either sign."""
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
@@ -358,10 +351,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
 
 
 def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axis k and the angle phi in [0, pi] of a rotation.
-
-    The identity has no unique axis; the z axis is returned for it.
-    """
+    """Return the unit axis k and the angle phi in [0, pi]; for the identity, the axis is z."""
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3]
     sine = np.sqrt((vector * vector).sum(axis=-1))
@@ -448,8 +438,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
 
     The middle angle is in [0, pi] for a proper sequence such as ZYZ and in [-pi/2, pi/2] for the others. At
     the representational singularity, only the sum or the difference of the first and the third angle is
-    determined. There, the third angle is computed from the first angle, so that the product of the three
-    rotations is correct.
+    determined. The third angle is computed from the first angle, so that the product of the three rotations
+    is correct.
     """
     axes = sequence(name)
     R = rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0, because arctan2(0, -0) would be pi.

@@ -4,9 +4,6 @@ The name of the cache folder contains a digest of all source files of `compiled`
 kernel may use functions of any of these files. Numba's own cache files have no digest: a truncated file makes
 every later run fail, and Numba executes a file with a changed bit. This module therefore writes a digest into
 each cache file. If a cache file is damaged, its kernel is compiled again.
-
-Only kernels call an inlined function. The compiler inserts the function's code into each kernel, so an
-inlined function needs no machine code of its own.
 """
 
 from __future__ import annotations
@@ -42,10 +39,7 @@ _dumps: Any = dumps
 
 
 class KernelCache(_Null):  # type: ignore[misc]
-    """The disk cache of one function; Numba reads it before a compilation and writes it afterwards.
-
-    A file's name depends on the function, its source file, its argument types and the processor.
-    """
+    """The disk cache of one function; Numba reads it before a compilation and writes it afterwards."""
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
         self._folder, self._name, self._begin = folder, function_name(function), begin
@@ -113,7 +107,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
 
 
 class InlinedCompiler(_Compiler):  # type: ignore[misc]
-    """A compiler that runs only the passes of Numba that inlined functions need."""
+    """A compiler that produces LLVM code for kernels to inline, and no machine code."""
 
     def define_pipelines(self) -> list[Any]:
         passes = _Passes("inlined")
@@ -238,10 +232,7 @@ class Kernel:
 
 
 class Core(Kernel):
-    """A compiled function that C code can call; its arguments are integers, such as addresses.
-
-    Python calls the function through ctypes, which releases Python's global interpreter lock.
-    """
+    """A compiled function of integers for callers in C; calls from Python release the interpreter lock."""
 
     def __init__(self, function: Callable[..., int]) -> None:
         super().__init__(function, (types.int64,) * function.__code__.co_argcount, nogil=True)
@@ -264,8 +255,5 @@ def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator for a kernel with these Numba types of arguments.
-
-    Releasing Python's global interpreter lock (`nogil`) does not pay in a call of a microsecond.
-    """
+    """Return a decorator for a kernel with these Numba types of arguments."""
     return lambda function: Kernel(function, arguments, nogil)

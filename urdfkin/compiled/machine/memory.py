@@ -122,11 +122,7 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose each square block of numbers in the matrix whose rows are the given vectors.
-
-    For example, four vectors of eight numbers contain two blocks of 4 by 4 numbers. Blocks of 2 by 2 numbers
-    are transposed first, then blocks of 4 by 4 and 8 by 8, each by an exchange of two quarters.
-    """
+    """Transpose each square block of numbers in the matrix whose rows are the given vectors."""
     x, w = list(vectors), 1
     while w < len(x):
         for i in range(len(x)):
@@ -330,8 +326,8 @@ def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
 def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
-    The address of `to[0]` is `address`. A processor reads a cache line before it writes a part of the line,
-    but not before it writes the whole line.
+    A processor reads a cache line before it writes a part of the line, but not before it writes the whole
+    line.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

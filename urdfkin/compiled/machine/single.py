@@ -202,9 +202,8 @@ def single(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Return a function that computes a quantity for one configuration, and the kernel's arguments.
 
-    The compiled tree must have only one frame, and the base must be fixed. The function takes the needed
-    inputs of q, v and a, and then the output array or None. It returns None for arguments that it does not
-    support.
+    The compiled tree must have only one frame, and the base must be fixed. For unsupported arguments, the
+    function returns None.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
@@ -222,10 +221,7 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that calls a C function instead of a kernel, and the C function's arguments.
-
-    The number `orders` is 1 for q, 2 for q and v, and 3 for q, v and a; `shape` is that of the result.
-    """
+    """Return a function that calls a C function instead of a kernel, and the C function's arguments."""
     address = ctypes.cast(core, ctypes.c_void_p).value
     return _called(address or 0, orders, shape, plan, core)
 

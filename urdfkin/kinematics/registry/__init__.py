@@ -1,4 +1,4 @@
-"""The textbook's equations as data: each has its statement, its meaning, its functions and its tests.
+"""The textbook's equations as data: the statement, meaning, functions and tests of each equation.
 
 The TOML files in `data` are the only source of `docs/equations.md` and of `urdfkin explain 7.130`.
 """
@@ -69,10 +69,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Misprint:
-    """A wrong or incomplete statement in the chapter.
-
-    The test, as "file::name", proves the misprint; `proof` states the reason in one sentence.
-    """
+    """A wrong or incomplete statement in the chapter; `test` is the proving test, as "file::name"."""
 
     where: str
     printed: str
