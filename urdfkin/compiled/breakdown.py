@@ -41,7 +41,6 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: The kinds of contribution, in the order of the array `terms`.
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
-#: Maximum number of displayed samples of a batch.
 _MOST_SHOWN = 2
 
 

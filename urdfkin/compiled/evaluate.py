@@ -188,7 +188,7 @@ def _interpreted(
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
         preload.spend(name, took)
-        # The first configuration takes longer than later ones, so its time alone decides nothing.
+        # The first configuration takes longer than later configurations, so its time is not representative.
         if i and (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
             return None
     return odd

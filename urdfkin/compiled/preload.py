@@ -38,7 +38,6 @@ _SAVED = 5e-5
 #: Time (s) after which the cache folder is searched again for a missing kernel.
 _AGAIN = 0.05
 
-#: Modules that contain the kernels.
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
 #: The kernels that each of two processes compiles; the compile times are about equal.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"

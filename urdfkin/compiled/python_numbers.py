@@ -57,7 +57,6 @@ def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[
     return fma
 
 
-#: Function that returns x y + z, rounded only once.
 fma = _python_fma(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
 
 

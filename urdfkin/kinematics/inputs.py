@@ -11,11 +11,11 @@ from urdfkin.system.lazy_import import is_a
 
 FloatArray = NDArray[np.float64]
 
-#: Largest difference between 1 and the norm of a unit vector.
+#: Largest accepted difference between 1 and the norm of a unit vector.
 #: A vector that is normalised in double precision deviates by 4e-16 at most.
 #: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
 UNIT_TOLERANCE = 1e-12
-#: Largest entry of R R^T - I for a rotation R.
+#: Largest accepted entry of R R^T - I for a rotation matrix R.
 #: If the entries of R are rounded to nine decimals, each has an error of 5e-10 at most.
 #: An entry of R R^T - I is then at most 1e-9 times the sum of the absolute values of a row of R.
 #: The sum of the absolute values of a row is at most sqrt(3).

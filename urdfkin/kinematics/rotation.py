@@ -450,10 +450,10 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # Row `j` (the second axis) of R_first^T R = R_second R_third depends only on the third angle.
+    # Let R = F S T with the rotations F, S, T about the three axes. Row `j` of S T is row `j` of T.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # Two entries of row `j` are not 0: those of the second axis and of the axis `rest`.
+    # Only two entries of row `j` are not 0: the entries of the second axis and of the axis `rest`.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()

@@ -132,13 +132,11 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time.
 
-#: Options of every compiled function.
 #: Without fast math, the compiler neither reorders nor fuses operations; the module `numbers` fuses some.
 #: Results therefore do not depend on the compiler.
 #: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
 #: The functions allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-#: Options of an inlined function; Python and C cannot call the function.
 _INLINED: dict[str, Any] = {
     "forceinline": True,
     "no_cpython_wrapper": True,
@@ -181,7 +179,6 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-#: Decorator of an inlined function.
 compiled = jitted(**_INLINED)
 
 # A read-only argument type also accepts a writable array, without a copy.
