@@ -46,7 +46,7 @@ _MOST_SHOWN = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccelerationBreakdown(Displayable):
-    """Contributions of the joints to a frame's acceleration; six numbers are [linear; angular].
+    """Contributions of the joints to a frame's acceleration; six-vectors are [linear; angular].
 
     `base` (..., 6) is the acceleration that the frame would have if only the base moved. `terms` (...,
     joints, 4, 6) are the contributions of the joints, with the kinds in the order of `KINDS`.

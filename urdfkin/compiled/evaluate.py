@@ -1,7 +1,7 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
 Inputs have the shapes (n, nq) and (n, nv). A few configurations are computed with Python numbers, and more
-configurations by a compiled kernel (`preload`) in several threads. Both give exactly the same doubles.
+configurations by a compiled kernel (`preload`) in several threads. Both methods give exactly the same doubles.
 """
 
 from __future__ import annotations

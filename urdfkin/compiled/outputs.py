@@ -64,7 +64,7 @@ def _pose_row(s, row, x, last):
 
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
-    if reference == _WORLD:  # In WORLD, the velocity is that of the body's point at the world's origin.
+    if reference == _WORLD:  # In WORLD, the reference point is the body's point at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, vel, w, to)
 

@@ -85,7 +85,7 @@ class CompiledTree:
         columns: (columns, 4) integers, columns `ColumnField`; one row for each Jacobian column.
         multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
         leaders: (frames, columns) index of the column to which each column is added; -1 if the column's joint
-            does not move the frame. Columns of mimic joints are added to one column.
+            does not move the frame. The columns of a joint and of its mimic joints are added.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints, from the

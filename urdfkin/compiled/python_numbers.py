@@ -195,7 +195,7 @@ def one() -> Known:
 
 
 def nothing() -> Known:
-    """Return the placeholder for a number that no output needs; operations with it return it."""
+    """Return the placeholder for a number that no output needs."""
     return _NOTHING
 
 

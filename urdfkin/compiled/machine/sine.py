@@ -2,10 +2,11 @@
 
 Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the rest is in [-pi/4, pi/4]. The
 rounding error of this subtraction is computed too. The polynomials come from fdlibm (Sun Microsystems,
-k_sin.c and k_cos.c). For angles below 2^20 quarter turns, pi/2 is the sum of two doubles, which are enough
-because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the cosine is near 0,
-and this small value has an error of up to 1e-27. The C library computes the sine and the cosine of a larger
-angle, but not of the other angles in the vector, so that a result does not depend on other configurations.
+k_sin.c and k_cos.c). For angles below 2^20 quarter turns, pi/2 is the sum of two doubles. Two doubles are
+enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the cosine is
+near 0, and this small value has an error of up to 1e-27. The C library computes the sine and the cosine of a
+larger angle, but not of the other angles in the vector, so that a result does not depend on other
+configurations.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Compute one configuration with compiled functions that Python calls like built-in functions.
 
 CPython passes the addresses of the arguments to a built-in function. The compiled function reads a few 8-byte
-words of each array object, at the offsets that CPython and NumPy guarantee to C code. It holds Python's
-global interpreter lock for about a microsecond. For arguments that it does not support, it returns None.
+words of each array object, at the offsets that CPython and NumPy guarantee to C code. The function holds
+Python's global interpreter lock for about a microsecond. For unsupported arguments, the function returns
+None.
 
 A call marks its scratch memory as busy. This is one atomic operation, so it is also safe in a Python without
 a global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
@@ -202,8 +203,8 @@ def single(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Return a function that computes a quantity for one configuration, and the kernel's arguments.
 
-    The compiled tree must have only one frame, and the base must be fixed. For unsupported arguments, the
-    function returns None.
+    The compiled tree must have only one frame, and the base must be fixed. The function that is returned
+    gives None for unsupported arguments.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
