@@ -34,8 +34,6 @@ PROCESSES = f"Pinocchio, {PROCESSORS} processes"
 
 @dataclass(frozen=True)
 class Contender:
-    """A library, and the functions that time its computation of a quantity."""
-
     library: str
     module: str
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
@@ -107,7 +105,6 @@ def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> I
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return the fastest calls of Pinocchio that compute a quantity."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,

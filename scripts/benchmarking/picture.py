@@ -45,7 +45,6 @@ def _light(svg: bytes) -> bytes:
 
 
 def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
-    """Return the rows of a quantity; except in the section `joints`, only rows of the first robot."""
     found = [row for row in rows if row["section"] == section and row["quantity"] == quantity]
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]
 

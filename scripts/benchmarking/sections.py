@@ -210,8 +210,6 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 class _Empty:
-    """Empty methods with the signatures of a prepared evaluator's methods."""
-
     def jacobian(self, q: object, out: object = None) -> object:
         return out
 

@@ -137,7 +137,6 @@ def machine_of(figures: Mapping[str, Any]) -> str:
 
 
 def _groups(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
-    """Yield "robot, quantity" and the rows of each robot and quantity."""
     for (robot, quantity), group in groupby(rows, key=lambda row: (row["robot"], row["quantity"])):
         yield f"{robot}, {quantity}", list(group)
 

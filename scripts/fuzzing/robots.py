@@ -86,7 +86,6 @@ def odd_angle(rng: random.Random) -> float:
 
 
 def direction(rng: random.Random) -> list[float]:
-    """Return a random unit vector, in half of the cases a coordinate axis."""
     if rng.random() < 0.5:
         axis = [0.0, 0.0, 0.0]
         axis[rng.randrange(3)] = rng.choice((1.0, -1.0))
@@ -106,7 +105,6 @@ def odd_axis(rng: random.Random) -> list[float]:
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
-    """Return a quaternion of any norm, possibly zero."""
     numbers = rng.choice(
         (
             [0.0, 0.0, 0.0, 1.0],

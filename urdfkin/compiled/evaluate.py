@@ -1,7 +1,7 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
 Inputs have the shapes (n, nq) and (n, nv). A few configurations are computed with Python numbers, and more
-configurations by a compiled kernel (`preload`) in several threads. Both methods give exactly the same doubles.
+configurations by a compiled kernel (`preload`). Both methods give exactly the same doubles.
 """
 
 from __future__ import annotations
@@ -337,7 +337,6 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
 
 
 def _parts(n: int, threads: int) -> list[slice]:
-    """Split `n` rows into at most `threads` parts; each part has at least one block."""
     blocks = n // LANES
     edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
     return [slice(a, b) for a, b in pairwise(edges) if a < b]

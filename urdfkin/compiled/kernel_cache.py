@@ -42,7 +42,6 @@ _listeners: list[Listener] = [_log]
 
 @contextmanager
 def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """Send compilation events only to `listener` while the context is open."""
     _listeners.append(listener)
     try:
         yield

@@ -89,7 +89,6 @@ def _emit_six(m, s, program, place, b, linear, angular, to):
 
 
 def emit_matrix(m, s, program, place, sources, b, reference, state, to):
-    """Write a frame's Jacobian (6, nv) or the Jacobian's time derivative."""
     frames, size = program[_FRAMES], 6 * program[_NV]
     write_rows(m, s, program, sources, size, to, (b * frames + place) * size, frames * size)
 

@@ -348,7 +348,6 @@ def _read_inputs(m, task, program, s, b, orders):
 
 
 def _squares(total, m, task, program, b, orders):
-    """Add to `total` the squares of all inputs of a block, also of unused inputs."""
     total = _added(total, m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
         total = _added(total, m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])

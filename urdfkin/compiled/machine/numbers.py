@@ -28,8 +28,6 @@ _DOUBLE = ir.DoubleType()
 
 
 class Lanes(types.Type):
-    """The type of a vector of `width` doubles."""
-
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Lanes({width})")

@@ -119,8 +119,6 @@ def _any_large(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _with_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
-    """Return a copy of the vector x with the double `value` at the index `lane`."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, lane, value = arguments
         return builder.insert_element(x, value, lane)

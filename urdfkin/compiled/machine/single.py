@@ -150,8 +150,6 @@ def _compute_into(address, inputs, to, ndarray):
 
 
 class _Method(ctypes.Structure):
-    """CPython's structure PyMethodDef, which describes a built-in function."""
-
     _fields_ = (
         ("name", ctypes.c_char_p),
         ("address", ctypes.c_void_p),
