@@ -34,18 +34,16 @@ PROCESSES = f"Pinocchio, {PROCESSORS} processes"
 
 @dataclass(frozen=True)
 class Contender:
-    """A library, and the functions that time its computation of a quantity."""
-
-    library: str  # name of the distribution
-    module: str  # name of the module
+    library: str
+    module: str
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
-    #: Returns the library's timed tasks for a batch. None: a batch is a loop of calls.
+    #: If a library has no function for batches, the benchmark calls the library in a loop.
     batches: Callable[[Subject, str], Iterator[Work]] | None = None
-    program: str | None = None  # another program that the library needs
+    program: str | None = None  # The library needs this program.
 
     @property
     def missing(self) -> str | None:
-        """Return the reason why the library cannot run, or None if it can run."""
+        """Return the reason why the library cannot run, or None."""
         if util.find_spec(self.module) is None:
             return "not installed"
         if self.program and shutil.which(self.program) is None:
@@ -54,7 +52,6 @@ class Contender:
 
     @property
     def state(self) -> str:
-        """Return the library's version, or the reason why the library cannot run."""
         try:
             return self.missing or metadata.version(self.library)
         except metadata.PackageNotFoundError:
@@ -72,10 +69,7 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the timed tasks for a batch.
-
-    They differ in threads and memory. One task computes nothing and only writes the output array.
-    """
+    """Yield the timed tasks for a batch, with different numbers of threads and output arrays."""
     method, n = getattr(subject.robot, quantity), subject.n
     inputs = subject.inputs(quantity, n)
     out, own, floor = np.empty((3, n, *subject.width(quantity)))
@@ -94,7 +88,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the calls of the robot's method and of frames that were prepared in advance."""
+    """Yield the calls of the robot's method, of a prepared frame and of a compiled frame."""
     robot, frame = subject.robot, subject.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)
@@ -111,7 +105,6 @@ def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> I
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
-    """Return the fastest calls of Pinocchio that compute a quantity."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,
@@ -130,7 +123,6 @@ def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
 
 
 def all_joints_calls(subject: Subject) -> Calls:
-    """Return the calls for all joints: `computeJointJacobians` and `getFrameJacobian`."""
     usual = pinocchio_calls(subject.urdf, subject.frame, "jacobian")
     names = {**usual.names, "compute": pin.computeJointJacobians, "get": pin.getFrameJacobian}
     return Calls(LOOP, names, ("compute(model, data, q)", "get(model, data, frame, aligned)"))
@@ -161,13 +153,11 @@ def _array(buffer: Any, shape: Sequence[int]) -> FloatArray:
 
 
 def _start(urdf: str, frame: str, quantity: str, buffers: Sequence[tuple[Any, tuple[int, ...]]]) -> None:
-    """In a worker, make a model and open the shared memory."""
     _here["loop"] = pinocchio_calls(urdf, frame, quantity).loop()
     _here["arrays"] = [_array(*buffer) for buffer in buffers]
 
 
 def _share(start: int, stop: int) -> None:
-    """In a worker, compute a part of the batch."""
     *inputs, out = (x[start:stop] for x in _here["arrays"])
     _here["loop"](out, *inputs)
 
@@ -179,7 +169,7 @@ LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
 
 
 def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
-    """Return, for each coordinate of a library, the index of the coordinate with the same name in urdfkin."""
+    """Return the index in `ours` of each name in `theirs`."""
     index = {name: i for i, name in enumerate(ours)}
     return [index[name] for name in theirs]
 
@@ -192,7 +182,7 @@ def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 
 
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of dynibo: rows [angular; linear], joints breadth first, matrices column by column."""
+    """Yield the calls of dynibo, which has rows [angular; linear] and joints in breadth-first order."""
     import dynibo
 
     robot = dynibo.Robot.from_urdf(str(subject.file))
@@ -215,12 +205,11 @@ def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def breadth_first(urdf: str) -> list[str]:
-    """Return the moving joints in dynibo's order: breadth first, in the file's order."""
     joints = ET.fromstring(urdf).findall("joint")
     ends = [(_link(joint, "parent"), _link(joint, "child")) for joint in joints]
     links = sorted({parent for parent, _ in ends} - {child for _, child in ends})
     names = []
-    for link in links:  # the loop appends to this list
+    for link in links:  # The loop appends to this list.
         for joint, (parent, child) in zip(joints, ends, strict=True):
             if parent == link:
                 links.append(child)
@@ -233,7 +222,7 @@ def _link(joint: ET.Element, tag: str) -> str:
 
 
 def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls to MuJoCo; rows are [angular; linear], and links are not merged (`fusestatic`)."""
+    """Yield the calls of MuJoCo, which has rows [angular; linear]."""
     import mujoco
 
     flags = {"fusestatic": "false", "discardvisual": "true"}
@@ -268,7 +257,7 @@ def mujoco(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of Drake: rows [angular; linear]; an acceleration is J a plus a velocity term."""
+    """Yield the calls of Drake, which has rows [angular; linear]."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import JacobianWrtVariable
@@ -305,11 +294,11 @@ def drake(subject: Subject, quantity: str) -> Iterator[Calls]:
 
 
 def toolbox(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of the Robotics Toolbox: `jacob0`, and an acceleration as J a + Jdot v."""
+    """Yield the calls of the Robotics Toolbox; an acceleration is J a + Jdot v."""
     import roboticstoolbox as rtb
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the library warns that its URDF reader is deprecated
+        warnings.simplefilter("ignore")  # The library warns that its URDF reader is deprecated.
         robot: Any = rtb.Robot.URDF(str(subject.file))
     path = robot.ets(end=subject.frame)
     moving = sorted((link for link in robot.links if link.jindex is not None), key=lambda x: x.jindex)
@@ -340,7 +329,7 @@ _SINGLE = 1e-6
 
 
 def torch(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`; it has no accelerations."""
+    """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`."""
     import pytorch_kinematics as pk
     import torch
 
@@ -361,16 +350,16 @@ def torch(subject: Subject, quantity: str) -> Iterator[Work]:
         return Work(who, n, lambda: jacobian(q), result, _SINGLE, remark)
 
     yield work("PyTorch Kinematics", chain.jacobian)
-    if shutil.which("g++"):  # torch.compile needs a C++ compiler
+    if shutil.which("g++"):  # `torch.compile` needs a C++ compiler.
         yield work("PyTorch Kinematics, compiled", torch.compile(chain.jacobian_tensor))
 
 
 def jax(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the textbook's equations on JAX arrays in float64, compiled for a batch by `vmap` and XLA."""
+    """Yield the textbook's equations on JAX arrays, compiled for a batch by `vmap` and XLA."""
     import jax
     import jax.numpy as jnp
 
-    jax.config.update("jax_enable_x64", True)  # float64, as in all contenders
+    jax.config.update("jax_enable_x64", True)  # All contenders compute in float64.
     array, plan = jnp.asarray, subject.plan
     eq = bound(
         plus=lambda x, y: array(x) + array(y),

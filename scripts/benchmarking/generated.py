@@ -1,10 +1,9 @@
-"""Generate C code for one robot, frame and quantity; its speed is an upper limit for a general kernel.
+"""Generate C code for one robot, frame and quantity; the code's speed is an upper limit for a general kernel.
 
 CasADi writes the textbook's equations with the robot's constants as straight-line C, without products with 0
 and 1. Each number is a SIMD vector of doubles: several configurations are computed together (`generated.c`).
-The time includes sine, cosine and the transposition of the arrays. The code does not check its inputs: a
-non-finite number, or an angle of a million turns, gives a wrong result. Sine and cosine lack urdfkin's
-correction of the last digit.
+The code does not check its inputs: a non-finite number, or an angle of a million turns, gives a wrong result.
+Sine and cosine lack urdfkin's correction of the last digit.
 """
 
 import ctypes
@@ -72,7 +71,7 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
     compute = compiled(subject, quantity)
     inputs = subject.inputs(quantity, subject.n)
     out = np.empty((subject.n, *subject.width(quantity)))
-    addresses = [x.ctypes.data for x in (*inputs, *inputs, *inputs)[:3]]  # a Jacobian does not need v and a
+    addresses = [x.ctypes.data for x in (*inputs, *inputs, *inputs)[:3]]  # A Jacobian does not need v and a.
 
     def run() -> None:
         compute(subject.n, *addresses, out.ctypes.data)
@@ -81,7 +80,7 @@ def batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def compiled(subject: Subject, quantity: str) -> Callable[..., None]:
-    """Return a function; its arguments are the batch size and the addresses of q, v, a and the results."""
+    """Return a function of the batch size and the addresses of q, v, a and the results."""
     plan, folder = subject.plan, subject.folder
     turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
     tables = {

@@ -101,8 +101,8 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
         out = np.ones((n, *subject.width(quantity))) if kind == "out" else None
         few = tuple(x[:64] for x in inputs)
         with only("compiled"):
-            method(*few, frame, verify=False, threads=2)  # loads compiled code and starts threads
-        Path("/proc/self/clear_refs").write_text("5")  # reset the recorded largest memory size
+            method(*few, frame, verify=False, threads=2)  # This call loads compiled code and starts threads.
+        Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM.
         before = _bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
         taken = _bytes("VmHWM") - before + (out.nbytes if out is not None else 0)
@@ -111,7 +111,6 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
 
 
 def _bytes(entry: str) -> int:
-    """Return an entry of /proc/self/status in bytes: VmRSS (memory in use) or VmHWM (its maximum)."""
     lines = Path("/proc/self/status").read_text("utf-8").splitlines()
     return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(entry))
 

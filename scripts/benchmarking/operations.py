@@ -23,12 +23,12 @@ _SINE_COSINE = 51
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A number that stores its operands."""
+    """A number that stores its operands; `known` is 0 or 1 for a constant."""
 
-    known: int | None = None  # 0 or 1 if the number is this constant; None otherwise
-    #: Whether the number is not needed. Operations with such a number are not counted.
+    known: int | None = None
+    #: Whether the number is not needed; operations with an unneeded number are not counted.
     nothing: bool = False
-    made_of: tuple[Number, ...] = ()  # the operands; empty for an input
+    made_of: tuple[Number, ...] = ()
 
     def __add__(self, other: Number) -> Number:
         if self.nothing or other.nothing:

@@ -23,10 +23,9 @@ Entry = Mapping[str, Any]
 
 
 def draw(figures: Mapping[str, Any], path: Path) -> bytes:
-    """Return a picture in the format of the suffix of `path`; sections without measurements are empty."""
     rows = figures["rows"]
     with style(font_size=11, svg_fonttype="none", hatch_linewidth=0.8):
-        figure = new_figure(11.0, 12.0)  # wide enough for the longest contender's name
+        figure = new_figure(11.0, 12.0)  # The longest contender's name fits into this width.
         grid = figure.add_gridspec(3, 2, height_ratios=[1.2, 1.2, 1.0])
         for row, quantity in enumerate(MARKS):
             bars = figure.add_subplot(grid[row, :])
@@ -39,20 +38,18 @@ def draw(figures: Mapping[str, Any], path: Path) -> bytes:
 
 
 def _light(svg: bytes) -> bytes:
-    """Remove comments, indentation and fallback fonts, which saves a third of the bytes."""
+    """Remove comments, indentation and fallback fonts."""
     text = re.sub(r"<!--.*?-->", "", svg.decode(), flags=re.DOTALL)
     text = re.sub(r"('DejaVu Sans'|DejaVu Sans)(, [^;\"]*)?", "sans-serif", text)
     return re.sub(r"\s*\n\s*", "\n", text).encode()
 
 
 def _chosen(rows: Sequence[Entry], section: str, quantity: str) -> list[Entry]:
-    """Return the rows of a quantity; except in the section `joints`, only rows of the first robot."""
     found = [row for row in rows if row["section"] == section and row["quantity"] == quantity]
     return [row for row in found if section == "joints" or row["robot"] == found[0]["robot"]]
 
 
 def _bars(axes: Any, rows: Sequence[Entry], quantity: str) -> None:
-    """Draw a bar for each contender, the fastest on top, on a logarithmic scale."""
     ordered = sorted(rows, key=lambda row: -float(row["median_ns"]))
     costs = [row["median_ns"] for row in ordered]
     names = [row["who"] for row in ordered]
@@ -93,6 +90,5 @@ def _growth(axes: Any, rows: Sequence[Entry], section: str, label: str, one: str
 
 
 def _plain_powers(axes: Any) -> None:
-    """Label powers of ten as 1,000, without minor ticks, which keeps the file small."""
     axes.xaxis.set_major_formatter(lambda x, _: f"{x:,.0f}" if x >= 1 else f"{x:g}")
     axes.minorticks_off()

@@ -70,7 +70,6 @@ def contest_rows(section: str, n: int, contenders: Sequence[Contender], rounds: 
 
 
 def operation_counts() -> Iterator[tuple[str, int]]:
-    """Yield "robot, quantity" and the number of operations of one configuration."""
     for subject, quantity, _ in _contests("operations", 1):
         yield f"{subject.name}, {quantity}", operations(subject.plan, quantity)
 
@@ -94,10 +93,7 @@ def _table(section: str, subject: Subject, quantity: str, size: int = 0) -> Row:
 
 
 def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row]:
-    """Measure how the time for the tip grows with the number of joints of a chain.
-
-    The batches are so large that the Jacobians of a batch contain about `numbers` numbers.
-    """
+    """Measure chains of joints; the Jacobians of a batch contain about `numbers` elements."""
     for size in joints:
         n = max(numbers // (6 * size), 16)
         with Subject(chain_urdf(size), TIP, n, name=f"chain of {size}") as subject:
@@ -105,7 +101,6 @@ def joint_rows(joints: Sequence[int], numbers: int, rounds: int) -> Iterator[Row
 
 
 def size_rows(sizes: Sequence[int], rounds: int) -> Iterator[Row]:
-    """Measure how the time grows with the size of a batch, for the first subject, one thread and `out=`."""
     for size in sizes:
         with Subject(*SUBJECTS[0], size) as subject:
             yield from _growth("sizes", subject, size, rounds)
@@ -122,7 +117,6 @@ def _growth(section: str, subject: Subject, size: int, rounds: int) -> Iterator[
 
 
 def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
-    """Measure how the time of placements grows with the number of frames, in one pass and in single calls."""
     with Subject(*SUBJECTS[-1], n) as subject:
         robot, q, links = subject.robot, subject.q, subject.robot.link_names
         for count in sorted({min(count, len(links)) for count in counts}):
@@ -155,7 +149,7 @@ PARTS: Mapping[str, frozenset[Op]] = {
 
 
 def parts_of_batches(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time of each step of a batch, in ns for one configuration, with one thread."""
+    """Yield the time of each step of a batch, in ns for one configuration."""
     for subject, quantity, _ in _contests("where", n):
         program = program_of(subject.plan, turned=False, columns=quantity == "jacobian")
         works = [_core(subject, quantity, cut(program, end), part) for end, part in enumerate(PARTS, start=1)]
@@ -174,7 +168,7 @@ def cut(program: KernelProgram, parts: int) -> KernelProgram:
     words = program.words.copy()
     code = words[words[Head.CODE] :].reshape(-1, WIDTH)
     chosen = [line for line in code if Op(line[0]) in ops]
-    end = np.zeros((1, WIDTH), dtype=np.int64)  # an instruction with the operation Op.END
+    end = np.zeros((1, WIDTH), dtype=np.int64)
     words = np.concatenate([words[: words[Head.CODE]], *chosen, *end])
     if parts < 2:
         words[Head.ANGLES_END] = words[Head.ANGLES]
@@ -182,13 +176,12 @@ def cut(program: KernelProgram, parts: int) -> KernelProgram:
 
 
 def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> Work:
-    """Return the timed task in which a kernel computes a whole batch."""
     inputs = [STILL_STATE, *subject.inputs(quantity, subject.n)]
     out = np.empty((subject.n, *subject.width(quantity)))
     staged = who == "writing results" and is_staged(out)
     task, memory = task_of(program, Reference.LOCAL_WORLD_ALIGNED, inputs, out, staged=staged)
     core = getattr(kernels, f"{quantity}s")
-    owners = program, memory, out, inputs  # the kernel arguments contain the addresses of these arrays
+    owners = program, memory, out, inputs  # The kernel arguments contain the addresses of these arrays.
 
     def compute(_: object = owners) -> None:
         core(task.ctypes.data)
@@ -198,7 +191,7 @@ def _core(subject: Subject, quantity: str, program: KernelProgram, who: str) -> 
 
 
 def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
-    """Yield the time (ns) of each step of a call, by a prepared evaluator and by the robot's method."""
+    """Yield the time (ns) of each step of a call for one configuration."""
     for subject, quantity, _ in _contests("where", n):
         calls = list(_calls(subject, quantity))
         works = [call.single(subject, quantity) for call in calls]
@@ -217,8 +210,6 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
 
 
 class _Empty:
-    """Empty methods with the signatures of a prepared evaluator's methods."""
-
     def jacobian(self, q: object, out: object = None) -> object:
         return out
 
@@ -240,9 +231,9 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
         "out": np.empty(subject.width(quantity)),
     }
     for line in (
-        "q",  # a line without a call measures the cost of the loop
+        "q",  # A line without a call measures the time of the loop.
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # the code still fails at the check of the arrays, which rejects a tuple
+        f"compute({q_v_a}, shape)",  # The check of the arrays rejects a tuple.
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",
@@ -254,7 +245,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 def _entry(
     kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Return the medians over all rounds. Each part is a difference of times from the same round."""
+    """Return the medians over all rounds; each part is a difference of times from one round."""
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}

@@ -15,9 +15,9 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 
 QUANTITIES = ("jacobian", "acceleration")
-#: The third robot is a humanoid: most of its joints do not move the chosen frame.
+#: Most joints of the humanoid talos do not move the chosen frame.
 SUBJECTS = (("panda", "panda_hand"), ("ur5", "tool0"), ("talos", "gripper_left_base_link"))
-#: Number of configurations in a loop of calls; the time for a single call does not depend on this number.
+#: Number of configurations in a loop of calls.
 LOOP = 2_000
 TIP = "tip"
 
@@ -25,8 +25,7 @@ TIP = "tip"
 class Subject:
     """The common input of all contenders: one robot and frame, q (n, nq), v and a (n, nv).
 
-    Mimic joints are independent, so that every library has the same coordinates, each with one number.
-    `loop` is the number of configurations in a loop of calls. `stack` closes resources of the contenders.
+    Mimic joints are independent, so that every library has the same coordinates.
     """
 
     def __init__(self, source: str, frame: str, n: int, *, name: str | None = None) -> None:
@@ -51,7 +50,6 @@ class Subject:
 
     @cached_property
     def urdf(self) -> str:
-        """The URDF without meshes, inertias and mimic rules."""
         return bare_urdf(self.robot.urdf)
 
     @cached_property
@@ -60,20 +58,17 @@ class Subject:
 
     @cached_property
     def file(self) -> Path:
-        """`urdf` as a file, for libraries that only read files."""
         file = self.folder / "robot.urdf"
         file.write_text(self.urdf, "utf-8")
         return file
 
     def width(self, quantity: str) -> tuple[int, ...]:
-        """Return the shape of one configuration's result."""
         return (6, self.nv) if quantity == "jacobian" else (6,)
 
     def numbers(self, quantity: str) -> int:
         return int(np.prod(self.width(quantity)))
 
     def inputs(self, quantity: str, n: int) -> tuple[FloatArray, ...]:
-        """Return the first `n` rows of the inputs of the quantity: q, or q, v and a."""
         return tuple(x[:n] for x in ((self.q,) if quantity == "jacobian" else (self.q, self.v, self.a)))
 
 
@@ -84,8 +79,7 @@ _KEPT = ("origin", "parent", "child", "axis", "limit")
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """Return a URDF with only the links and joints, without mimic rules, and with equal inertias.
 
-    Some libraries need inertias. Some libraries add a body `world`, so a link with this name is renamed.
-    `flags` are the attributes of MuJoCo's element `mujoco/compiler`.
+    Some libraries add a body `world`, so a link with this name is renamed.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))
@@ -105,7 +99,7 @@ def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
 
 
 def chain_urdf(joints: int, seed: int = 0) -> str:
-    """Return a chain of revolute joints, named in their order, with oblique axes and links of 0.1 m."""
+    """Return a chain of revolute joints with oblique axes and links of 0.1 m."""
     generator = np.random.default_rng(seed)
     axes = generator.standard_normal((joints, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)

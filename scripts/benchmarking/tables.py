@@ -52,7 +52,7 @@ _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
 
 @dataclass(frozen=True)
 class Words:
-    """A table as text: its rows map headings to cells, and its first column has names."""
+    """A table as text; each entry of `cells` maps the headings to the cells of a row."""
 
     section: str
     title: str
@@ -69,7 +69,6 @@ class Words:
 
     @property
     def text(self) -> str:
-        """The table in Markdown."""
         remarks = "".join(f"\n[{i}] {remark}." for i, remark in enumerate(self.remarks, start=1))
         cells = markdown(self.head, self.rows, left=1) + (f"\n{remarks}" if remarks else "")
         return f"**{self.title}**\n\n{cells}"
@@ -138,7 +137,6 @@ def machine_of(figures: Mapping[str, Any]) -> str:
 
 
 def _groups(rows: list[Entry]) -> Iterator[tuple[str, list[Entry]]]:
-    """Yield "robot, quantity" and the rows of each robot and quantity."""
     for (robot, quantity), group in groupby(rows, key=lambda row: (row["robot"], row["quantity"])):
         yield f"{robot}, {quantity}", list(group)
 
@@ -164,7 +162,6 @@ def _contest(section: str, title: str, rows: list[Entry]) -> Words:
 
 
 def _generated(rows: Sequence[Entry]) -> float | None:
-    """Return the time of code generated for the robot, or None without a measurement."""
     return next((float(row["median_ns"]) for row in rows if row["who"] == GENERATED), None)
 
 
@@ -207,8 +204,6 @@ def _floor(title: str, group: list[Entry], operations: Mapping[str, int]) -> dic
 
 
 def _where(title: str, entries: Sequence[Entry]) -> Words:
-    """Return a column for each robot and quantity: nanoseconds, and their share of the total time."""
-
     def cell(entry: Entry, part: str) -> str:
         ns = entry["parts"].get(part)
         return "" if ns is None else f"{number(ns)} ({100 * ns / entry['ns']:.0f} %)"

@@ -23,31 +23,35 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Work:
-    who: str  # name of the contender in the tables
-    n: int  # number of configurations: `compute` uses the first `n` configurations of the subject
-    compute: Callable[[], object]  # the timed function
-    #: Returns the results in urdfkin's conventions, untimed. None: there is nothing to compare.
+    who: str
+    n: int
+    compute: Callable[[], object]
+    #: Function that returns the results in urdfkin's conventions; None if there is nothing to compare.
     result: Callable[[], FloatArray] | None = None
-    tolerance: float = TOLERANCE  # allowed difference from Pinocchio
-    remark: str = ""  # a remark on the measurement
+    tolerance: float = TOLERANCE
+    remark: str = ""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table: the properties of the table, and the measurements of one contender."""
+    """A row of a table: the measurements of one contender.
 
-    section: str  # a name of `benchmark.SECTIONS`
-    robot: str  # a name of the catalogue, or the number of joints of a chain
-    quantity: str  # jacobian, acceleration or placement
-    numbers: int  # number of float64 values of one configuration's result
-    size: int = 0  # number of joints, frames or configurations, whichever the table varies
-    who: str = ""  # name of the contender
-    n: int = 0  # number of configurations of a call
-    median_ns: float = 0.0  # median time for one configuration over the rounds
-    minimum_ns: float = 0.0  # minimum time for one configuration
-    #: Median of the baseline divided by this median; above 1 is faster than the baseline.
+    `numbers` is the number of values in the result for one configuration, and `n` is the number of
+    configurations of a call. The table varies `size`, a number of joints, frames or configurations.
+    """
+
+    section: str
+    robot: str
+    quantity: str
+    numbers: int
+    size: int = 0
+    who: str = ""
+    n: int = 0
+    median_ns: float = 0.0
+    minimum_ns: float = 0.0
+    #: Median time of the baseline, divided by the median time of the contender.
     ratio: float | None = None
-    remark: str = ""  # a remark on the measurement
+    remark: str = ""
 
 
 class DifferenceError(Exception):
@@ -55,7 +59,7 @@ class DifferenceError(Exception):
 
 
 def agree(works: Sequence[Work], reference: Work, what: str) -> None:
-    """Compute all results once, also as a warm-up; raise DifferenceError if one differs from `reference`."""
+    """Compute all results once; raise DifferenceError if one differs from `reference`."""
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -77,7 +81,7 @@ def agree(works: Sequence[Work], reference: Work, what: str) -> None:
 def times(
     works: Sequence[Work], rounds: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, FloatArray]:
-    """Return the nanoseconds for one configuration; each task runs once in each round, in varying order."""
+    """Return the times (ns) for one configuration, one for each round."""
     found: dict[str, list[float]] = {work.who: [] for work in works}
     shuffled, order = list(works), random.Random(0)
     gc.disable()
@@ -122,26 +126,25 @@ def measure(
 class Calls:
     """The lines of Python that call a library for one configuration.
 
-    They become the body of a loop, so the measured time includes no call of the benchmark itself.
+    The lines become the body of a loop, so the measured time includes no call of the benchmark itself.
     """
 
-    who: str  # name of the contender
-    names: Mapping[str, Any]  # variables that the lines use, besides `q`, `v` and `a`
-    lines: tuple[str, ...]  # the calls; the last line is an expression whose value is the result
-    #: The lines for a batch, which write into `out[k]`. None: a batch stores the value of the last line.
+    who: str
+    names: Mapping[str, Any]  # The lines use these variables, and `q`, `v` and `a`.
+    lines: tuple[str, ...]  # The value of the last line is the result.
+    #: Lines that write the result of configuration k into `out[k]`; by default, the last line's value.
     store: tuple[str, ...] | None = None
-    #: For each coordinate of the library, its index in urdfkin. None: the order is the same.
+    #: Index in urdfkin of each coordinate of the library; None if the orders are equal.
     order: list[int] | None = None
-    #: Shape of one configuration's result in a batch; None: urdfkin's shape.
+    #: Shape of one configuration's result in a batch; None means urdfkin's shape.
     shape: tuple[int, ...] | None = None
     #: Converts a batch's raw results to urdfkin's conventions.
     read: Callable[[FloatArray], FloatArray] = field(default=lambda raw: raw)
     #: Converts the value of the last line to an array with the layout of one row of a batch.
     read_one: Callable[[Any], FloatArray] = field(default=np.array)
-    remark: str = ""  # see `Work`
+    remark: str = ""
 
     def batch(self, subject: Subject, quantity: str) -> Work:
-        """Return the timed task for a batch: a loop over all configurations that fills a reused array."""
         inputs = [self._ordered(x) for x in subject.inputs(quantity, subject.loop)]
         out = np.empty((subject.loop, *(self.shape or subject.width(quantity))))
         loop = self.loop()
@@ -149,12 +152,12 @@ class Calls:
         return Work(self.who, subject.loop, run, result, remark=self.remark)
 
     def loop(self) -> Callable[..., None]:
-        """Return a function that loops over a batch; its arguments are `out`, and q or q, v and a."""
+        """Return a function that loops over a batch; it writes the results to `out`."""
         body = self.store or (*self.lines[:-1], f"out[k] = {self.lines[-1]}")
         return _function(self.names, "out, *inputs", "for k, (q, v, a) in enumerate(rows(inputs)):", body)
 
     def single(self, subject: Subject, quantity: str) -> Work:
-        """Return the timed task for single calls, whose results are not stored."""
+        """Return the timed task for single calls; their results are not stored."""
         inputs = [list(self._ordered(x)) for x in subject.inputs(quantity, subject.loop)]
         rows = list(_rows(inputs))
         repeat = _function(self.names, "rows_", "for q, v, a in rows_:", self.lines)
@@ -171,7 +174,7 @@ class Calls:
 
 
 def _rows(inputs: Any) -> Any:
-    """Yield (q, v, a) for each configuration. If q is the only input, yield (q, q, q) instead."""
+    """Yield (q, v, a) for each configuration, or (q, q, q) if q is the only input."""
     return zip(*(inputs if len(inputs) == 3 else [inputs[0]] * 3), strict=True)
 
 

@@ -25,7 +25,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a test and its details. The outcome is one of `GOOD`, or the name of a failure."""
+    """The outcome of a test, which is one of `GOOD` or the name of a failure, and details."""
 
     word: str
     details: str = ""

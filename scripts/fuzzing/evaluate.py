@@ -38,7 +38,7 @@ QUANTITIES = {"placement": 1, "velocity": 2, "jacobian": 1, "hessian": 1, "accel
 
 
 class MismatchError(Exception):
-    """Error if two computations of the same number return different results."""
+    """Two computations of one number return different results."""
 
 
 def evaluate(case: Case) -> Outcome:
@@ -154,7 +154,6 @@ def _inputs(robot: Robot, seed: int) -> tuple[FloatArray, FloatArray, FloatArray
 
 
 def _base(generator: np.random.Generator, size: float) -> BaseMotion:
-    """Return a rotated, moving base at a distance of `size` metres."""
     R = np.linalg.qr(generator.normal(size=(3, 3)))[0]
     T = np.eye(4)
     T[:3, :3] = R * np.linalg.det(R)
@@ -205,17 +204,17 @@ def _together(
 
 
 def _names(robot: Robot, q: FloatArray, generator: np.random.Generator) -> Iterator[tuple[str, FloatArray]]:
-    """Yield placements of frames by name. urdfkin and Pinocchio find each name independently."""
+    """Yield placements of frames by name; urdfkin and Pinocchio look up each name independently."""
     links, joints = set(robot.link_names), {joint.name for joint in robot.tree.joints}
     own = sorted(links | joints)
     asked = [f"{prefix}{name}" for name in own for prefix in ("", "link:", "joint:")]
     for i in generator.permutation(len(asked))[:NAMES]:
         try:
             yield f"placement of {asked[i]!r}", robot.placement(q, asked[i])
-        except UnknownNameError:  # for example `joint:x`, if x is only a link
+        except UnknownNameError:  # For example, `joint:x` is unknown if x is only a link.
             if asked[i] in own:
                 raise
-        except InputError:  # two frames have this name
+        except InputError:  # Two frames have this name.
             if asked[i] not in links & joints:
                 raise
 

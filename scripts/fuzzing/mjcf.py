@@ -53,7 +53,6 @@ class _File:
         )
 
     def defaults(self) -> str:
-        """Return nested default classes for joints and sites."""
         if self.family != "mjcf-classes":
             return ""
         sites = [f'<site pos="{self.vector()}"/>' * (self.rng.random() < 0.5) for _ in _CLASSES]
@@ -73,7 +72,7 @@ class _File:
             parts = [f'<{kind} name="free{self.bodies}" {align}/>']
         else:
             parts = [self.joint() for _ in range(rng.choice((0, 1, 1, 2)))]
-        for _ in range(rng.randint(1, 2)):  # rotated boxes give the body oblique axes of inertia
+        for _ in range(rng.randint(1, 2)):  # Rotated boxes give the body oblique axes of inertia.
             sizes = " ".join(repr(rng.uniform(0.05, 0.5)) for _ in range(3))
             parts.append(f'<geom type="box" size="{sizes}" pos="{self.vector()}" {self.orientation()}/>')
         if rng.random() < 0.2:
@@ -125,7 +124,6 @@ class _File:
         return " ".join(repr(tame_length(self.rng)) for _ in range(3))
 
     def equalities(self) -> str:
-        """Return constraints between joints, such as chains, cycles, duplicates and nonlinear constraints."""
         rng, made = self.rng, []
         count = rng.randint(1, 5) if self.family == "mjcf-equalities" else rng.randint(0, 1)
         for i in range(count if len(self.joints) > 1 else 0):
@@ -144,7 +142,6 @@ class _File:
 
 
 def compiled(data: bytes) -> mujoco.MjModel | None:
-    """Return MuJoCo's model of the file; None if MuJoCo rejects it."""
     try:
         return mujoco.MjModel.from_xml_string(data.decode())
     except ValueError:

@@ -91,7 +91,7 @@ def _of_tokens(rng: random.Random, how: str, data: bytes) -> bytes:
     first, second = (pattern.search(data, at) or pattern.search(data) for at in starts)
     if first is None or second is None:
         return data
-    group = pattern.groups  # group 2 is an attribute's value, group 0 the whole match
+    group = pattern.groups  # Group 2 is an attribute's value, and group 0 is the whole match.
     if how == "swap_values":
         if first.start() == second.start():
             return data

@@ -52,7 +52,7 @@ _TURNS = (0.0, math.pi, -math.pi, math.pi / 2, 1.5708, 3.14159, 1e-9)
 
 
 def written(rng: random.Random, x: float) -> str:
-    """Return a number, or a number very close to it, as text in a random notation."""
+    """Return a number, sometimes slightly changed, as text in a random notation."""
     plain = repr(x)
     if rng.random() < 0.85:
         return plain
@@ -64,7 +64,6 @@ def vector(rng: random.Random, numbers: list[float]) -> str:
 
 
 def tame_length(rng: random.Random) -> float:
-    """Return a length of some decimetres, often 0."""
     return rng.choice((0.0, 0.0, round(rng.uniform(-1.0, 1.0), 3), rng.uniform(-1.0, 1.0)))
 
 
@@ -76,7 +75,6 @@ def odd_length(rng: random.Random) -> float:
 
 
 def tame_angle(rng: random.Random) -> float:
-    """Return an angle within a turn, often a multiple of a quarter turn."""
     return rng.choice((*_TURNS[:4], rng.uniform(-math.pi, math.pi)))
 
 
@@ -88,7 +86,6 @@ def odd_angle(rng: random.Random) -> float:
 
 
 def direction(rng: random.Random) -> list[float]:
-    """Return a random unit vector, in half of the cases a coordinate axis."""
     if rng.random() < 0.5:
         axis = [0.0, 0.0, 0.0]
         axis[rng.randrange(3)] = rng.choice((1.0, -1.0))
@@ -108,7 +105,6 @@ def odd_axis(rng: random.Random) -> list[float]:
 
 
 def odd_quaternion(rng: random.Random) -> list[float]:
-    """Return a quaternion of any norm, possibly zero, whose rotation may be the identity, tiny or random."""
     numbers = rng.choice(
         (
             [0.0, 0.0, 0.0, 1.0],
@@ -123,7 +119,7 @@ def odd_quaternion(rng: random.Random) -> list[float]:
 
 
 def odd_size(rng: random.Random) -> float:
-    """Return a norm for an axis or quaternion: mostly about 1, sometimes extremely small or large."""
+    """Return a norm that is mostly about 1, and sometimes extremely small or large."""
     exponent = rng.choice((0.0, 0.0, rng.uniform(-1e-9, 1e-9), rng.uniform(-6, 6), rng.uniform(-170, 170)))
     return math.pow(10.0, rng.uniform(-320, 300) if rng.random() < 0.05 else exponent)
 
@@ -134,7 +130,7 @@ def odd_factor(rng: random.Random) -> float:
 
 
 def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
-    """Return random limits of a joint: equal, adjacent, far apart, infinite or, rarely, reversed."""
+    """Return random limits of a joint: equal, adjacent, far apart or, rarely, reversed."""
     a = odd_angle(rng) if turns else odd_length(rng)
     b = odd_angle(rng) if turns else odd_length(rng)
     if rng.random() < 0.02:
@@ -146,7 +142,6 @@ def odd_range(rng: random.Random, turns: bool) -> tuple[float, float]:
 
 
 def odd_limit(rng: random.Random) -> str:
-    """Return a random text for a limit of effort or jerk; some of these texts are invalid."""
     refused = ("-1.0", "-5e-324", "inf", "nan", "", "1e400", "0x10", "1.0 ")
     fine = ("0", "-0.0", "1e300", "5e-324", "1e-400")
     return rng.choice(refused) if rng.random() < 0.03 else rng.choice((*fine, written(rng, rng.random())))
@@ -205,7 +200,7 @@ class _Robot:
         return list(names)
 
     def joint(self, i: int) -> str:
-        """Return joint i, the parent of link i + 1."""
+        """Return joint i, whose child is link i + 1."""
         rng, kind = self.rng, self.kinds[i]
         # Most random robots are chains, because a chain accumulates the largest rounding errors.
         parent = i if rng.random() < 0.7 else rng.randint(0, i)

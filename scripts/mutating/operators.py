@@ -26,12 +26,12 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Change:
-    """One mutant: a new value in a list or in a field of a node."""
+    """One mutant: a new value in `home`, at a list index or in a field of a node."""
 
-    shown: ast.AST  # the node whose text is printed
-    home: Any  # the list or the node
-    place: int | str  # the index or the field
-    value: Any  # the new value
+    shown: ast.AST  # The text of this node is printed.
+    home: Any
+    place: int | str
+    value: Any
 
     @property
     def line(self) -> int:
@@ -54,7 +54,6 @@ class Change:
             self.put(old)
 
     def put(self, value: Any) -> Any:
-        """Set a value and return the previous one."""
         if isinstance(self.place, int):
             old, self.home[self.place] = self.home[self.place], value
         else:
@@ -87,7 +86,7 @@ def function_at(tree: ast.Module, line: int) -> str:
 
 
 def rewritten(source: str, before: str, after: str) -> ast.Module:
-    """Return a file's tree with one text replaced; raise ValueError if it does not occur exactly once."""
+    """Return a file's tree with one text replaced; raise ValueError unless the text occurs once."""
     if source.count(before) != 1:
         raise ValueError(f"found {source.count(before)} times: {before}")
     return ast.parse(source.replace(before, after))

@@ -1,10 +1,9 @@
 """The acceleration of a frame as a sum of contributions, one for each joint and each kind of acceleration.
 
-Sections 7.6 and 7.7. Consider joint k, and assume that all later joints are fixed. Then the frame's origin
-moves relative to link k-1. Its velocity u_k is v_k z x d for a revolute joint k, and v_k z for a prismatic
-joint k. Link k-1 itself rotates with the angular velocity w_{k-1}. The origin is thus a moving point in a
-moving frame, and equation 7.125 gives the terms of its acceleration. Equation 7.130 is the sum of these terms
-over all joints, from the last joint to the first:
+Consider joint k, and assume that all later joints are fixed. The frame's origin then moves relative to link
+k-1 with the velocity u_k, which is v_k z x d for a revolute joint k and v_k z for a prismatic joint k. Link
+k-1 itself rotates with the angular velocity w_{k-1}. Equation 7.125 gives the acceleration of a moving point
+in a moving frame. Equation 7.130 is the sum of its terms over all joints:
 
 | kind | term | cause |
 |---|---|---|
@@ -14,14 +13,11 @@ over all joints, from the last joint to the first:
 | sliding | a_k z | acceleration of a prismatic joint |
 
 The vector d from the joint's origin to the frame's origin is the sum of the interorigin vectors after the
-joint (equation 7.110). A difference of two positions in the world would lose digits if the robot is far from
-the world's origin or has a long link.
+joint (7.110). A difference of two positions in the world would lose digits far from the world's origin.
 
-The angular acceleration follows from equation 7.129. Its term a_k z is added to the transverse acceleration.
-Its term v_k w_{k-1} x z is added to the Coriolis acceleration. A planar or floating joint translates and
-rotates at the same time, and its axes of translation rotate with it. The joint's linear velocity is s, and
-its angular velocity is o. The acceleration of a planar or floating joint has one more term, the cross product
-o x s. This term is added to the Coriolis acceleration.
+The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
+planar or floating joint with the linear velocity s and the angular velocity o has one more Coriolis term,
+o x s, because the joint's axes of translation rotate.
 """
 
 from __future__ import annotations
@@ -45,20 +41,15 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: The kinds of contribution, in the order of the array `terms`.
 KINDS = ("transverse", "centripetal", "coriolis", "sliding")
-#: Maximum number of displayed samples of a batch.
 _MOST_SHOWN = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccelerationBreakdown(Displayable):
-    """Contributions of the joints to a frame's acceleration.
+    """Contributions of the joints to a frame's acceleration; six-vectors are [linear; angular].
 
-    Attributes:
-        joints: Names of the moving joints from the base to the frame.
-        base: (..., 6) acceleration that the frame would have if all joints were fixed and only the base
-            moved.
-        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of `KINDS`,
-            and the six numbers are [linear; angular].
+    `base` (..., 6) is the acceleration that the frame would have if only the base moved. `terms` (...,
+    joints, 4, 6) are the contributions of the joints, with the kinds in the order of `KINDS`.
     """
 
     joints: tuple[str, ...]
@@ -109,7 +100,7 @@ class AccelerationBreakdown(Displayable):
 
 
 class _Moves(NamedTuple):
-    """The velocity or acceleration (n, 3) of a joint relative to its parent link, in world axes."""
+    """Linear and angular velocity or acceleration (n, 3) of a joint, in world axes."""
 
     slide: FloatArray
     turn: FloatArray
@@ -127,17 +118,14 @@ def acceleration_breakdown(
     out: FloatArray | None = None,
     threads: int | None = None,
 ) -> AccelerationBreakdown:
-    """Return the contributions to the classical acceleration of a link's frame, for n configurations.
+    """Split the classical acceleration of a link's frame into contributions, for n configurations.
 
-    `base` is the state of the base (1 or n, 24), see `BaseMotion.state`; `out` (n, joints, 4, 6) is an array
-    for the terms; `threads` is the largest number of threads, None for `evaluate.default_threads`. A number
-    of q, v or a that is not finite raises NotFiniteError. A contribution beyond the range of double precision
-    raises RangeError.
+    `base` (1 or n, 24) is the state of the base, see `BaseMotion.state`; `out` is (n, joints, 4, 6).
     """
-    if not np.isfinite(a).all():  # `placements` and `velocities` check q and v later.
+    if not np.isfinite(a).all():  # `placements` and `velocities` check q and v.
         raise NotFiniteError("q, v and a must be finite")
     moving = moving_joints(tree, link)
-    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # frames: all links on the path
+    plan = compile_tree(tree, [0, *(i + 1 for i in tree.path(link))])  # The frames are all links on the path.
     n = len(q)
     terms = np.empty((n, len(moving), len(KINDS), 6)) if out is None else out
     of_base = np.empty((n, 6))
@@ -159,7 +147,6 @@ def acceleration_breakdown(
 
 
 def moving_joints(tree: KinematicTree, link: int) -> list[int]:
-    """Return the moving joints on the path from the base to the link."""
     return [i for i in tree.path(link) if tree.joints[i].kind.nv]
 
 
@@ -198,7 +185,7 @@ def _contributions(
 
 
 def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatArray) -> FloatArray:
-    """Return the vectors (n, links, 3) from the origin of each link to the end of the path, in world axes."""
+    """Return the vectors (n, links, 3) from each link's origin to the path's end, in world axes."""
     levers = np.zeros(Rs.shape[:-1])
     for k in reversed(range(len(path))):
         joint, at = tree.joints[path[k]], tree.q_index[path[k]]
@@ -208,7 +195,7 @@ def _levers(tree: KinematicTree, path: Sequence[int], q: FloatArray, Rs: FloatAr
 
 
 def _slide(joint: Joint, q: FloatArray) -> FloatArray:
-    """Return a joint's translation (n, 3) in the joint's axes, from the joint's coordinates q."""
+    """Return a joint's translation (n, 3) in the joint's axes."""
     slide = np.zeros((len(q), 3))
     match joint.kind:
         case JointKind.PLANAR:
@@ -226,7 +213,7 @@ def _slide(joint: Joint, q: FloatArray) -> FloatArray:
 
 
 def _terms(rate: _Moves, rate_2: _Moves, w_before: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the contributions (n, 4, 6) of one joint: four kinds, each [linear; angular]."""
+    """Return the contributions (n, 4, 6) of one joint, in the order of `KINDS`."""
     nothing = np.zeros_like(d)
     u = eq.point_velocity(rate.slide, rate.turn, d)
     kinds = (
@@ -253,7 +240,7 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 
 
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration (7.123) of a point fixed to the base; d leads from the base's origin to it."""
+    """Return the acceleration (7.123) of the base's point at `d` from the base's origin."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

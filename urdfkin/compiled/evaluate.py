@@ -1,9 +1,7 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs have the shapes (n, nq) and (n, nv); `urdfkin.robot` has checked and reshaped them. A few
-configurations are computed with Python numbers, and more configurations by a compiled kernel (`preload`) in
-several threads. The results are exactly the same doubles for each kind of computation and any number of
-threads.
+Inputs have the shapes (n, nq) and (n, nv). A few configurations are computed with Python numbers, and more
+configurations by a compiled kernel (`preload`). Both methods give exactly the same doubles.
 """
 
 from __future__ import annotations
@@ -52,12 +50,8 @@ _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, Ker
 class EvaluateOptions(TypedDict, total=False):
     """Keyword arguments of every function of this module.
 
-    Attributes:
-        base: (n, 24) or (1, 24) state of the base (`BaseMotion.state`).
-        out: C-contiguous float64 array of the result's size, to which the result is written.
-        threads: Largest number of threads; None uses all processors for large batches.
-        read: True if the caller reads the results immediately; the results then stay in the processor's
-            caches.
+    `base` is the state of the base, (n, 24) or (1, 24). `out` is a C-contiguous array for the result. `read`
+    is true if the caller reads the results immediately, so that the results stay in the caches.
     """
 
     base: FloatArray
@@ -67,7 +61,7 @@ class EvaluateOptions(TypedDict, total=False):
 
 
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[EvaluateOptions]) -> FloatArray:
-    """Return T_world_frame (n, frames, 4, 4): the positions by equation 7.77, and the rotations."""
+    """Return T_world_frame (n, frames, 4, 4) by equation 7.77."""
     program = program_of(plan, turned=True)
     return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **how)
 
@@ -124,7 +118,7 @@ def hessians(
 ) -> FloatArray:
     """Return Hessians (n, frames, 6, nv, nv).
 
-    [..., i, j] is the derivative of column i in the direction of the joint velocity j.
+    Entry [..., i, j] is the derivative of Jacobian column i in the direction of the joint velocity j.
     """
     program = program_of(plan, turned=reference.own_axes, columns=True, pairs=True)
     return _compute("hessians", plan, program, [q], reference, (6, plan.nv, plan.nv), **how)
@@ -139,11 +133,7 @@ def imus(
     gravity: FloatArray,
     **how: Unpack[EvaluateOptions],
 ) -> FloatArray:
-    """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes.
-
-    An accelerometer cannot distinguish gravity from an acceleration of the base in the opposite direction.
-    The function therefore accelerates the base by -gravity.
-    """
+    """Return [proper acceleration; angular velocity] (n, frames, 6) in each frame's own axes."""
     how["base"] = against_gravity(how.get("base", STILL_STATE), gravity)
     program = program_of(plan, turned=True)
     return _compute("imus", plan, program, [q, v, a], Reference.LOCAL, (6,), **how)
@@ -162,10 +152,7 @@ def _compute(
     threads: int | None = None,
     read: bool = False,
 ) -> FloatArray:
-    """Return a result (n, frames, *shape) that is computed from q, or q and v, or q, v and a.
-
-    An input that is not finite raises NotFiniteError; a result that is not finite raises RangeError.
-    """
+    """Return a result (n, frames, *shape) that is computed from q, or q and v, or q, v and a."""
     shape = len(inputs[0]), len(plan.frames), *shape
     out = np.empty(shape) if out is None else out.reshape(shape)
     # In an array with the stride 0, all rows are the same row of memory.
@@ -187,8 +174,7 @@ def _interpreted(
 ) -> int | None:
     """Compute a batch with Python numbers; stop and return None if a kernel is faster.
 
-    If the computation finishes, return 1 if an input is nan, infinite or too large, and 0 otherwise. The
-    measured processor time of each configuration decides whether a kernel is faster.
+    Otherwise, return 1 if an input is nan, infinite or too large, else 0.
     """
     if preload.kernel(name) is not None:
         return None
@@ -202,7 +188,7 @@ def _interpreted(
         row[:] = result
         least = min(least, took := time.thread_time() - begin)
         preload.spend(name, took)
-        # The first configuration takes longer than later ones, so its time alone decides nothing.
+        # The first configuration takes longer than later configurations, so its time is not representative.
         if i and (left := len(flat) - 1 - i) and preload.kernel(name, left * least) is not None:
             return None
     return odd
@@ -211,7 +197,6 @@ def _interpreted(
 def _lists(
     program: KernelProgram, reference: Reference, inputs: Sequence[FloatArray], i: int, result: list[float]
 ) -> list[Any]:
-    """Return the arguments with which Python runs a recursion for configuration `i`."""
     task: list[Any] = [0] * len(KernelArgs)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.lists
     task[KernelArgs.SCRATCH], task[KernelArgs.OUT] = [None] * program.rows, result
@@ -234,7 +219,6 @@ def _compiled(
     *,
     staged: bool,
 ) -> int:
-    """Compute with a compiled kernel; return whether an input is nan, infinite or too large."""
     core = preload.kernel(name)
 
     def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
@@ -247,11 +231,7 @@ def _compiled(
 
 
 def is_staged(out: FloatArray) -> bool:
-    """Return whether results are collected in a buffer and then written to memory in whole cache lines.
-
-    A processor that writes a part of a cache line reads the whole line first. Reading is slow if the output
-    is larger than the cache.
-    """
+    """Return whether results are collected in a buffer and then written in whole cache lines."""
     return out.nbytes >= _STREAMED and LANES * out[0].size <= _MOST_STAGED
 
 
@@ -263,12 +243,7 @@ def task_of(
     *,
     staged: bool,
 ) -> tuple[NDArray[np.int64], object]:
-    """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished.
-
-    `inputs` are the base's state, q and, if needed, v and a; each has either one row for all configurations,
-    or one row for each configuration. If `staged`, the kernel writes results to a buffer first (see
-    `is_staged`).
-    """
+    """Return a kernel's arguments, and the arrays that must stay alive until the kernel has finished."""
     width, memory, task = out[0].size, scratch(program), np.zeros(len(KernelArgs), dtype=np.int64)
     stage = lines(LANES * width if staged else 0)
     task[KernelArgs.PROGRAM], task[KernelArgs.CONSTANTS] = program.addresses
@@ -311,22 +286,20 @@ Compute = Callable[[Sequence[FloatArray], FloatArray], int]
 
 
 def default_threads(n: int) -> int:
-    """Return 1 for a small batch, else the number of processors that this process may use."""
     return _processors() if n >= _WORTH_THREADS else 1
 
 
 def _processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1  # macOS
+    return os.cpu_count() or 1  # macOS has no `sched_getaffinity`.
 
 
 def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, threads: int | None) -> int:
-    """Compute `out` (n, ...) with several threads; each array of `inputs` is (n, ...) or (1, ...).
+    """Compute `out` (n, ...) in several threads; each array of `inputs` is (n, ...) or (1, ...).
 
-    The result is 1 if an input is nan, infinite or too large, else 0. All arrays are C-contiguous. `compute`
-    must release Python's global interpreter lock. `threads` is the largest number of threads; None means the
-    number from `default_threads`. Any other value that is not an integer of at least 1 raises InputError.
+    All arrays are C-contiguous, and `compute` must release Python's global interpreter lock. The result is 1
+    if an input is nan, infinite or too large, else 0.
     """
     n = len(out)
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
@@ -344,11 +317,7 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
-    """Compute `n` rows with NumPy in parts, so that the memory for intermediate results does not grow with n.
-
-    `compute` computes the rows of a slice. For an empty batch, `compute` is called once, with an empty slice.
-    `threads` has the same meaning as in `in_blocks`.
-    """
+    """Compute `n` rows in parts, so that the memory for intermediate results does not grow with n."""
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
     count = min(threads, len(parts), _processors())
@@ -368,7 +337,6 @@ def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> N
 
 
 def _parts(n: int, threads: int) -> list[slice]:
-    """Split `n` rows into at most `threads` parts of whole blocks; each part has at least one block."""
     blocks = n // LANES
     edges = [*(LANES * (blocks * i // threads) for i in range(threads)), n]
     return [slice(a, b) for a, b in pairwise(edges) if a < b]

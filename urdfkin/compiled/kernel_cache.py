@@ -1,8 +1,4 @@
-"""Find the cache folder of compiled kernels, and report compilations to listeners, without importing Numba.
-
-Compiling a kernel takes seconds, and reading it from disk takes almost no time. A listener is a function that
-receives an event for each compilation that this process waits for.
-"""
+"""The cache folder of compiled kernels, and events of compilations; this module does not import Numba."""
 
 from __future__ import annotations
 
@@ -31,7 +27,7 @@ Listener = Callable[[str, float | None], None]
 
 
 def _log(name: str, seconds: float | None) -> None:
-    """Log a warning about a compilation, at most once in each process (by default on standard error)."""
+    """Log a warning about the first compilation of this process."""
     if seconds is None and not _logged:
         _logged.append(name)
         logging.getLogger("urdfkin").warning(
@@ -46,7 +42,6 @@ _listeners: list[Listener] = [_log]
 
 @contextmanager
 def listen_to_compile_events(listener: Listener) -> Iterator[None]:
-    """While the context is open, send compilation events only to `listener`."""
     _listeners.append(listener)
     try:
         yield
@@ -56,9 +51,9 @@ def listen_to_compile_events(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def compile_event(name: str) -> Iterator[Callable[[], None]]:
-    """Inform the listener when the compilation of the kernel `name` begins and ends.
+    """Inform the listener when the compilation of a kernel begins and ends.
 
-    The context yields a function, which the caller must call before it compiles the kernel.
+    The context yields a function that the caller must call before it compiles the kernel.
     """
     starts: list[float] = []
 

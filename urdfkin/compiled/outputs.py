@@ -1,8 +1,7 @@
 """Outputs of the forward recursion: placements, velocities, accelerations, Jacobians and their derivatives.
 
-For each output (for example the velocity), a function `mask_...` marks the vectors of a link's state that the
-output does not need. A function `emit_...` writes the output of a frame. Jacobian columns are computed in
-world axes; for LOCAL they are rotated to the axes of the frame.
+A function `mask_...` marks the vectors of a link's state that an output does not need. Jacobian columns are
+computed in world axes; for LOCAL they are rotated to the axes of the frame.
 """
 
 from __future__ import annotations
@@ -30,17 +29,15 @@ def _unused_vector():
 
 
 def mask_place(state):
-    """Mark all vectors of a link's state as unused, except the rotation R and the position p."""
     return state[0], state[1], _unused_vector(), _unused_vector(), _unused_vector(), _unused_vector()
 
 
 def mask_velocity(state):
-    """Mark the accelerations alpha and acc of a link's state as unused."""
     return state[0], state[1], state[2], state[3], _unused_vector(), _unused_vector()
 
 
 def mask_acceleration(state):
-    """Mark the linear velocity `vel` as unused: the acceleration (equation 7.130) does not depend on it."""
+    """Mark the linear velocity as unused, because acceleration (7.130) does not depend on it."""
     return state[0], state[1], state[2], _unused_vector(), state[4], state[5]
 
 
@@ -66,15 +63,13 @@ def _pose_row(s, row, x, last):
 
 
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
-    """Write a frame's velocity [linear; angular], 7.127 and 7.128, in the given reference frame."""
     p, w, vel = state[1], state[2], state[3]
-    if reference == _WORLD:  # Use the point of the body that is now at the world's origin.
+    if reference == _WORLD:  # In WORLD, the reference point is the body's point at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, vel, w, to)
 
 
 def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
-    """Write a frame's acceleration [linear; angular] by equations 7.129 and 7.130."""
     p, w, alpha, acc = state[1], state[2], state[4], state[5]
     if reference == _WORLD:
         acc = eq.point_acceleration(acc, alpha, w, eq.minus(_no_vector(), p))
@@ -82,7 +77,7 @@ def emit_acceleration(m, s, program, place, sources, b, reference, state, to):
 
 
 def emit_imu(m, s, program, place, sources, b, reference, state, to):
-    """Write the readings of an accelerometer and a gyroscope. The base's acceleration contains -gravity."""
+    """Write accelerometer and gyroscope readings; the base's acceleration contains -gravity."""
     _emit_six(m, s, program, place, b, state[5], state[2], to)
 
 
@@ -94,7 +89,6 @@ def _emit_six(m, s, program, place, b, linear, angular, to):
 
 
 def emit_matrix(m, s, program, place, sources, b, reference, state, to):
-    """Write a frame's Jacobian columns, with zeros for the joint velocities that do not move the frame."""
     frames, size = program[_FRAMES], 6 * program[_NV]
     write_rows(m, s, program, sources, size, to, (b * frames + place) * size, frames * size)
 
@@ -106,12 +100,11 @@ def store_none(s, row, axis, state):
     """Do nothing, because this output has no Jacobian columns."""
 
 
-def column_none(s, row, to, how, g, c, reference, state):
-    """Do nothing, because this output has no Jacobian columns."""
+def column_none(s, row, to, how, g, c, reference, state): ...
 
 
 def store_axis(s, row, axis, state):
-    """Store the axis z_{i-1} and the origin O_{i-1} of a joint in world axes, for equation 7.85."""
+    """Store a joint's axis z_{i-1} and origin O_{i-1} in world axes (7.85)."""
     R, p = state[0], state[1]
     if axis == 2:
         put_vector(s, row, (R[0][2], R[1][2], R[2][2]))
@@ -123,7 +116,6 @@ def store_axis(s, row, axis, state):
 
 
 def store_moving_axis(s, row, axis, state):
-    """Store a joint's axis and origin, and the velocities w and vel of the link that carries the axis."""
     store_axis(s, row, axis, state)
     put_vector(s, row + 6, state[2])
     put_vector(s, row + 9, state[3])
@@ -141,7 +133,7 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 
 
 def column_rate(s, row, to, how, g, c, reference, state):
-    """Compute the time derivative of a Jacobian column (7.126), for LOCAL in the frame's moving axes."""
+    """Compute the time derivative of a Jacobian column (7.126); for LOCAL, in the frame's moving axes."""
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
@@ -169,7 +161,7 @@ def _end(reference, x):
 
 
 def _put_column(s, to, how, g, c, reference, R, linear, angular):
-    """Write a Jacobian column, expressed in the axes of the reference frame.
+    """Write a Jacobian column in the axes of the reference frame.
 
     The column of a mimic joint is scaled and added to the column of the mimicked joint.
     """
@@ -200,7 +192,7 @@ def _add_six(s, to, linear, angular):
 
 
 def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
-    """Write the derivative of each Jacobian column with respect to each joint's motion, (6, nv, nv)."""
+    """Write the Hessian (6, nv, nv) of a frame."""
     count, nv = program[pairs], program[_NV]
     first, end = pairs + 1, pairs + 1 + PAIR_WIDTH * count
     frames, size = program[_FRAMES], nv * nv
@@ -210,7 +202,7 @@ def emit_pairs(m, s, program, place, pairs, b, reference, state, to):
             put_vector(s, program[j + 3], _no_vector())
             put_vector(s, program[j + 3] + 3, _no_vector())
         for i in range(first, end, PAIR_WIDTH):
-            if program[i + 2] == rate:  # Joints with the velocity `rate`, and their mimic joints.
+            if program[i + 2] == rate:  # Mimic joints have the same velocity index as the mimicked joint.
                 _add_changes(s, program, i, first, end, reference)
         for row in range(6):
             at = begin + row * size + rate * nv
@@ -221,10 +213,10 @@ def _add_changes(s, program, i, first, end, reference):
     """Add the derivatives of column i with respect to the motion of each joint.
 
     Column i belongs to a joint on the path. If an earlier joint on the path turns, the linear and angular
-    parts of column i turn with it. A later joint moves only the reference point of the column, which is the
-    frame's origin. For WORLD, the reference point does not move, so a later joint does not change the column.
-    For LOCAL, an earlier joint rotates the column together with the axes of the frame. The components of the
-    column in these axes do not change.
+    parts of column i turn with the earlier joint. A later joint moves only the reference point of the column,
+    which is the frame's origin. For WORLD, the reference point does not move, so a later joint does not
+    change the column. For LOCAL, an earlier joint rotates the column together with the axes of the frame, so
+    the components of the column do not change.
     """
     v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
     for j in range(first, end, PAIR_WIDTH):

@@ -1,19 +1,8 @@
-"""Compile a robot's tree into arrays, and into a program: the list of instructions that a kernel executes.
+"""A robot's tree as arrays, and as a program: the list of instructions that a kernel executes.
 
-A moving joint is called a step. Some of the arrays have one row for each step, and others have one row for
-each frame. As in the textbook, every joint frame is rotated so that the joint's axis is z (`turned` returns
-this rotation). Each revolute joint is then Rz, and each prismatic joint is Tz. Fixed joints are merged into
-the constant offsets between moving joints. A compiled tree contains only the joints that move one of its
-frames.
-
-A kernel executes the program once for each block of configurations. The instructions are chosen once for each
-robot. Instructions for a translation along, or a rotation about, a coordinate axis take a third of the time
-of the general instructions. A translation by zero needs no instruction. The state of a link stays in
-registers until the next link is computed. At a branch of the tree, the state is saved to memory and read
-again later.
-
-`KernelArgs` names the arguments of a kernel. All arguments of a kernel are integers: memory addresses,
-lengths and options.
+A moving joint is called a step. As in the textbook, every joint frame is rotated so that the joint's axis is
+z: a revolute joint is then Rz, and a prismatic joint is Tz. Fixed joints are merged into the constant offsets
+between moving joints. At a branch of the tree, a program saves the state of a link to memory.
 """
 
 from __future__ import annotations
@@ -36,16 +25,12 @@ IntArray = NDArray[np.int64]
 
 
 class StepField(IntEnum):
-    """Columns of `CompiledTree.steps` (integers)."""
-
     KIND = 0
     Q = 1
     V = 2
 
 
 class JointMotion(IntEnum):
-    """The kinds of moving joints: the values in the column `StepField.KIND`."""
-
     TURN = 0
     SLIDE = 1
     PLANAR = 2
@@ -53,10 +38,7 @@ class JointMotion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Indices of the numbers of a joint in `CompiledTree.geometry`: rotation R, offset and mimic rule.
-
-    The offset leads from the previous moving joint to this joint, in the previous joint's axes.
-    """
+    """Columns of `CompiledTree.geometry`; the offset is in the axes of the previous moving joint."""
 
     R = 0
     OFFSET = 9
@@ -65,8 +47,6 @@ class Geometry(IntEnum):
 
 
 class ColumnField(IntEnum):
-    """Columns of `CompiledTree.columns` (integers); a row describes a Jacobian column (eq. 7.85)."""
-
     STEP = 0
     AXIS = 1
     TURNS = 2
@@ -94,34 +74,24 @@ _RATES: dict[JointMotion, tuple[tuple[int, bool], ...]] = {
 class CompiledTree:
     """The moving joints and the frames that a computation needs, stored in arrays.
 
-    The joints are sorted: each joint comes after all joints between it and the base.
+    Each joint comes after all joints between it and the base.
 
     Attributes:
-        nq: Length of `q`.
-        nv: Length of `v` and `a`.
         joints: Indices of the moving joints in the tree's list of joints.
         steps: (steps, 3) integers, columns `StepField`.
         geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2) integers for each frame: the index of the last moving joint before the frame, and
-            the frame's index in the output. The first integer is -1 if no joint moves the frame. The array is
-            sorted by the first integer.
-        offsets: (frames, 12) rotation matrix (9 numbers) and translation (3 numbers) of each frame, relative
-            to the frame of its last moving joint.
-        columns: (columns, 4) integers, columns `ColumnField`. A planar joint has three Jacobian columns, and
-            a floating joint has six.
+        frames: (frames, 2) index of the last moving joint before the frame, or -1; the frame's output index.
+        offsets: (frames, 12) rotation matrix and translation from the last moving joint to each frame.
+        columns: (columns, 4) integers, columns `ColumnField`; one row for each Jacobian column.
         multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
-        leaders: (frames, columns) for each column, the index of the column to which it is added. The columns
-            of a joint and of its mimic joints are added, because these joints have the same joint velocity.
-            Their sum is stored in the first of these columns on the path to the frame. The index is -1 if the
-            column's joint does not move the frame.
+        leaders: (frames, columns) index of the column to which each column is added; -1 if the column's joint
+            does not move the frame. The columns of a joint and of its mimic joints are added.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
-        lengths: (steps + frames,) sums of the lengths of URDF offsets in metres, including the offsets of
-            fixed joints. The first entries are the lengths from the previous moving joint to each moving
-            joint. The other entries are from the last moving joint to each frame, in the order of `frames`.
+        lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints, from the
+            previous moving joint to each moving joint, and then to each frame.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) sum of `Joint.tilt` (rad) over the joints between the root and each frame, in output
-            order.
+        tilts: (frames,) sum of `Joint.tilt` (rad) of these joints, in output order.
     """
 
     nq: int
@@ -150,7 +120,6 @@ class CompiledTree:
 
     @cached_property
     def cache(self) -> dict[object, Any]:
-        """Objects that are computed from this tree, such as programs and weights of error bounds."""
         return {}
 
     @cached_property
@@ -161,7 +130,6 @@ class CompiledTree:
 
     @cached_property
     def turns_only(self) -> bool:
-        """Whether every moving joint is revolute; the sum of the link lengths to a frame is then constant."""
         return bool((self.steps[:, StepField.KIND] == JointMotion.TURN).all())
 
     def __reduce__(self) -> tuple[type[CompiledTree], tuple[Any, ...]]:
@@ -169,7 +137,7 @@ class CompiledTree:
 
 
 def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
-    """Return the compiled tree of the joints that move the given links; results are in this order."""
+    """Compile the joints that move the given links; results are in the order of `links`."""
     depths = _depths(tree, links)
     tilts = {0: 0.0}
     for link in depths:
@@ -210,7 +178,7 @@ def compile_tree(tree: KinematicTree, links: Sequence[int]) -> CompiledTree:
 
 
 def _depths(tree: KinematicTree, links: Iterable[int]) -> dict[int, int]:
-    """Return the number of joints between the root and each link on the paths to the given links."""
+    """Return the number of joints from the root to each link on the paths to `links`."""
     met = {0}
     for end in links:
         link = end
@@ -246,12 +214,11 @@ def _anchors(tree: KinematicTree, step_of_joint: dict[int, int], wanted: Iterabl
 
 
 def turned(joint: Joint) -> FloatArray:
-    """Return the pose (4, 4), in the joint's URDF frame, of a frame whose z axis is the joint's axis."""
+    """Return the pose (4, 4) that rotates the z axis to the joint's axis."""
     return pose(axis_aligning(joint.axis) if joint.kind.has_axis else None)
 
 
 def _flat(T: FloatArray) -> FloatArray:
-    """Return the twelve numbers of a pose: the rotation matrix row by row, then the offset."""
     return np.concatenate((T[:3, :3].ravel(), T[:3, 3]))
 
 
@@ -301,14 +268,14 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 
 
 class Op(IntEnum):
-    """Instructions of a program. The suffix X, Y or Z is the axis; CARRY and TURN allow any axis."""
+    """Instructions of a program: CARRY translates, TURN rotates, and the suffix X, Y or Z is the axis."""
 
     END = 0
-    CARRY_X = 1  # translation along a rigid link
+    CARRY_X = 1
     CARRY_Y = 2
     CARRY_Z = 3
     CARRY = 4
-    TURN_X = 5  # constant rotation
+    TURN_X = 5
     TURN_Y = 6
     TURN_Z = 7
     TURN = 8
@@ -318,27 +285,32 @@ class Op(IntEnum):
     FLOATING = 12
     SAVE = 13
     RESUME = 14
-    STORE = 15  # data that the Jacobian column of a joint needs
+    STORE = 15
     COLUMN = 16
     EMIT = 17
 
 
 class Head(IntEnum):
-    """Indices of the integers at the beginning of a program, before the instructions."""
+    """Indices of the integers at the beginning of a program, before the instructions.
 
-    CODE = 0  # index of the first instruction
+    CODE is the index of the first instruction. BLOCKS_Q, BLOCKS_V and BLOCKS_END delimit the lists of blocks
+    of eight coordinates or velocities. ANGLES and ANGLES_END delimit the list of joint angles. Q, V, A and
+    BASE are the first scratch rows of the inputs.
+    """
+
+    CODE = 0
     NQ = 1
     NV = 2
     FRAMES = 3
-    BLOCKS_Q = 4  # index of the blocks of q (eight coordinates each)
+    BLOCKS_Q = 4
     BLOCKS_V = 5
     BLOCKS_END = 6
-    ANGLES = 7  # start of the joint angles
+    ANGLES = 7
     ANGLES_END = 8
-    Q = 9  # first scratch row of the coordinates
-    V = 10  # first scratch row of the velocities
-    A = 11  # first scratch row of the accelerations
-    BASE = 12  # first scratch row of the base's motion
+    Q = 9
+    V = 10
+    A = 11
+    BASE = 12
 
 
 #: Number of doubles in a row of scratch memory, one for each of eight configurations.
@@ -366,14 +338,7 @@ _JOINTS = {
 
 @dataclass(frozen=True, eq=False)
 class KernelProgram:
-    """The program of a kernel.
-
-    Attributes:
-        words: The program as integers: first the integers that `Head` names, then lists, for example of joint
-            angles, and then the instructions.
-        constants: The constants of the instructions.
-        rows: Number of rows of scratch memory that the program needs.
-    """
+    """A program: `words` are the integers that `Head` names, then lists, and then the instructions."""
 
     words: IntArray
     constants: FloatArray
@@ -381,12 +346,11 @@ class KernelProgram:
 
     @cached_property
     def addresses(self) -> tuple[int, int]:
-        """Memory addresses of `words` and `constants`, which are valid while the program exists."""
+        """Memory addresses of `words` and `constants`; they are valid while the program exists."""
         return address(self.words), address(self.constants)
 
     @cached_property
     def lists(self) -> tuple[list[int], list[Number]]:
-        """Python lists of `words` and `constants`, for the recursion in Python."""
         words: list[int] = self.words.tolist()
         return words, list(map(Number, self.constants.tolist()))
 
@@ -394,15 +358,10 @@ class KernelProgram:
 def program_of(
     plan: CompiledTree, *, turned: bool, columns: bool = False, pairs: bool = False
 ) -> KernelProgram:
-    """Return the program for the frames of a compiled tree. The tree stores the program for later calls.
+    """Return the program for the frames of a compiled tree; the tree stores the program.
 
-    Args:
-        plan: The compiled tree.
-        turned: Whether the program also computes the orientation of each frame. True is necessary for
-            placements, and for results in the frame's own axes.
-        columns: Whether Jacobian columns are needed.
-        pairs: Whether a separate column is stored for each joint, including mimic joints. A Hessian is
-            computed from all pairs of Jacobian columns.
+    If `turned` is true, the program also computes the orientation of each frame. If `pairs` is true, mimic
+    joints have separate Jacobian columns, as a Hessian requires.
     """
     key = turned, columns, pairs
     program: KernelProgram | None = plan.cache.get(key)
@@ -442,7 +401,6 @@ class _Writer:
         return KernelProgram(np.array(words, dtype=np.int64), np.array(self.constants), rows)
 
     def _write(self) -> None:
-        """Write the instructions for all joints and frames, from the base outwards."""
         events = list(self._events())
         columns = self.plan.columns if self.columns else self.plan.columns[:0]
         last = {origin: k for k, (origin, _, _) in enumerate(events)}
@@ -462,11 +420,7 @@ class _Writer:
                 now = -2  # The registers contain the state of the frame, not of a joint.
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield the moving joints and frames in the order in which the recursion visits them.
-
-        An item is (index of the previous joint, index of the joint, None), or (index of the previous joint,
-        None, index of the frame).
-        """
+        """Yield (previous joint, joint, None) or (previous joint, None, frame), in the recursion's order."""
         f = 0
         for i in range(-1, len(self.plan.steps)):
             if i >= 0:
@@ -476,11 +430,7 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Write an instruction that saves the state after a joint, if a later event needs the state.
-
-        `last[i]` is the index of the last event that uses the state after joint i. The event with index
-        `following` comes next and uses the state in the registers, so only later events need the saved state.
-        """
+        """Save the state after a joint if an event after the next event needs the state."""
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 
@@ -496,7 +446,7 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write the instructions for a translation by p and a rotation by R; return whether there are any."""
+        """Write a translation by p and a rotation by R; return whether they need instructions."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -508,12 +458,10 @@ class _Writer:
         return len(self.code) > before
 
     def _rule(self, i: int) -> int:
-        """Store a mimic joint's multiplier and offset, and return their index; 0 for other joints."""
         multiplier, constant = self.plan.geometry[i, Geometry.MULTIPLIER :].tolist()
         return 0 if (multiplier, constant) == (1.0, 0.0) else self._constants(multiplier, constant)
 
     def _angles(self) -> list[int]:
-        """Return the list of joint angles, with `ANGLE_WIDTH` integers for each."""
         angles = []
         for i, step in enumerate(self.plan.steps):
             kind, q = JointMotion(step[StepField.KIND]), self.q + int(step[StepField.Q])
@@ -556,7 +504,7 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the scratch memory row of each element of the frame's (6, nv) matrix, from `row` on."""
+        """Return the scratch row of each element of the frame's (6, nv) matrix, from `row` on."""
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
@@ -564,11 +512,7 @@ class _Writer:
         return sources.ravel().tolist()
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the list of Jacobian columns from which the kernel computes a frame's Hessian.
-
-        The first integer is the number of columns. `PAIR_WIDTH` integers for each column follow. The last
-        integers are the scratch memory rows with the elements of the result.
-        """
+        """Return the number of columns, `PAIR_WIDTH` integers for each column, and the scratch rows."""
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]
@@ -637,12 +581,11 @@ def address(x: NDArray[Any]) -> int:
 
 
 def scratch(program: KernelProgram) -> FloatArray:
-    """Return memory for the intermediate results of one run of a program."""
     return lines(program.rows * LANES)
 
 
 def lines(count: int) -> FloatArray:
-    """Return an uninitialized array of `count` numbers that is aligned to a cache line."""
+    """Return an uninitialized array of `count` numbers, aligned to a cache line."""
     numbers = np.empty(count + _LINE // 8)
     first = -address(numbers) % _LINE // 8
     return numbers[first : first + count]

@@ -1,8 +1,7 @@
 """Decide when a kernel is loaded or compiled; this decision does not import Numba.
 
-A single configuration needs no kernel: Python computes exactly the same result in a millisecond. Importing
-Numba and reading a kernel from disk takes longer, and compiling takes seconds. Therefore, this module
-measures how long Python has computed without each kernel.
+For a few configurations, Python is faster than loading or compiling a kernel. This module therefore measures
+how long Python has computed without each kernel, and estimates the time of the next computations.
 
 | time without a kernel | action |
 |---|---|
@@ -10,8 +9,7 @@ measures how long Python has computed without each kernel.
 | more than `BESIDE`, no kernel on disk | compile the kernel in a second process; Python still computes |
 | more than `COMPILING`, no kernel on disk | compile the kernel in this process |
 
-The time includes an estimate for the next computations. If no second process can compile the kernel, this
-process compiles it after the time `BESIDE`.
+If no second process can compile the kernel, this process compiles it after the time `BESIDE`.
 """
 
 from __future__ import annotations
@@ -31,7 +29,7 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Thresholds (s) of the computing time without a kernel; the table in the module docstring lists the actions.
+#: Thresholds (s) of the computing time without a kernel; the module docstring lists the actions.
 LOADING, BESIDE, COMPILING = 0.3, 1.0, 3.0
 #: Time (s) that replaces `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03
@@ -40,9 +38,8 @@ _SAVED = 5e-5
 #: Time (s) after which the cache folder is searched again for a missing kernel.
 _AGAIN = 0.05
 
-#: Modules that contain the kernels.
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: Two processes compile one half of the kernels each; the compile times are about equal.
+#: The kernels that each of two processes compiles; the compile times are about equal.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -59,7 +56,7 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """Compute only in the given way while the context is open; tests compare the two ways."""
+    """Compute only in the given way while the context is open."""
     _only.append(way)
     try:
         yield
@@ -68,14 +65,14 @@ def only(way: Way) -> Iterator[None]:
 
 
 def spend(name: str, seconds: float) -> None:
-    """Add the time (seconds) of a computation that did not use the kernel `name`."""
+    """Add the seconds of a computation that did not use the kernel `name`."""
     _spent[name] = _spent.get(name, 0.0) + seconds
 
 
 def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
-    """Return a kernel of the module `home`, or None if computing without the kernel is faster.
+    """Return a kernel, or None if computing without the kernel is faster.
 
-    `more` is the estimated time (seconds) of the next computations if they do not use the kernel.
+    `more` is the estimated time (seconds) of the next computations without the kernel.
     """
     if _only and _only[-1] == "interpreted":
         return None
@@ -92,10 +89,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 
 
 def single_pays(name: str) -> bool:
-    """Return whether to load the fast function (`SINGLE`) that calls the kernel `name` for one configuration.
-
-    Each call adds the time that the fast function would save to a running total.
-    """
+    """Return whether to load the function that computes one configuration with the kernel `name`."""
     if _only:
         return _only[-1] == "compiled"
     if name not in _loaded and f"local_{name}" not in _loaded:
@@ -114,7 +108,7 @@ def load(name: str, home: str = RECURSIONS) -> Any:
 
 
 def _on_disk(name: str) -> bool:
-    """Return whether a kernel is on disk; if it is missing, search for it again after `_AGAIN` seconds."""
+    """Return whether a kernel is on disk; search again only after `_AGAIN` seconds."""
     folder = cache_folder()
     if folder is None or time.monotonic() < _absent.get((folder, name), 0.0):
         return False
@@ -135,11 +129,7 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Start a second process that compiles a kernel, and return whether a second process runs.
-
-    At most one such process runs at a time, and at most one is started for each kernel. The function also
-    returns True if a running second process compiles another kernel.
-    """
+    """Start at most one second process for each kernel; return whether a second process runs."""
     if cache_folder() is None:
         return False
     if any(process.poll() is None for process in _beside.values()):
@@ -151,7 +141,6 @@ def _compile_beside(name: str, home: str) -> bool:
 
 
 def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
-    """Start a second interpreter that compiles kernels; if it fails, this process compiles them."""
     import subprocess
 
     from urdfkin.system.processes import own_python
@@ -195,16 +184,11 @@ os.register_at_fork(after_in_child=_forget_beside)
 
 
 def are_on_disk() -> bool:
-    """Return whether all kernels that `load_kernels` loads are on disk."""
     return all(map(_on_disk, _ONE_HALF + _OTHER_HALF))
 
 
 def load_kernels() -> None:
-    """Load every kernel before several processes start; otherwise, each process would compile every kernel.
-
-    A process compiles on one processor only, so a second process compiles half of the kernels, and this
-    process reads them from disk.
-    """
+    """Load every kernel before several processes start, so that not every process compiles all kernels."""
     missing = cache_folder() is not None and not all(map(_on_disk, _OTHER_HALF))
     helper = _compile_elsewhere(_OTHER_HALF) if missing else None
     try:

@@ -1,7 +1,6 @@
-"""Compute results of one frame for one configuration in fast calls, for control loops and solvers.
+"""Fast results of one frame for one configuration, for control loops and solvers.
 
-Each function has its own program and its own scratch memory, so the caller passes only the arrays. If another
-thread is using the function, `Robot` computes the same result instead.
+If another thread is using a function's scratch memory, `Robot` computes the same result instead.
 """
 
 from __future__ import annotations
@@ -21,14 +20,11 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.system.locks import importing
 
-#: A function that is called as f(q, out), f(q, v, out) or f(q, v, a, out).
-#: It returns None for unsupported arguments; then `Robot` computes the result or raises the error.
+#: A function f(q, out), f(q, v, out) or f(q, v, a, out) that returns None for unsupported arguments.
 Fast = Callable[..., FloatArray | None]
 
 
 class _PreparedRobot(Protocol):
-    """The methods and attributes of `Robot` that a prepared frame uses."""
-
     tree: Any
     verifier: Any
 
@@ -50,7 +46,7 @@ class PreparedFrame:
     """Fast evaluation of one frame in one reference frame; create it with `Robot.prepare`.
 
     Results are exactly the same numbers as those of `Robot`. With `verify=True`, urdfkin compares each result
-    with Pinocchio's result and allows the same difference as `Robot`. With `verify=False`, results are not
+    with Pinocchio's result and uses the tolerance of `Robot`. With `verify=False`, results are not
     checked, and `Robot.certificate` reports them as unchecked. Contiguous float64 arrays are used directly.
     For arguments of other types, `Robot` computes the result or raises the error. Several threads may share
     one object, also on free-threaded Python.
@@ -136,7 +132,7 @@ class PreparedFrame:
         return self._robot.jacobian(q, self.frame, self.reference, out=out, verify=self.verify, threads=1)
 
     def hessian(self, q: Given, out: FloatArray | None = None) -> FloatArray:
-        """Return the Hessian (6, nv, nv), the derivative of the Jacobian by the motion of each joint.
+        """Return the Hessian (6, nv, nv), the derivative of the Jacobian with respect to each joint's motion.
 
         >>> import urdfkin
         >>> tip = urdfkin.load("planar_two_link").prepare("tip")

@@ -1,8 +1,6 @@
 """Number types for the recursion of one configuration in plain Python, without compilation.
 
-Results are exactly the same doubles as those of compiled kernels; `urdfkin.compiled.machine.numbers` explains
-the types. Scratch memory is a list with one number for each row. These functions take lists; compiled kernels
-take memory addresses instead.
+Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`).
 """
 
 from __future__ import annotations
@@ -19,8 +17,8 @@ LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: The sum of this constant and a number below 2^51 is rounded to an integer.
-#: The lowest bits of the sum's mantissa are the integer nearest to the number.
+#: If this constant is added to a number below 2^51, the sum is rounded to an integer.
+#: The lowest bits of the sum's mantissa then contain the number, rounded to the nearest integer.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (
     -1.66666666666666324348e-01,
@@ -41,14 +39,14 @@ COSINE = (
 
 
 def _c_fma() -> Callable[[float, float, float], float]:
-    """Return the fused multiply-add of the C library, which the Python interpreter has already loaded."""
+    """Return the fused multiply-add of the C library that the Python process has loaded."""
     function = ctypes.PyDLL(None).fma
     function.restype, function.argtypes = ctypes.c_double, (ctypes.c_double,) * 3
     return function
 
 
 def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[[float, float, float], float]:
-    """Return a function that computes `math.fma`, but returns inf and nan where Python raises an error."""
+    """Return `math.fma`, but with inf and nan where Python raises an error."""
 
     def fma(x: float, y: float, z: float) -> float:
         try:
@@ -59,7 +57,6 @@ def _python_fma(own: Callable[..., float], c: Callable[..., float]) -> Callable[
     return fma
 
 
-#: Function that returns x y + z, rounded only once.
 fma = _python_fma(math.fma, _c_fma()) if hasattr(math, "fma") else _c_fma()
 
 
@@ -108,7 +105,7 @@ class Number:
 
 
 class Product:
-    """A product x y that is not computed yet; the attributes are its two factors."""
+    """A product that is stored as its two factors."""
 
     __slots__ = ("x", "y")
 
@@ -147,7 +144,7 @@ class Product:
 
 
 class Known:
-    """The constant 0, the constant 1, or the placeholder `nothing()`, whose `value` is None."""
+    """The constant 0 or 1; the value None is the placeholder `nothing()`."""
 
     __slots__ = ("value",)
 
@@ -180,7 +177,7 @@ class Known:
 
 
 def _double(x: Any) -> float:
-    """Return a number, which must not be `nothing()`, as a float."""
+    """Return a number as a float; the number must not be `nothing()`."""
     if type(x) is Product:
         return x.x * x.y
     return x.x if type(x) is Number else float((x.value or 0) if type(x) is Known else x)
@@ -190,17 +187,15 @@ _ZERO, _ONE, _NOTHING = Known(0), Known(1), Known(None)
 
 
 def zero() -> Known:
-    """Return the constant 0, which simplifies products and sums: 0 x is 0, and 0 + x is x."""
     return _ZERO
 
 
 def one() -> Known:
-    """Return the constant 1, which simplifies products: 1 x is x."""
     return _ONE
 
 
 def nothing() -> Known:
-    """Return the object for a number that no output needs; every operation with this object returns it."""
+    """Return the placeholder for a number that no output needs."""
     return _NOTHING
 
 
@@ -217,12 +212,10 @@ def number(s: Sequence[Number], row: int) -> Number:
 
 
 def number_if(wanted: Any, s: Sequence[Number], row: int) -> Any:
-    """Return the number in a row of scratch memory, or `nothing()` if `wanted` is `nothing()`."""
     return wanted if wanted is _NOTHING else s[row]
 
 
 def put(s: list[Number], row: int, x: Any) -> None:
-    """Write a number to a row of scratch memory; do nothing if the number is `nothing()`."""
     if x is not _NOTHING:
         s[row] = x if type(x) is Number else Number(_double(x))
 
@@ -231,16 +224,15 @@ def constant(g: Sequence[Number], i: int) -> Number:
     return g[i]
 
 
-same = Number  # in compiled code, one double is copied to all configurations of a block
+same = Number  # Compiled code copies one double to all configurations of a block.
 
 
 def numbers_of(array: Any) -> Any:
-    """Return the numbers of an array as a list; compiled code uses a pointer to the numbers instead."""
     return array.tolist()
 
 
 def numbers_at(address: Any) -> Any:
-    """Return the argument, a list of numbers; compiled code converts an address here."""
+    """Return the argument, a list; compiled code converts an address to a pointer."""
     return address
 
 
@@ -250,29 +242,25 @@ whole_numbers_at = numbers_at
 def read_rows(
     m: int, x: Sequence[float], at: int, stride: int, count: int, s: list[Number], row: int
 ) -> None:
-    """Copy the numbers `x[at]`, `x[at + 1]` and so on to `count` rows of scratch memory."""
     s[row : row + count] = map(Number, x[at : at + count])
 
 
 def write_rows(
     m: int, s: Sequence[Number], rows: Sequence[int], first: int, count: int, to: list[float], at: int, _: int
 ) -> None:
-    """Copy `count` scratch rows, from `rows[first]` on, to the array `to`, from the index `at` on."""
     to[at : at + count] = [s[row].x for row in rows[first : first + count]]
 
 
 def add_squares(total: Number, x: Sequence[float], at: int, count: int) -> Number:
-    """Add to `total` the squares of `count` numbers that begin at `x[at]`."""
     return Number(total.x + sum(y * y for y in x[at : at + count]))
 
 
 def ordinary(total: Number) -> bool:
-    """Return whether a sum of squares is below the square of `LARGE`; for nan, return False."""
     return total.x < LARGE * LARGE
 
 
 def all_written(*_: object) -> None:
-    """Do nothing. Compiled code waits here until all results are in memory; Python need not wait."""
+    """Do nothing; compiled code waits here until all results are in memory."""
 
 
 stream = all_written

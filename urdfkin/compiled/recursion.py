@@ -19,9 +19,7 @@ world axes. The joint axis and the interorigin vector have constant components i
 The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
 add the rounding errors of another rotation.
 
-A vector that a result does not need is `nothing()` and costs no time. This module and the modules `outputs`
-and `recursions` contain plain functions that compute with the module `python_numbers`. The kernels are copies
-of these functions for Numba's number types (`urdfkin.compiled.machine.kernels`).
+A vector that a result does not need is `nothing()` and costs no time.
 """
 
 from __future__ import annotations
@@ -89,15 +87,12 @@ def world_axes(own, world):
 
 
 def seen(axes, R, x):
-    """Return the components of x, given in the link's axes, in the axes of `link_axes` or `world_axes`."""
+    """Convert a vector x from link axes to the axes of the recursion."""
     return axes(x, eq.rotate(R, x))
 
 
 def seen_after(axes, S, x):
-    """Return a link's velocity or acceleration x after the link's frame is rotated by S.
-
-    In world axes, the components of x do not change. In the link's axes, they are rotated.
-    """
+    """Return the components of a vector x after a rotation S of the link's frame."""
     return axes(eq.rotate(eq.transposed(S), x), x)
 
 
@@ -105,7 +100,7 @@ def seen_after(axes, S, x):
 
 
 def carried(axes, state, d):
-    """Return the state of the link's point at offset d, in the link's axes; equations 7.58, 7.128, 7.130."""
+    """Return the state of the link's point at `d` in link axes (7.58, 7.128, 7.130)."""
     R, p, w, vel, alpha, acc = state
     lever = seen(axes, R, d)
     return (
@@ -119,7 +114,7 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return a link's state after a rotation S of the axes of the link's frame; the link does not move."""
+    """Return a link's state after a rotation S of the link's frame; the link does not move."""
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -132,12 +127,12 @@ def turned(axes, state, S):
 
 
 def _turned_about_z(axes, state, s, row):
-    """Rotate the frame about z (7.5); the sine and cosine are in the scratch rows `row` and `row + 1`."""
+    """Rotate the frame about z (7.5); `row` and `row + 1` store the sine and the cosine."""
     return turned(axes, state, eq.about_z(number(s, row), number(s, row + 1), zero(), one()))
 
 
 def revolute(axes, state, s, row, v, a):
-    """Compute the state after a revolute joint: apply equations 7.129 and 7.127, then rotate the frame."""
+    """Compute the state after a revolute joint (7.127, 7.129)."""
     R, p, w, vel, alpha, acc = state
     z = seen(axes, R, (zero(), zero(), one()))
     alpha = eq.angular_acceleration(alpha, w, z, v, a)
@@ -145,17 +140,16 @@ def revolute(axes, state, s, row, v, a):
 
 
 def prismatic(axes, state, slide, v, a):
-    """Compute the state after a prismatic joint: apply equations 7.64, 7.130 and 7.128."""
+    """Compute the state after a prismatic joint (7.64, 7.128, 7.130)."""
     R, p, w, vel, alpha, acc = carried(axes, state, (zero(), zero(), slide))
     z = seen(axes, R, (zero(), zero(), one()))
     return R, p, w, eq.sliding_velocity(vel, z, v), alpha, eq.sliding_acceleration(acc, w, z, v, a)
 
 
 def free(axes, state, o, u, o_rate, u_rate):
-    """Add the velocity and the acceleration of a planar or floating joint to the state.
+    """Add the velocity and the acceleration of a planar or floating joint, in the child link's axes.
 
-    The caller has already added the joint's translation and rotation. The joint's velocity and acceleration
-    are given in the child link's axes.
+    The state already contains the joint's translation and rotation.
     """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
@@ -170,10 +164,7 @@ def free(axes, state, o, u, o_rate, u_rate):
 
 
 def _coordinate(s, row, g, c, follows):
-    """Return a joint's value, which is its coordinate or follows from its mimic rule.
-
-    For a mimic joint, the product and the sum are rounded separately, as in Pinocchio.
-    """
+    """Return a joint's value; a mimic rule's product and sum are rounded separately, as in Pinocchio."""
     x = number(s, row)
     if follows:
         x = rounded(constant(g, c) * x) + constant(g, c + 1)
@@ -251,7 +242,6 @@ def _save(s, row, state):
 
 
 def _resume(s, row, state):
-    """Read the needed vectors of a link's state from scratch memory."""
     R, p, w, vel, alpha, acc = state
     return (
         (_vector_if(R[0], s, row), _vector_if(R[1], s, row + 3), _vector_if(R[2], s, row + 6)),
@@ -267,13 +257,9 @@ def _resume(s, row, state):
 
 
 def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
-    """Read numbers of `m` configurations from x into scratch memory; the first configuration has index b.
+    """Read the listed blocks of eight numbers of `m` configurations into scratch memory.
 
-    A configuration consists of blocks of eight numbers, and only the listed blocks are read. If x has one
-    row, all configurations use this row. A block of eight numbers is read faster than a shorter block. If a
-    configuration ends within a block, numbers of the next configuration are therefore read too, unless they
-    are beyond the end of x. The scratch rows with these surplus numbers are overwritten when later inputs are
-    read.
+    A block may contain surplus numbers of the next configuration; later inputs overwrite the surplus numbers.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -284,7 +270,7 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
 
 
 def _start(axes, m, s, task, row, b):
-    """Return the base's motion in the world; the textbook calls the base frame 0 and the world frame -1."""
+    """Return the motion of the base in the world, as the state of a link."""
     nil, unit = same(0.0), same(1.0)
     R = (unit, nil, nil), (nil, unit, nil), (nil, nil, unit)
     p = w = vel = alpha = acc = nil, nil, nil
@@ -298,7 +284,6 @@ def _start(axes, m, s, task, row, b):
 
 
 def _sines_and_cosines(s, program, g):
-    """Compute the sines and cosines of all joint angles before the recursion, which needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)
@@ -310,7 +295,6 @@ def _sines_and_cosines(s, program, g):
 
 
 def _along_link(axes, op, state, g, c):
-    """Execute an instruction for a constant translation or a constant rotation."""
     if op == _CARRY_X:
         state = carried(axes, state, (constant(g, c), zero(), zero()))
     elif op == _CARRY_Y:
@@ -333,10 +317,10 @@ def _along_link(axes, op, state, g, c):
 def _over_joint(axes, op, state, s, x, v, a, z, g, c):
     """Execute a joint's instruction.
 
-    The arguments v and a are the scratch rows of the joint's velocity and acceleration. For a revolute joint,
-    x is the scratch row that stores the sine; for other joints, the row of the first coordinate. For a planar
-    joint, z is the scratch row that stores the sine; for other joints, z is 1 for a mimic joint, else 0. The
-    constants of a mimic rule begin at `g[c]`.
+    The scratch rows of the joint's velocity and acceleration are `v` and `a`. For a revolute joint, `x` is
+    the scratch row of the sine; for other joints, `x` is the row of the first coordinate. For a planar joint,
+    `z` is the scratch row of the sine; for other joints, `z` is 1 for a mimic joint, else 0. The constants of
+    a mimic rule begin at `g[c]`.
     """
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
@@ -352,7 +336,6 @@ def _over_joint(axes, op, state, s, x, v, a, z, g, c):
 
 
 def _read_inputs(m, task, program, s, b, orders):
-    """Read the coordinates and, if needed, the joint velocities and accelerations."""
     q, n, nq, nv = numbers_at(task[_Q]), task[_N], program[_NQ], program[_NV]
     edge, end = program[_BLOCKS_V], program[_BLOCKS_END]
     _read(m, q, n, b, nq, task[_STRIDE_Q], program, program[_BLOCKS_Q], edge, s, program[_ROW_Q])
@@ -365,7 +348,6 @@ def _read_inputs(m, task, program, s, b, orders):
 
 
 def _squares(total, m, task, program, b, orders):
-    """Add to `total` the squares of all inputs of a block, also of unused inputs."""
     total = _added(total, m, numbers_at(task[_Q]), b, program[_NQ], task[_STRIDE_Q])
     if orders > 1:
         total = _added(total, m, numbers_at(task[_V]), b, program[_NV], task[_STRIDE_V])
@@ -379,7 +361,6 @@ def _added(total, m, x, b, width, stride):
 
 
 def _block(axes, m, task, program, g, s, b, reference, orders, mask, store, column, emit):
-    """Run the recursion for the `m` configurations from index `b` on."""
     _read_inputs(m, task, program, s, b, orders)
     _sines_and_cosines(s, program, g)
     state = mask(_start(axes, m, s, task, program[_ROW_BASE], b))
@@ -414,14 +395,8 @@ def _block(axes, m, task, program, g, s, b, reference, orders, mask, store, colu
 def forward_recursion(address, axes, orders, mask, store, column, emit):
     """Execute a program for every block; return 1 if an input is nan, infinite or too large, else 0.
 
-    Args:
-        address: Address of the kernel's arguments (`KernelArgs`).
-        axes: `link_axes` or `world_axes`: the axes in which vectors are expressed.
-        orders: Number of inputs that are read: 1 for q, 2 for q and v, 3 for q, v and a.
-        mask: Function that replaces the unused vectors of a link's state by `nothing()`.
-        store: Function that stores what a joint's Jacobian column needs, for example the joint's axis.
-        column: Function that computes a column of J or of J-dot.
-        emit: Function that writes the result of a frame.
+    The address is that of the kernel's arguments (`KernelArgs`). The number `orders` is 1 for q, 2 for q and
+    v, and 3 for q, v and a. `mask`, `store`, `column` and `emit` are functions of `urdfkin.compiled.outputs`.
     """
     task = whole_numbers_at(address)
     program, g, s = whole_numbers_at(task[_PROGRAM]), numbers_at(task[_CONSTANTS]), numbers_at(task[_SCRATCH])

@@ -1,6 +1,9 @@
-"""The recursions, one function for each quantity, as plain Python or as compiled kernels of the same names.
+"""One forward recursion for each quantity, in Python; `urdfkin.compiled.machine.kernels` compiles copies.
 
-The argument of a kernel is the address of the integers that `KernelArgs` describes; Python takes lists
+The equations are 7.77 (placements), 7.127 and 7.128 (velocities), 7.129 and 7.130 (accelerations), 7.85
+(Jacobians) and 7.126 (Jacobian rates). Functions `local_...` compute in each frame's own axes.
+
+The argument of a kernel is the address of the integers that `KernelArgs` describes; Python code passes lists
 instead of addresses. The result is 1 if an input is nan, infinite or too large, else 0.
 """
 
@@ -27,49 +30,42 @@ from urdfkin.compiled.recursion import forward_recursion, link_axes, world_axes
 
 
 def placements(task):
-    """Compute placements of frames: the positions by equation 7.77, and the rotations."""
     return forward_recursion(task, world_axes, 1, mask_place, store_none, column_none, emit_place)
 
 
 def velocities(task):
-    """Compute velocities of frames (7.127 and 7.128) in the world's axes."""
     return forward_recursion(task, world_axes, 2, mask_velocity, store_none, column_none, emit_velocity)
 
 
 def local_velocities(task):
-    """Compute velocities of frames (7.127 and 7.128) in each frame's own axes."""
     return forward_recursion(task, link_axes, 2, mask_velocity, store_none, column_none, emit_velocity)
 
 
 def accelerations(task):
-    """Compute accelerations of frames (7.129 and 7.130) in the world's axes."""
     return forward_recursion(
         task, world_axes, 3, mask_acceleration, store_none, column_none, emit_acceleration
     )
 
 
 def local_accelerations(task):
-    """Compute accelerations of frames (7.129 and 7.130) in each frame's own axes."""
     return forward_recursion(
         task, link_axes, 3, mask_acceleration, store_none, column_none, emit_acceleration
     )
 
 
 def jacobians(task):
-    """Compute Jacobians of frames (7.85)."""
     return forward_recursion(task, world_axes, 1, mask_place, store_axis, column_jacobian, emit_matrix)
 
 
 def jacobian_rates(task):
-    """Compute the time derivatives J-dot of the Jacobians by equation 7.126."""
     return forward_recursion(task, world_axes, 2, mask_velocity, store_moving_axis, column_rate, emit_matrix)
 
 
 def hessians(task):
-    """Compute the derivative of each Jacobian column (7.85) with respect to each joint's motion."""
+    """Compute the derivative of each Jacobian column with respect to each joint's motion."""
     return forward_recursion(task, world_axes, 1, mask_place, store_axis, column_jacobian, emit_pairs)
 
 
 def imus(task):
-    """Compute accelerometer and gyroscope readings (7.127, 7.129, 7.130) in each frame's own axes."""
+    """Compute accelerometer and gyroscope readings in each frame's own axes."""
     return forward_recursion(task, link_axes, 3, mask_acceleration, store_none, column_none, emit_imu)

@@ -1,8 +1,4 @@
-"""Copies of the equations that use different basic operations, for example for NumPy arrays or LaTeX.
-
-The functions of `urdfkin.kinematics.equations` compute with triples of numbers. Copies of these functions
-compute with NumPy arrays, write LaTeX, or compute bounds. This module does not import NumPy.
-"""
+"""Copies of the textbook's equations with other basic operations, for example for NumPy arrays or LaTeX."""
 
 from __future__ import annotations
 
@@ -12,16 +8,14 @@ from typing import Any
 
 from urdfkin.kinematics import equations
 
-#: Basic operations on vectors, of which all equations are composed.
+#: Names of the vector operations from which all equations are composed.
 VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "product")
 
 
 def bound(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Return a namespace with copies of all functions of `equations`; the copies use other basic operations.
-
-    The function `decorate` is applied to each copy. `vectors` are the basic operations by name.
+    """Copy all functions of `equations`, and replace their basic operations by `vectors`.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
@@ -35,9 +29,8 @@ def rebound(
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls other copies instead of the original functions. If a function or module has the same name as
-    an entry of `others`, the entry replaces it. The function `decorate`, for example a compiler, is applied
-    to each copy. A module may use functions of the modules that are listed before it.
+    Inside a copy, each name refers to its entry in `others`, or to another copy. List a module after the
+    modules whose functions it uses.
     """
     copies: dict[str, Any] = {}
     for module in modules:

@@ -1,13 +1,6 @@
 """Motion of bodies: planar links, points and frames in moving frames, joints, tools, analytical Jacobians.
 
-| Subject | Section of the textbook | Equations |
-|---|---|---|
-| one link in the plane | 7.1 | 7.1 to 7.7 (page 2, with 7.6 and 7.8 to 7.10, is lost) |
-| `MovingFrame`, `compose` | 7.3, 7.6 | 7.49, 7.58 to 7.61, 7.125 |
-| position, velocity and acceleration of a point in a moving frame | 7.3.1, 7.6 | 7.58, 7.59, 7.123 to 7.125 |
-| one joint | 7.4.1, 7.4.2, 7.4.4 | 7.62 to 7.67, 7.72 to 7.74, 7.80, a column of 7.85 |
-| the tool and the last frame | 7.4.8 | 7.115 |
-| the analytical Jacobian | 7.5 | 7.116 to 7.122 |
+The module computes equations of the sections 7.1 and 7.3 to 7.6 of the textbook.
 
 | Argument | Shape | Meaning |
 |---|---|---|
@@ -29,11 +22,10 @@ derivatives of x = (position, orientation). For three Euler angles in any sequen
 x has 6 numbers and J is (..., 6, n). For a unit quaternion ("quaternion", scalar last), x has 7 numbers and J
 is (..., 7, n).
 
-Functions that take an `ArrayLike` raise InputError for a wrong shape or a value that is not finite. These
-functions also raise InputError for an axis that is not of unit length and for a matrix that is not a
-rotation. An unknown `representation` raises UnknownNameError. At the singularity of Euler angles, Omega
-cannot be inverted. Functions with the argument `nearest` raise RepresentationSingularityError if the distance
-from the singularity is at most `nearest`.
+Functions that take an `ArrayLike` raise InputError for a wrong shape, a value that is not finite, an axis
+that is not of unit length, and a matrix that is not a rotation. An unknown `representation` raises
+UnknownNameError. A distance of `nearest` or less from the singularity of Euler angles raises
+RepresentationSingularityError.
 """
 
 from __future__ import annotations
@@ -82,12 +74,9 @@ class MovingFrame:
 def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
     """Return the motion of frame 2 relative to frame 0 (7.60, 7.61).
 
-    The origin O_2 is a point that moves in frame 1. Its motion follows from 7.58, 7.124 and 7.125. The
-    angular velocity of frame 2 is w_01 + w_12 (7.49). The angular acceleration is the time derivative of w_01
-    + w_12, which contains the term w_01 x w_12.
-
     `outer` is the motion of frame 1 relative to frame 0. `inner` is the motion of frame 2 relative to frame
-    1, in frame 1; for example, `inner.d_0_1` is the vector from O_1 to O_2.
+    1, in frame 1. The origin O_2 is a point that moves in frame 1 (7.58, 7.124, 7.125). The time derivative
+    of the angular velocity w_01 + w_12 (7.49) contains the term w_01 x w_12.
     """
     R, w = outer.R_0_1, outer.w_0_1
     d_12, v_12, a_12 = (eq.rotate(R, x) for x in (inner.d_0_1, inner.v_0_1, inner.a_0_1))
@@ -105,7 +94,7 @@ def compose(outer: MovingFrame, inner: MovingFrame) -> MovingFrame:
 def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
     """Return the motion of the last frame relative to frame 0 (7.50, 7.61).
 
-    Entry i of `frames` is the motion of frame i + 1 relative to frame i. Without frames, nothing moves.
+    Entry i of `frames` is the motion of frame i + 1 relative to frame i.
     """
     return reduce(compose, frames, MovingFrame(np.eye(3), np.zeros(3)))
 
@@ -125,13 +114,7 @@ _ZERO = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityParts:
-    """Terms of a point's velocity (7.124), (..., 3), m/s in frame 0.
-
-    Attributes:
-        rotation: w x p, from the rotation of the frame.
-        relative: R v_1, the velocity of the point relative to the frame, expressed in frame 0.
-        origin: d-dot, the velocity of the frame's origin.
-    """
+    """Terms w x p, R v_1 and d-dot of a point's velocity (7.124), (..., 3), m/s in frame 0."""
 
     rotation: FloatArray
     relative: FloatArray
@@ -144,15 +127,7 @@ class VelocityParts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AccelerationParts:
-    """Terms of a point's acceleration (7.125), (..., 3), m/s^2 in frame 0.
-
-    Attributes:
-        transverse: alpha x p.
-        centripetal: w x (w x p), towards the axis of rotation.
-        coriolis: 2 w x R v_1, perpendicular to w and to R v_1.
-        relative: R a_1, where a_1 is the acceleration of the point relative to the moving frame.
-        origin: d-dot-dot, the acceleration of the frame's origin.
-    """
+    """Terms of a point's acceleration (7.125), (..., 3), m/s^2 in frame 0; see `point_acceleration`."""
 
     transverse: FloatArray
     centripetal: FloatArray
@@ -172,7 +147,7 @@ def point_position(frame: MovingFrame, p_1: ArrayLike) -> FloatArray:
 
 
 def point_velocity(frame: MovingFrame, p_1: ArrayLike, v_1: ArrayLike = _ZERO) -> VelocityParts:
-    """Return the terms of p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; for v_1 = 0, it is 7.59)."""
+    """Return the terms of p-dot_0 = w x R p_1 + R v_1 + d-dot_01 (7.124; 7.59 if v_1 = 0)."""
     p_0 = eq.rotate(frame.R_0_1, vectors(p_1, "p_1"))
     rotation = eq.tangential(frame.w_0_1, p_0)
     relative = eq.rotate(frame.R_0_1, vectors(v_1, "v_1"))
@@ -195,13 +170,7 @@ def point_acceleration(
 
 
 def interorigin_vector(d: ArrayLike, z: ArrayLike, a: ArrayLike, x: ArrayLike) -> FloatArray:
-    """Return the interorigin vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64), in the frame of `z` and `x`.
-
-    The offset d_i is along the joint's axis z_{i-1}, and the length a_i along the common normal x_i.
-
-    >>> interorigin_vector(0.3, [0.0, 0.0, 1.0], 0.5, [1.0, 0.0, 0.0])
-    array([0.5, 0. , 0.3])
-    """
+    """Return the vector d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64), in the frame of `z` and `x`."""
     vector: FloatArray = eq.interorigin_vector(
         scalars(d, "d"), unit_vectors(z, "z"), scalars(a, "a"), unit_vectors(x, "x")
     )
@@ -219,7 +188,7 @@ def interorigin_velocity(
 ) -> FloatArray:
     """Return the time derivative of the interorigin vector d_{i-1,i}, `d_vector` (7.73, 7.74).
 
-    It is d-dot_{i-1,i} = w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
+    The derivative is w_0i x d_{i-1,i}, plus d-dot_i z for a prismatic joint. If only joint i moves, the
     angular velocity w_0i of link i is w_{i-1,i}, and the equations are 7.66 and 7.67.
     """
     rotation: FloatArray = eq.tangential(vectors(w_0_i, "w_0_i"), vectors(d_vector, "d_vector"))
@@ -230,8 +199,8 @@ def interorigin_velocity(
 def jacobian_column(z: ArrayLike, arm: ArrayLike, turns: bool) -> FloatArray:
     """Return a joint's column of the velocity Jacobian (7.80, 7.85).
 
-    It is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. The moment arm `arm` is the
-    vector d_{i-1,n} (..., 3) from the joint's origin to the endpoint.
+    The column is [z x d_{i-1,n}; z] for a rotary joint and [z; 0] for a prismatic joint. `arm` is the vector
+    d_{i-1,n} (..., 3) from the joint's origin to the endpoint.
     """
     z, arm = np.broadcast_arrays(unit_vectors(z, "z"), vectors(arm, "arm"))
     linear, angular = eq.turning_column(z, arm) if turns else (z, np.zeros_like(z))
@@ -246,31 +215,18 @@ def planar_rotation(theta: ArrayLike) -> FloatArray:
 
 
 def planar_rotation_derivative(theta: ArrayLike) -> FloatArray:
-    """Return dR/dtheta (..., 2, 2) of the rotation matrix in the plane (7.4, figure 7.2).
-
-    Its columns are y1 and -x1, which are the axes x1 and y1 turned by 90 degrees.
-    """
+    """Return dR/dtheta (..., 2, 2) of the rotation matrix in the plane (7.4, figure 7.2)."""
     R = planar_rotation(theta)
     return np.stack((R[..., 1], -R[..., 0]), axis=-1)
 
 
 def link_endpoint(theta: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link of length a that turns about O_0 (7.1, 7.3).
-
-    >>> link_endpoint(np.pi / 2, 2.0).round(12)
-    array([0., 2.])
-    """
+    """Return d_01 = a x1 = R a (1, 0), the endpoint of a link of length a that turns about O_0 (7.1, 7.3)."""
     return scalars(length, "length")[..., np.newaxis] * planar_rotation(theta)[..., 0]
 
 
 def link_endpoint_velocity(theta: ArrayLike, rate: ArrayLike, length: ArrayLike) -> FloatArray:
-    """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7).
-
-    The velocity is tangential to the endpoint's circle, and its magnitude is v = r w.
-
-    >>> link_endpoint_velocity(0.0, 3.0, 2.0) + 0.0
-    array([0., 6.])
-    """
+    """Return the velocity d-dot_01 = a theta-dot y1 of a link's endpoint (7.2, 7.4, 7.7)."""
     speed = scalars(length, "length") * scalars(rate, "rate")
     return speed[..., np.newaxis] * planar_rotation_derivative(theta)[..., 0]
 
@@ -279,7 +235,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
     """Return the velocity of the tool frame from the velocity of frame n.
 
     The linear velocity is d-dot_{0,tool} = d-dot_0n + w x d_{n,tool}, where `d_n_tool` (..., 3) is the vector
-    from O_n to O_tool in frame 0. The angular velocities are equal.
+    from O_n to O_tool in frame 0.
     """
     velocity, d = vectors(velocity, "velocity", 6), vectors(d_n_tool, "d_n_tool")
     linear, w = velocity[..., :3], velocity[..., 3:]
@@ -288,11 +244,7 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of frame n from that of the tool frame (7.115): the inverse of `tool_velocity`.
-
-    >>> frame_velocity([0.0, 1.0, 0.0, 0.0, 0.0, 2.0], [0.5, 0.0, 0.0])
-    array([0., 0., 0., 0., 0., 2.])
-    """
+    """Return the velocity of frame n from that of the tool frame (7.115): the inverse of `tool_velocity`."""
     return tool_velocity(velocity, -vectors(d_n_tool, "d_n_tool"))
 
 
@@ -300,7 +252,7 @@ QUATERNION = "quaternion"
 
 
 def orientation_of(representation: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles or the quaternion of a rotation, which are the orientation part of x."""
+    """Return the Euler angles or the quaternion of a rotation."""
     return quaternion_of(R) if representation == QUATERNION else euler_of(representation, R)
 
 
@@ -319,8 +271,7 @@ def representation_inverse(representation: str, R: ArrayLike, nearest: float = N
     """Return C^-1 with x-dot = C^-1 [d-dot; w] (7.122): 6 by 6, or 7 by 6 for a quaternion.
 
     For a quaternion, C has several right inverses. The function returns the right inverse for which the
-    quaternion's time derivative is perpendicular to the quaternion. The quaternion's length then stays
-    constant. This right inverse has no singularity.
+    quaternion's time derivative is perpendicular to the quaternion.
     """
     if representation == QUATERNION:
         return _blocks(quaternion_rate_matrix(quaternion_of(R)))
@@ -356,7 +307,6 @@ def velocity_of_pose_rates(representation: str, R: ArrayLike, rates: ArrayLike) 
 
 
 def _blocks(lower: FloatArray) -> FloatArray:
-    """Return the block-diagonal matrix of the 3 by 3 identity and `lower`."""
     rows, columns = lower.shape[-2:]
     C = np.zeros((*lower.shape[:-2], 3 + rows, 3 + columns))
     C[..., :3, :3] = np.eye(3)

@@ -145,7 +145,7 @@ def coriolis(w, u):
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration of the link after a joint; w, alpha: those of the link before."""
+    """7.129, rotary: angular acceleration after a joint; w and alpha belong to the link before the joint."""
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 
@@ -191,7 +191,7 @@ def axis_rate(w, z):
 
 
 def turning_column_rate(z, z_rate, d, d_rate):
-    """7.126: the rate of [z x d; z]."""
+    """7.126: time derivative of the Jacobian column [z x d; z] of a rotary joint."""
     return plus(cross(z_rate, d), cross(z, d_rate)), z_rate
 
 

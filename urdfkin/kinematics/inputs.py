@@ -1,7 +1,4 @@
-"""Validation of vectors, matrices and rotations, and conversion to float64 arrays with leading batch axes.
-
-An InputError contains the argument's name.
-"""
+"""Validation of vectors, matrices and rotations, and conversion to float64 arrays with leading batch axes."""
 
 from __future__ import annotations
 
@@ -14,11 +11,11 @@ from urdfkin.system.lazy_import import is_a
 
 FloatArray = NDArray[np.float64]
 
-#: Largest difference between 1 and the norm of a unit vector.
+#: Largest accepted difference between 1 and the norm of a unit vector.
 #: A vector that is normalised in double precision deviates by 4e-16 at most.
-#: A vector with six typed digits deviates by more, so rotation formulas would not give a rotation matrix.
+#: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
 UNIT_TOLERANCE = 1e-12
-#: Largest entry of R R^T - I for a rotation R.
+#: Largest accepted entry of R R^T - I for a rotation matrix R.
 #: If the entries of R are rounded to nine decimals, each has an error of 5e-10 at most.
 #: An entry of R R^T - I is then at most 1e-9 times the sum of the absolute values of a row of R.
 #: The sum of the absolute values of a row is at most sqrt(3).
@@ -30,7 +27,7 @@ _DOUBLE = np.dtype(np.float64)
 
 
 def floats(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as a float64 array; NaN and inf are allowed; other values raise InputError."""
+    """Return real numbers as a float64 array; NaN and inf are allowed."""
     if type(value) is np.ndarray and value.dtype is _DOUBLE:
         return value
     if _is_masked(value):
@@ -48,14 +45,14 @@ def floats(value: ArrayLike, name: str) -> FloatArray:
 
 
 def _is_masked(value: object) -> bool:
-    """Return whether a number is masked; NumPy ignores masks without an error."""
+    """Return whether any element is masked; `np.asarray` ignores the mask of an array."""
     if is_a(value, "numpy.ma:MaskedArray"):
         return bool(np.ma.is_masked(value))
     return isinstance(value, list | tuple) and any(map(_is_masked, value))
 
 
 def scalars(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as a float64 array of any shape; raise InputError if it is not numeric and finite."""
+    """Return finite real numbers as a float64 array of any shape."""
     array = floats(value, name)
     if not np.isfinite(array).all():
         raise InputError(f"{name} must be finite", found=str(array[~np.isfinite(array)][0]))
@@ -63,7 +60,7 @@ def scalars(value: ArrayLike, name: str) -> FloatArray:
 
 
 def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
-    """Return `value` as a finite float64 array (..., size); raise InputError for any other value."""
+    """Return finite vectors (..., size) as a float64 array."""
     array = scalars(value, name)
     if array.ndim < 1 or array.shape[-1] != size:
         raise InputError(f"{name} must have the shape (..., {size})", found=str(array.shape))
@@ -71,7 +68,7 @@ def vectors(value: ArrayLike, name: str, size: int = 3) -> FloatArray:
 
 
 def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> FloatArray:
-    """Return `value` as a finite float64 array (..., rows, columns); raise InputError for any other value."""
+    """Return finite matrices (..., rows, columns) as a float64 array."""
     array = scalars(value, name)
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise InputError(f"{name} must have the shape (..., {rows}, {columns})", found=str(array.shape))
@@ -79,7 +76,6 @@ def matrices(value: ArrayLike, name: str, rows: int = 3, columns: int = 3) -> Fl
 
 
 def unit_vectors(value: ArrayLike, name: str) -> FloatArray:
-    """Return `value` as unit vectors (..., 3); a vector with another norm raises InputError."""
     array = vectors(value, name)
     norms = np.sqrt((array * array).sum(axis=-1))
     if (np.abs(norms - 1.0) > UNIT_TOLERANCE).any():
@@ -102,17 +98,13 @@ def rotations(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotation_defect(R: FloatArray) -> FloatArray:
-    """Return the largest absolute entry (...,) of R R^T - I for matrices (..., 3, 3); inf for a reflection.
-
-    The result is 0 for an exact rotation.
-    """
+    """Return the largest absolute entry of R R^T - I; inf for a reflection or an overflow."""
     with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))
         return np.where((defect >= 0.0) & (determinant(R) > 0.0), defect, np.inf)
 
 
 def determinant(matrix: FloatArray) -> FloatArray:
-    """Return the determinant of matrices (..., 3, 3), three times as fast as with np.cross."""
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrix, (-2, -1), (0, 1))
     triple: FloatArray = (b * f - c * e) * g + (c * d - a * f) * h + (a * e - b * d) * i
     return triple

@@ -1,4 +1,4 @@
-"""LaTeX text of the equations: the functions of `equations` take LaTeX expressions instead of numbers."""
+"""LaTeX text of the textbook's equations; the functions of `equations` run with LaTeX expressions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: Symbols that replace those of `_SYMBOLS` in a function, by the function's name.
+#: For each function of `equations`, the symbols that differ from `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
@@ -46,10 +46,7 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression; `kind` is `_SUM`, `_CROSS`, or `_ATOM` for any other expression.
-
-    A sum needs brackets inside a product, and a cross product needs brackets inside another cross product.
-    """
+    """A LaTeX expression; its `kind` decides whether a larger expression puts it in brackets."""
 
     text: str
     kind: int = _ATOM

@@ -23,7 +23,7 @@ _EASIER, _HARDER = 0.03, 10.0
 _SLOW = 0.99
 #: The iteration ends if a full step would reduce the squared error by at most this fraction.
 _LEAST_REDUCTION = 1e-13
-#: Relative rounding error (eps) of the norm of n residuals is at most this number times n.
+#: The norm of n residuals has a relative rounding error of at most this number times n eps.
 _NORM_ROUNDING = 4.0
 
 
@@ -36,15 +36,11 @@ def least_squares(
     longest: float = math.inf,
     patience: int = 0,
 ) -> tuple[State, float]:
-    """Return the state with the smallest residuals near the initial state, and the norm of these residuals.
+    """Return the state with the smallest residuals near `start`, and the norm of these residuals.
 
-    Args:
-        start: The state from which the iteration starts.
-        residuals: Returns the residuals (rows,) of a state, and intermediate results for `derivatives`.
-        derivatives: Returns the negative derivatives (rows, parameters) of the residuals.
-        move: Returns the state that a step (parameters,) reaches from a state.
-        longest: Largest component of a step.
-        patience: Number of consecutive slow steps that end the iteration; 0 means no limit.
+    `derivatives` returns the negative derivatives (rows, parameters) of the residuals (rows,). `longest`
+    limits each component of a step (parameters,). The iteration ends after `patience` consecutive slow steps;
+    0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

@@ -41,7 +41,7 @@ Length = Any
 
 
 def product(x: Length, y: Length) -> Length:
-    """Return x y of numbers >= 0; at least `SMALLEST` if neither of them is zero.
+    """Return x y for x, y >= 0; the result is at least `SMALLEST` if neither number is zero.
 
     >>> product(1e-200, 1e-200) == SMALLEST, product(0.0, 1e-200), product(np.array([2.0]), 3.0)
     (True, 0.0, array([6.]))
@@ -64,8 +64,8 @@ def counted(x: FloatArray) -> FloatArray:
 
 
 def norm(x: FloatArray) -> FloatArray:
-    """Return the lengths (...) of vectors (..., n). A length is 0 or at least `SMALLEST`."""
-    return counted(np.hypot.reduce(x, axis=-1))  # Squares could underflow or overflow; hypot does not.
+    """Return the lengths (...) of vectors (..., n); a length is 0 or at least `SMALLEST`."""
+    return counted(np.hypot.reduce(x, axis=-1))  # Squares could underflow or overflow, but np.hypot does not.
 
 
 #: The equations with lengths instead of vectors and absolute values instead of numbers; arrays broadcast.

@@ -1,14 +1,6 @@
 """Rotations of rigid bodies, and the time derivatives of rotation matrices, quaternions and Euler angles.
 
-| Functions | Section and equations of the textbook |
-|---|---|
-| `skew`, `unskew`, `rotate_skew` | 7.2: 7.16, 7.31, 7.46; appendix A |
-| `rotation_about`, `axis_angle_of` and others: an axis and an angle | 7.2.1: 7.18 to 7.34 |
-| `rotation_rate`, `angular_velocity_of`, `turning_vector_rate` | 7.2.2: 7.35 to 7.42 |
-| `add_angular_velocities` | 7.2.3: 7.43 to 7.50 |
-| `euler_of`, `euler_rates` and others: Euler angles | 7.2.4: 7.51 to 7.56 |
-| `quaternion_of`, `quaternion_rates` and others: unit quaternions | 7.2.5: 7.57 |
-| `axis_aligning` | 7.4 |
+The module computes equations of section 7.2 of the textbook (7.11 to 7.57).
 
 | Argument | Shape | Meaning |
 |---|---|---|
@@ -21,16 +13,13 @@
 | `name` | | Euler sequence with SciPy's name |
 | `nearest` | | least allowed distance from the singularity of Euler angles, rad |
 
-The dots are a batch shape: arrays of any leading shape are accepted, and results have the same leading shape.
-Functions that take an `ArrayLike` raise InputError for a wrong shape, for a value that is not finite, and for
-a matrix that is not a rotation. An axis or a quaternion whose length is not 1 raises InputError too, and so
-does an unknown `frame`.
+The dots stand for any batch shape; results have the batch shape of the arguments. Functions that take an
+`ArrayLike` raise InputError for a wrong shape, a value that is not finite, a matrix that is not a rotation,
+an axis or a quaternion whose length is not 1, and an unknown `frame`.
 
-A user's matrix often has only a few digits, so its columns are only approximately orthogonal. A conversion to
-a quaternion, a conversion to Euler angles, and Gram-Schmidt on the columns give rotations that differ in the
-last digit of the matrix. `nearest_rotation` and `polar_factor` return the rotation that is nearest to the
-matrix in the Frobenius norm. This rotation is unique: it is the orthogonal factor U of the polar
-decomposition M = U H.
+`nearest_rotation` and `polar_factor` return the rotation that is nearest to a matrix in the Frobenius norm.
+`nearest_rotation` requires small errors; `polar_factor` accepts errors of any size. The nearest rotation is
+unique: it is the orthogonal factor U of the polar decomposition M = U H.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
 quaternion and its negative are the same rotation. Functions with the argument `frame` express the angular
@@ -40,8 +29,9 @@ because the integral of the angular velocity is not an orientation (example 7.3)
 
 Euler angles have 24 sequences. A name has three letters, in the order of the angles. Capital letters are axes
 that turn with the body: "ZYZ" is the textbook's R = Rz Ry Rz. Small letters are fixed axes: "xyz" is the
-URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. The functions for Euler angles express
-angular velocities in the fixed frame 0.
+URDF's rpy (roll, pitch, yaw). An unknown name raises UnknownNameError. A distance of `nearest` or less from
+the singularity raises RepresentationSingularityError. The functions for Euler angles express angular
+velocities in the fixed frame 0.
 """
 
 from __future__ import annotations
@@ -62,13 +52,7 @@ from urdfkin.kinematics.number_kinds import array_equations as eq
 
 
 def skew(w: ArrayLike) -> FloatArray:
-    """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16), for any vector w.
-
-    >>> skew([0.0, 0.0, 1.0]) + 0.0
-    array([[ 0., -1.,  0.],
-           [ 1.,  0.,  0.],
-           [ 0.,  0.,  0.]])
-    """
+    """Return S(w), the skew-symmetric matrix with S(w) p = w x p (7.16)."""
     w = vectors(w, "w")
     S = np.zeros((*w.shape, 3))
     S[..., 2, 1], S[..., 0, 2], S[..., 1, 0] = w[..., 0], w[..., 1], w[..., 2]
@@ -77,14 +61,10 @@ def skew(w: ArrayLike) -> FloatArray:
 
 
 def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the vector w of a skew-symmetric matrix S(w), the inverse of `skew` (7.26, 7.37).
+    """Return the vector w of a skew-symmetric matrix S(w) (7.26, 7.37).
 
-    A computed S has a small symmetric part, caused by rounding. Each component of w is the mean of two
-    entries, S_ij and -S_ji, so the symmetric part has no effect. If an entry of the symmetric part exceeds
-    `tolerance` times the largest entry of S, InputError is raised.
-
-    >>> unskew(skew([1.0, 2.0, 3.0]))
-    array([1., 2., 3.])
+    An entry of the symmetric part of S that exceeds `tolerance` times the largest entry of S raises
+    InputError.
     """
     S = matrices(S, "S")
     size = np.abs(S).max(axis=(-1, -2), initial=0.0)
@@ -98,7 +78,7 @@ def unskew(S: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
 
 
 def rotate_skew(R_0_1: ArrayLike, S_1: ArrayLike) -> FloatArray:
-    """Return S(R w) = R S(w) R^T: change the frame of a skew-symmetric matrix from 1 to 0 (7.46)."""
+    """Return S(R w) = R S(w) R^T, which expresses the skew-symmetric matrix S(w) in frame 0 (7.46)."""
     R_0_1 = rotations(R_0_1, "R_0_1")
     return R_0_1 @ matrices(S_1, "S_1") @ R_0_1.swapaxes(-1, -2)
 
@@ -120,13 +100,7 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant.
-
-    Unlike `nearest_rotation`, it accepts errors of any size, as in a matrix with few digits.
-
-    >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
-    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    """
+    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant."""
     U, _, Vt = np.linalg.svd(M)
     return np.asarray(U @ Vt)
 
@@ -134,16 +108,8 @@ def polar_factor(M: FloatArray) -> FloatArray:
 def axis_aligning(axis: ArrayLike) -> FloatArray:
     """Return a rotation with `axis` as its third column; for the axis z, it is the identity.
 
-    If the axis does not point down (its z component is not negative), the result is the shortest rotation
-    from z to the axis. If the axis points down, the result is half a turn about x, followed by the shortest
-    rotation from -z to the axis. The computation therefore has no singularity near any axis (Duff and others,
-    "Building an Orthonormal Basis, Revisited", 2017). For a coordinate axis the entries are exactly 0 and
-    +-1.
-
-    >>> axis_aligning([1.0, 0.0, 0.0])
-    array([[ 0.,  0.,  1.],
-           [ 0.,  1.,  0.],
-           [-1.,  0.,  0.]])
+    The formula (Duff and others, "Building an Orthonormal Basis, Revisited", 2017) has no singularity. For a
+    coordinate axis, the entries are exactly 0 and +-1.
     """
     axis = unit_vectors(axis, "axis")
     x, y, z = np.moveaxis(axis, -1, 0)
@@ -156,29 +122,23 @@ def axis_aligning(axis: ArrayLike) -> FloatArray:
 
 
 def rotation_rate(R_0_1: ArrayLike, w_0_1: ArrayLike) -> FloatArray:
-    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42), (..., 3, 3), 1/s."""
+    """Return the time derivative R-dot = S(w) R of a rotation matrix (7.38, 7.42)."""
     return skew(vectors(w_0_1, "w_0_1")) @ rotations(R_0_1, "R_0_1")
 
 
 def angular_velocity_of(R_0_1: ArrayLike, R_rate: ArrayLike, tolerance: float = 1e-9) -> FloatArray:
-    """Return the angular velocity w with S(w) = R-dot R^T (7.38); equations 7.35 to 7.37 show that w exists.
+    """Return the angular velocity w with S(w) = R-dot R^T (7.35 to 7.38).
 
-    `R_rate` (..., 3, 3) is the time derivative of `R_0_1`, 1/s; `tolerance` is that of `unskew`.
-
-    >>> R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> angular_velocity_of(R, rotation_rate(R, [1.0, 2.0, 3.0]))
-    array([1., 2., 3.])
+    `R_rate` (..., 3, 3) is the time derivative of `R_0_1` in 1/s; `unskew` defines `tolerance`.
     """
     R_0_1 = rotations(R_0_1, "R_0_1")
     return unskew(matrices(R_rate, "R_rate") @ R_0_1.swapaxes(-1, -2), tolerance)
 
 
 def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
-    """Return the time derivative w x p in frame 0 of a vector p that is fixed in frame 1 (7.39 to 7.41).
+    """Return the time derivative w x p of a vector p that is fixed in frame 1 (7.39 to 7.41).
 
-    Args:
-        w_0_1: (..., 3) angular velocity of frame 1.
-        p_0: (..., 3) the vector p, expressed in frame 0.
+    `p_0` (..., 3) is the vector p, expressed in frame 0.
     """
     return np.cross(vectors(w_0_1, "w_0_1"), vectors(p_0, "p_0"))
 
@@ -186,11 +146,8 @@ def turning_vector_rate(w_0_1: ArrayLike, p_0: ArrayLike) -> FloatArray:
 def add_angular_velocities(Rs: ArrayLike, ws: ArrayLike) -> FloatArray:
     """Return the angular velocity (..., 3) of frame n relative to frame 0, in frame 0 (7.43 to 7.50).
 
-    The result is the sum of the angular velocities of each frame relative to the previous frame.
-
-    Args:
-        Rs: (..., n, 3, 3); entry i is the orientation of frame i + 1 in frame i.
-        ws: (..., n, 3); entry i is the angular velocity of frame i + 1 relative to frame i, in frame i.
+    Entry i of `Rs` (..., n, 3, 3) is the orientation of frame i + 1 in frame i. Entry i of `ws` (..., n, 3)
+    is the angular velocity of frame i + 1 relative to frame i, in frame i.
     """
     Rs, ws = rotations(Rs, "Rs"), vectors(ws, "ws")
     if Rs.ndim < 3 or ws.ndim < 2 or Rs.shape[-3] != ws.shape[-2]:
@@ -211,7 +168,7 @@ NORM_TOLERANCE = 1e-6
 
 
 def unit_quaternions(value: ArrayLike, name: str = "quat") -> FloatArray:
-    """Return normalised quaternions; a norm that differs from 1 by more than 1e-6 raises InputError."""
+    """Normalise quaternions (..., 4) whose norms differ from 1 by at most 1e-6."""
     quat = vectors(value, name, 4)
     norms = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     if (np.abs(norms - 1.0) > NORM_TOLERANCE).any():
@@ -228,13 +185,12 @@ def rotation_of(quat: ArrayLike) -> FloatArray:
 
 
 def quaternion_of(R: ArrayLike) -> FloatArray:
-    """Return the unit quaternion with qw >= 0 of a rotation.
+    """Return the unit quaternion of a rotation, with qw >= 0.
 
     Shepperd's method avoids cancellation: it divides by the component with the largest absolute value.
     """
     R = rotations(R, "R")
-    # The entries of K = 4 q q^T are sums of entries of R (and of 1 on the diagonal).
-    # Each row of K is a multiple of q.
+    # Each row of the matrix K = 4 q q^T is a multiple of the quaternion q.
     K = np.empty((*R.shape[:-2], 4, 4))
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
     K[..., 3, 3] = 1.0 + trace
@@ -258,7 +214,7 @@ def multiply(left: ArrayLike, right: ArrayLike) -> FloatArray:
 
 
 def conjugate(quat: ArrayLike) -> FloatArray:
-    """Return the conjugate (-q, q0) of a quaternion; for a unit quaternion, it is the inverse rotation."""
+    """Return the conjugate (-q, q0); the conjugate of a unit quaternion is the inverse rotation."""
     conjugated: FloatArray = vectors(quat, "quat", 4) * np.array([-1.0, -1.0, -1.0, 1.0])
     return conjugated
 
@@ -270,8 +226,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
     """Return the matrix E (..., 4, 3) in (q-dot, q0-dot) = E w (7.57).
 
     For w in the fixed frame, E = 1/2 [q0 I - S(q); -q^T]. For w in the body's frame, the sign of S(q)
-    changes. The columns of E have length 1/2. The columns are perpendicular to each other and to the
-    quaternion, so the quaternion's length is constant.
+    changes. The columns of E have length 1/2, and are perpendicular to each other and to the quaternion.
     """
     if frame not in ("fixed", "body"):
         raise InputError("frame must be 'fixed' or 'body'", found=repr(frame))
@@ -283,11 +238,7 @@ def quaternion_rate_matrix(quat: ArrayLike, frame: ExpressedIn = "fixed") -> Flo
 
 
 def quaternion_rates(quat: ArrayLike, w: ArrayLike, frame: ExpressedIn = "fixed") -> FloatArray:
-    """Return the time derivative (..., 4) of a body's quaternion from the body's angular velocity w (7.57).
-
-    >>> quaternion_rates([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 2.0]) + 0.0
-    array([0., 0., 1., 0.])
-    """
+    """Return the time derivative (..., 4) of a body's quaternion from its angular velocity w (7.57)."""
     return (quaternion_rate_matrix(quat, frame) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
@@ -305,19 +256,11 @@ def angular_velocity_from_quaternion_rates(
 def integrate_orientation(
     w: Callable[[float], ArrayLike], quat: ArrayLike, times: ArrayLike, frame: ExpressedIn = "fixed"
 ) -> FloatArray:
-    """Return the quaternions (n, ..., 4) at n `times`, by the fourth-order Runge-Kutta method for 7.57.
+    """Integrate 7.57 by the fourth-order Runge-Kutta method; return quaternions (n, ..., 4).
 
-    The method makes one step from each time to the next. The exact quaternion has constant length. Rounding
-    and truncation errors change the length, so the quaternion is normalised after each step. If the step is
-    halved, the truncation error is divided by about 16.
-
-    Args:
-        w: Returns the angular velocity (..., 3) at a time. The angular velocity must be smooth within a step,
-            so add a time to `times` at each jump. At the start and the end of a step, w is evaluated slightly
-            inside the step.
-        quat: (..., 4) orientation at the first time.
-        times: (n,) increasing times, s.
-        frame: Frame of the angular velocity.
+    `w` returns the angular velocity (..., 3) at a time in s, and `quat` is the orientation at the first of
+    the n increasing `times`. The angular velocity must be smooth within a step, so `times` must contain each
+    jump. At both ends of a step, `w` is evaluated slightly inside the step.
     """
     times = scalars(times, "times")
     if times.ndim != 1 or (np.diff(times) <= 0.0).any():
@@ -347,30 +290,24 @@ def _step(
 
 
 def _rates(quat: FloatArray, w: FloatArray, frame: ExpressedIn) -> FloatArray:
-    """Return the rates of a quaternion of any length, because 7.57 is linear in the quaternion."""
+    """Return the rates of a quaternion of any length; equation 7.57 is linear in the quaternion."""
     length = np.sqrt((quat * quat).sum(axis=-1, keepdims=True))
     rates: FloatArray = length * quaternion_rates(quat / length, w, frame)
     return rates
 
 
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28).
-
-    >>> rotation_about([0.0, 0.0, 1.0], np.pi / 2).round(15) + 0.0
-    array([[ 0., -1.,  0.],
-           [ 1.,  0.,  0.],
-           [ 0.,  0.,  1.]])
-    """
+    """Return R_k(phi) = I cos(phi) + k k^T (1 - cos(phi)) + S(k) sin(phi), Rodrigues' formula (7.28)."""
     axis = unit_vectors(axis, "axis")
     angle = scalars(angle, "angle")[..., np.newaxis, np.newaxis]
-    # The versine is 1 - cos(phi); this formula has no cancellation at small angles.
+    # For small angles phi, this formula of the versine 1 - cos(phi) has no cancellation.
     versine = 2.0 * np.sin(angle / 2.0) ** 2
     outer = axis[..., :, np.newaxis] * axis[..., np.newaxis, :]
     return np.eye(3) * np.cos(angle) + outer * versine + skew(axis) * np.sin(angle)
 
 
 def rotation_about_derivative(axis: ArrayLike, angle: ArrayLike) -> FloatArray:
-    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.33; 7.29 states its terms)."""
+    """Return the derivative dR_k(phi)/dphi = S(k) R_k(phi), per radian (7.29, 7.33)."""
     return skew(axis) @ rotation_about(axis, angle)
 
 
@@ -385,14 +322,14 @@ def circular_velocity(axis: ArrayLike, rate: ArrayLike, p: ArrayLike) -> FloatAr
 
 
 def split_along(axis: ArrayLike, p: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return the component k (k . p) of p along the axis k, and the rest, perpendicular to k (7.18)."""
+    """Return the components of p parallel and perpendicular to the axis k (7.18)."""
     axis, p = unit_vectors(axis, "axis"), vectors(p, "p")
     along = axis * (axis * p).sum(axis=-1, keepdims=True)
     return along, p - along
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
-    """Return the rotation R_k(phi) of the rotation vector phi k, without a division by phi."""
+    """Return the rotation of the rotation vector phi k; the angle phi may be 0."""
     vector = vectors(rotation_vector, "rotation_vector")
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., np.newaxis, np.newaxis]
     S = skew(vector)
@@ -403,25 +340,18 @@ def exp_rotation(rotation_vector: ArrayLike) -> FloatArray:
 
 
 def log_rotation(R: ArrayLike) -> FloatArray:
-    """Return the rotation vector phi k of a rotation, with phi in [0, pi].
-
-    The result is accurate for every angle, also near 0 and near pi. At phi = pi, k and -k are both correct,
-    and the function returns either of them.
-    """
+    """Return the rotation vector phi k, with phi in [0, pi]; for phi = pi, k may have either sign."""
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # The squares of tiny components lose digits, so phi k is then computed as 2 `vector`.
+    # Squares of tiny components lose digits, so the rotation vector is then computed as 2 times `vector`.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
 
 def axis_angle_of(R: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axis k and the angle phi in [0, pi] of a rotation, the inverse of `rotation_about`.
-
-    The identity has no unique axis; the z axis is returned for it.
-    """
+    """Return the unit axis k and the angle phi in [0, pi]; for the identity, the axis is z."""
     quat = quaternion_of(R)
     vector, scalar = quat[..., :3], quat[..., 3]
     sine = np.sqrt((vector * vector).sum(axis=-1))
@@ -440,14 +370,9 @@ SEQUENCES = (*(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 class Sequence:
     """The axes of an Euler sequence; the index 0 is x, 1 is y, 2 is z.
 
-    Attributes:
-        first: Index of the first body-fixed axis.
-        second: Index of the second body-fixed axis.
-        third: Index of the third body-fixed axis; in a proper Euler sequence it is equal to `first`.
-        other: The index that is neither the first nor the second.
-        sign: +1 if (first, second, other) is right-handed, else -1.
-        fixed: Whether the sequence with this name rotates about axes that are fixed in space. Then the angles
-            are in the reverse order of the body-fixed axes.
+    The axes `first`, `second` and `third` turn with the body. The axis `other` is neither the first nor the
+    second axis. The sign is +1 if (first, second, other) is right-handed, else -1. If `fixed` is true, the
+    name lists axes that are fixed in space, in the reverse order of the body's axes.
     """
 
     name: str
@@ -460,11 +385,11 @@ class Sequence:
 
     @property
     def proper(self) -> bool:
-        """Whether the first and the third axis have the same index, as in ZYZ."""
+        """Whether the first and the third axis are the same, as in ZYZ."""
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Return angles or rates in the order of the body-fixed axes; a second call restores their order."""
+        """Convert between the order of the name and the order of the body-fixed axes."""
         return values[..., ::-1] if self.fixed else values
 
 
@@ -485,7 +410,7 @@ def _sequence(name: str) -> Sequence:
 
 
 def coordinate_rotation(axis: int, angle: FloatArray) -> FloatArray:
-    """Return the rotation Rx, Ry or Rz (axis 0, 1 or 2); the constant entries are exactly 0 and 1."""
+    """Return Rx, Ry or Rz (axis 0, 1 or 2); its constant entries are exactly 0 and 1."""
     angle = np.asarray(angle)
     R = np.zeros((*angle.shape, 3, 3))
     j, k = (axis + 1) % 3, (axis + 2) % 3
@@ -509,12 +434,12 @@ def rotation_from_euler(name: str, angles: ArrayLike) -> FloatArray:
 
 
 def euler_of(name: str, R: ArrayLike) -> FloatArray:
-    """Return the Euler angles of a rotation. Up to rounding, this is the inverse of `rotation_from_euler`.
+    """Return the Euler angles of a rotation.
 
     The middle angle is in [0, pi] for a proper sequence such as ZYZ and in [-pi/2, pi/2] for the others. At
     the representational singularity, only the sum or the difference of the first and the third angle is
-    determined. The third angle is then computed from the first angle, so that the product of the three
-    rotations is correct.
+    determined. The third angle is computed from the first angle, so that the product of the three rotations
+    is correct.
     """
     axes = sequence(name)
     R = rotations(R, "R") + 0.0  # Adding 0 turns -0 into 0, because arctan2(0, -0) would be pi.
@@ -525,29 +450,26 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # Row `j` (the second axis) of R_first^T R = R_second R_third depends only on the third angle.
+    # Let R = F S T with the rotations F, S, T about the three axes. Row `j` of S T is row `j` of T.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
-    # Two entries of row `j` are not 0: those of the second axis and of the axis `rest`.
+    # Only two entries of row `j` are not 0: the entries of the second axis and of the axis `rest`.
     rest, sense = (m, sign) if axes.proper else (i, -sign)
     third = np.arctan2(-sense * row[..., rest], row[..., j])
     return axes.turning(np.stack((first, second, third), axis=-1)).copy()
 
 
 def rotation_from_rpy(rpy: ArrayLike) -> FloatArray:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll), the URDF's `rpy`; it is exactly the identity for zero angles."""
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), the rotation of the URDF's `rpy`."""
     return rotation_from_euler("xyz", rpy)
 
 
 def rpy_of(R: ArrayLike) -> FloatArray:
-    """Return roll, pitch and yaw of a rotation; the yaw is 0 if R[0, 0] = R[1, 0] = 0 exactly.
-
-    The angles are accurate at a pitch of +-pi/2 too (see `euler_of`).
-    """
+    """Return roll, pitch and yaw of a rotation; the yaw is 0 if R[0, 0] = R[1, 0] = 0 exactly."""
     return euler_of("xyz", R)
 
 
-#: Least distance (rad) from the singularity at which Euler angle rates still have enough digits.
+#: At this distance (rad) or less from the singularity, Euler angle rates are not computed.
 NEAREST = 1e-9
 
 
@@ -555,11 +477,6 @@ def euler_rate_matrix(name: str, angles: ArrayLike) -> FloatArray:
     """Return the matrix Omega (..., 3, 3) in w = Omega (phi-dot, theta-dot, psi-dot) (7.51 to 7.55).
 
     The columns of Omega are the axes of the three rotations, in frame 0.
-
-    >>> euler_rate_matrix("ZYZ", [0.0, np.pi / 2, 0.3]).round(15) + 0.0
-    array([[0., 0., 1.],
-           [0., 1., 0.],
-           [1., 0., 0.]])
     """
     axes = sequence(name)
     turns = axes.turning(vectors(angles, "angles"))
@@ -577,10 +494,7 @@ def angular_velocity_from_euler_rates(name: str, angles: ArrayLike, rates: Array
 
 
 def euler_rates(name: str, angles: ArrayLike, w: ArrayLike, nearest: float = NEAREST) -> FloatArray:
-    """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56).
-
-    A distance of `nearest` or less from the singularity raises RepresentationSingularityError.
-    """
+    """Return the rates Omega^-1 w of a body's Euler angles from its angular velocity w (7.56)."""
     return (euler_rate_inverse(name, angles, nearest) @ vectors(w, "w")[..., np.newaxis])[..., 0]
 
 
@@ -589,8 +503,7 @@ def euler_rate_inverse(name: str, angles: ArrayLike, nearest: float = NEAREST) -
 
     In the frame after the first rotation, the first and the second axis are coordinate axes, and the third
     axis has no component along the second axis. One component of w then gives the third rate, and the other
-    two components give the first and the second rate. A distance of `nearest` or less from the singularity
-    raises RepresentationSingularityError.
+    two components give the first and the second rate.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, nearest)
@@ -625,11 +538,9 @@ def singularity_distance(name: str, angles: ArrayLike) -> FloatArray:
 def euler_condition(name: str, angles: ArrayLike) -> FloatArray:
     """Return the condition number of Omega; it is 1 if the three axes are perpendicular to each other.
 
-    The condition number is the largest factor by which the relative error of the rates exceeds the relative
-    error of the angular velocity w. The middle axis is perpendicular to the first and to the third axis. Let
-    d be the angle between the first and the third axis. The singular values of Omega are then 1 and
-    sqrt(1 +- cos d), and its condition number is cot(d / 2). At the singularity, no condition number exists,
-    and the function raises RepresentationSingularityError.
+    The middle axis is perpendicular to the first and to the third axis. Let d be the angle between the first
+    and the third axis. The singular values of Omega are then 1 and sqrt(1 +- cos d), and its condition number
+    is cot(d / 2). At the singularity, the function raises RepresentationSingularityError.
     """
     angles = vectors(angles, "angles")
     _refuse_singular(name, angles, 0.0)

@@ -218,9 +218,9 @@ SINGLE_POLYNOMIAL = 1.0
 #: The standard deviation of the difference is 2.4, so 13.7 is nearly six standard deviations.
 CONSTANT = 13.7
 #: Error (in eps) of the directions of two joint axes.
-#: Dividing an axis by its length has an error of 0.5; rotating an axis by Rodrigues' formula has one of 2.0.
+#: The division of an axis by its length has an error of 0.5, and Rodrigues' formula has an error of 2.0.
 AXES = 5.0
-#: Error (in eps) of each joint that is caused by the program that wrote the file.
+#: Error (in eps) that the program that wrote the file causes for each joint.
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
 #: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
 #: Roll and pitch both tilt an axis, so the error of 22.5 eps counts twice; yaw does not tilt the axis.
@@ -255,7 +255,7 @@ MIMIC_LIMIT = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
-    """Return the difference (in eps) that two readers of one URDF may have, for each factor of a term.
+    """Return the allowed difference (in eps) between urdfkin and Pinocchio, for each factor of a term.
 
     `joints` is the number of joints on the path. `tilt` is the sum over these joints of the angle (radians)
     between Pinocchio's axis and the file's axis.

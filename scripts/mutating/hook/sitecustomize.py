@@ -2,9 +2,9 @@
 
 This file is in a folder on PYTHONPATH, so that each Python process of a test run loads it at its start.
 
-`URDFKIN_MUTANT` is the module's name and the mutant's number, `urdfkin.validation.error_stats:17`.
-`URDFKIN_MUTANT` can also be only the module's name. `URDFKIN_MUTANT_TEXTS` then contains the text and its
-replacement, as JSON.
+`URDFKIN_MUTANT` is the module's name and the mutant's number, for example
+`urdfkin.validation.error_stats:17`. Without a number, `URDFKIN_MUTANT_TEXTS` contains a text of the module
+and its replacement, as JSON.
 """
 
 import importlib.abc

@@ -1,15 +1,9 @@
 """Compile kernels with Numba and cache them on disk.
 
-Cache. Each computer compiles a kernel once. The name of the cache folder contains a digest of all source
-files of `compiled` and `kinematics`, because a kernel may use functions of any of these files. Numba's own
-cache files have no digest: a truncated file makes every later run fail, and Numba executes a file with a
-changed bit. This module therefore writes a digest into each cache file. If a cache file is damaged, its
-kernel is compiled again. If no folder is writable, nothing is cached.
-
-Inlined functions. Only kernels call an inlined function; Python never calls it. The compiler inserts the
-function's code into each kernel. An inlined function therefore needs no machine code of its own, and no
-separate optimization. It has no closures and no array expressions, so the compiler passes for these features
-are skipped too. Skipping these steps halves the compile time.
+The name of the cache folder contains a digest of all source files of `compiled` and `kinematics`, because a
+kernel may use functions of any of these files. Numba's own cache files have no digest: a truncated file makes
+every later run fail, and Numba executes a file with a changed bit. This module therefore writes a digest into
+each cache file. If a cache file is damaged, its kernel is compiled again.
 """
 
 from __future__ import annotations
@@ -39,25 +33,19 @@ from urdfkin.compiled.kernel_cache import cache_folder, compile_event, compiling
 from urdfkin.system.cache import get, put, report_damaged
 from urdfkin.system.files import read_bytes
 
-_Null: Any = NullCache  # Numba has no types.
+_Null: Any = NullCache  # Numba has no type annotations.
 _Result: Any = CompileResult
 _dumps: Any = dumps
 
 
 class KernelCache(_Null):  # type: ignore[misc]
-    """The disk cache of one function. Numba reads the cache before a compilation and writes it afterwards.
-
-    The folder's name contains a digest of the source files that all kernels share. A file's name depends on
-    the function, its source file, its argument types and the processor. The source file may be in another
-    package. If the cache has no usable file, the function `begin` is called before the compilation.
-    """
+    """The disk cache of one function; Numba reads it before a compilation and writes it afterwards."""
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
         self._folder, self._name, self._begin = folder, function_name(function), begin
         self._source = read_bytes(Path(function.__code__.co_filename))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function for these argument types from the cache, or None."""
         target_context.refresh()
         place = self._place(sig, target_context.codegen())
         if (content := get(place)) is not None:
@@ -80,11 +68,10 @@ class KernelCache(_Null):  # type: ignore[misc]
 
 
 def function_name(function: Callable[..., int]) -> str:
-    """Return the last part of the name of a function's module, followed by the function's name."""
     return f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
 
-_Library: Any = JITCodeLibrary  # Numba has no types.
+_Library: Any = JITCodeLibrary  # Numba has no type annotations.
 _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = CompilerBase
 _Passes: Any = PassManager
@@ -92,16 +79,13 @@ _register: Any = register_pass
 
 
 class _InlinedLibrary(_Library):  # type: ignore[misc]
-    """LLVM code of an inlined function."""
-
     def finalize(self) -> None:
-        """Mark the library as complete, but do not generate machine code."""
+        """Mark the library as complete without generating machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
     @property
     def all(self) -> list[Any]:
-        """The LLVM libraries of this function and of all functions that it calls."""
         return [self, *dict.fromkeys(self._linking_libraries)]
 
 
@@ -114,7 +98,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
         state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba needs a Python entry point as the key of a compiled function; this empty one is never called.
+        # Numba uses a Python function as the key of a compiled function, and never calls this function.
         what, environment = state.cr.fndesc, state.cr.env
         handle = make_function(what.lookup_module(), what.qualname, "", 0, environment, (state.library,))
         state.targetctx.insert_user_function(handle, what, state.library.all)
@@ -123,7 +107,7 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
 
 
 class InlinedCompiler(_Compiler):  # type: ignore[misc]
-    """A compiler that runs only the passes of Numba that inlined functions need."""
+    """A compiler that produces LLVM code for kernels to inline, and no machine code."""
 
     def define_pipelines(self) -> list[Any]:
         passes = _Passes("inlined")
@@ -148,13 +132,11 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time.
 
-#: Options of every compiled function.
 #: Without fast math, the compiler neither reorders nor fuses operations; the module `numbers` fuses some.
 #: Results therefore do not depend on the compiler.
 #: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
 #: The functions allocate no memory, so their arrays need no reference counts.
 COMPILED: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
-#: Options of an inlined function, which has no entry point for Python or C.
 _INLINED: dict[str, Any] = {
     "forceinline": True,
     "no_cpython_wrapper": True,
@@ -174,11 +156,9 @@ def compiling_allowed() -> Iterator[None]:
 
 
 def _skip_blas_check() -> None:
-    """Prevent Numba from importing SciPy only to check that its linear algebra is available.
+    """Prevent Numba from importing SciPy only to check that linear algebra is available.
 
-    The import takes a fifth of the running time of a command, and no kernel calls linear algebra. For other
-    compiled functions that call linear algebra, Numba still imports and checks SciPy. If a version of Numba
-    makes this check in a different function, `_skip_blas_check` has no effect.
+    For other compiled functions that call linear algebra, Numba still imports and checks SciPy.
     """
     if "numba.np.arraymath" in sys.modules or find_spec("scipy") is None:
         return
@@ -192,8 +172,6 @@ def _skip_blas_check() -> None:
 
 
 def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return Numba's decorator for compiled functions; `options` are added to this package's options."""
-
     def decorate(function: Callable[..., Any]) -> Any:
         with compiling_allowed():
             return numba.njit(**options, **COMPILED)(function)
@@ -201,7 +179,6 @@ def jitted(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-#: Decorator of an inlined function.
 compiled = jitted(**_INLINED)
 
 # A read-only argument type also accepts a writable array, without a copy.
@@ -239,7 +216,6 @@ class Kernel:
         return dispatcher
 
     def _compile_or_load(self, function: Any, compile_: Callable[[], object]) -> None:
-        """Read the function from disk, or compile it and inform the listeners."""
         with compile_event(self.__name__.strip("_").replace("_", " ")) as begin, compiling_allowed():
             _skip_blas_check()
             if (folder := cache_folder()) is None:
@@ -253,11 +229,7 @@ class Kernel:
 
 
 class Core(Kernel):
-    """A compiled function that C code can call; its arguments are integers, such as addresses.
-
-    Kernels call this function directly. Python calls it through ctypes, which releases Python's global
-    interpreter lock.
-    """
+    """A compiled function of integers for callers in C; calls from Python release the interpreter lock."""
 
     def __init__(self, function: Callable[..., int]) -> None:
         super().__init__(function, (types.int64,) * function.__code__.co_argcount, nogil=True)
@@ -276,14 +248,9 @@ class Core(Kernel):
 
 
 def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator for an inlined function, with additional options for Numba."""
     return jitted(**_INLINED, **options)
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator for a kernel with these argument types (Numba's).
-
-    The kernel is compiled at the first call and cached on disk. `nogil` says whether a call releases Python's
-    global interpreter lock. For a call of a microsecond, releasing the lock costs more time than it saves.
-    """
+    """Return a decorator for a kernel with these Numba types of arguments."""
     return lambda function: Kernel(function, arguments, nogil)

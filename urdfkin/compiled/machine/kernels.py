@@ -1,8 +1,7 @@
 """The compiled recursions, one for each function of the module `recursions`.
 
-For a batch, a kernel computes eight configurations at a time, one in each of the eight lanes of a vector
-register. For a single configuration, the same kernel computes the same numbers in all eight lanes. A
-configuration therefore has exactly the same result in a batch as in a call with only this configuration.
+A kernel computes eight configurations at a time, one in each of the eight lanes of a vector register. A
+single configuration is computed in all eight lanes, so its result is exactly the same as in a batch.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
-"""Transfer of numbers between arrays in memory and scratch memory, eight configurations at a time.
+"""Transfer of numbers between arrays and scratch memory, eight configurations at a time.
 
-Scratch memory consists of *rows* of `LANES` doubles, one double for each configuration of a block.
-
-In an array, all numbers of one configuration are adjacent. In scratch memory, a row contains one quantity for
-all eight configurations. The transfer is therefore a transposition. If the numbers were moved one at a time,
-the transposition would take a third of the time of computing a Jacobian. Transposing a block of eight by
-eight numbers takes only a few shuffle instructions. If the number of values is not a multiple of eight, the
-remaining values are transferred in blocks of four, two and one.
+In an array, all numbers of one configuration are adjacent. Scratch memory consists of rows of `LANES`
+doubles; a row contains one quantity for all eight configurations. The transfer is therefore a transposition.
+Shuffle instructions transpose blocks of eight, four, two or one numbers of each configuration.
 """
 
 from __future__ import annotations
@@ -29,12 +25,10 @@ NUMBERS, WHOLE_NUMBERS = types.CPointer(types.float64), types.CPointer(types.int
 
 
 def _vector_at(builder: Any, numbers: Any, at: Any, width: int) -> Any:
-    """Return the address of `width` numbers that begin at `numbers[at]`."""
     return builder.bitcast(builder.gep(numbers, [at]), ir.VectorType(ir.DoubleType(), width).as_pointer())
 
 
 def _in_row(builder: Any, s: Any, row: Any) -> Any:
-    """Return the address of the eight doubles of a row of scratch memory."""
     return _vector_at(builder, s, builder.mul(row, ir.Constant(row.type, LANES)), LANES)
 
 
@@ -86,10 +80,7 @@ def same(context: Any, x: Any) -> Any:
 
 @intrinsic
 def numbers_of(context: Any, array: Any) -> Any:
-    """Return a pointer to an array's numbers.
-
-    An index into a pointer must not be negative, so compiled code need not test the sign of the index.
-    """
+    """Return a pointer to an array's numbers; an index into the pointer must not be negative."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -117,13 +108,12 @@ _MOST_FETCHED = 3072
 
 
 def _piece(builder: Any, vector: Any, start: int, width: int) -> Any:
-    """Return `width` consecutive elements of a vector, beginning with the element `start`."""
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(start, start + width)))
     return builder.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), mask)
 
 
 def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
-    """Concatenate vectors of equal length. The number of vectors must be a power of two."""
+    """Concatenate vectors of equal length; the number of vectors must be a power of two."""
     while len(pieces) > 1:
         width = 2 * pieces[0].type.count
         mask = ir.Constant(ir.VectorType(ir.IntType(32), width), list(range(width)))
@@ -132,12 +122,7 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose each square block of numbers in the matrix whose rows are the given vectors.
-
-    For example, four vectors of eight numbers contain two blocks of 4 by 4 numbers. The function transposes
-    blocks of 2 by 2 numbers first, then, for enough vectors, blocks of 4 by 4 and of 8 by 8. To transpose a
-    larger block, the function exchanges the block's upper right quarter with the lower left quarter.
-    """
+    """Transpose each square block of numbers in the matrix whose rows are the given vectors."""
     x, w = list(vectors), 1
     while w < len(x):
         for i in range(len(x)):
@@ -155,7 +140,7 @@ def _plus(builder: Any, number: Any, constant: int) -> Any:
 
 
 def _make_reader(width: int) -> Any:
-    """Return a function that reads `width` numbers for each of eight configurations into scratch rows."""
+    """Return a function that reads `width` numbers of each of eight configurations into scratch rows."""
 
     @intrinsic
     def read(context: Any, x: Any, at: Any, stride: Any, s: Any, row: Any) -> Any:
@@ -176,7 +161,7 @@ def _make_reader(width: int) -> Any:
 
 
 def _make_writer(width: int) -> Any:
-    """Return a function that copies `width` rows of scratch memory, for eight configurations, to an array."""
+    """Return a function that writes `width` scratch rows of eight configurations to an array."""
 
     @intrinsic
     def write(context: Any, s: Any, rows: Any, first: Any, to: Any, at: Any, stride: Any) -> Any:
@@ -204,11 +189,7 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 @compiled
 def read_rows(m, x, at, stride, count, s, row):
-    """Read `count` numbers of each of eight configurations into rows of scratch memory.
-
-    The numbers of configuration k begin at `x[at + k * stride]`. If `m` is 1, only the first configuration is
-    read, and its numbers are used for all eight.
-    """
+    """Read `count` numbers of each of eight configurations; if `m` is 1, all eight are equal."""
     i = 0
     if m == 1:
         for i in range(count):
@@ -229,11 +210,7 @@ def read_rows(m, x, at, stride, count, s, row):
 
 @compiled
 def write_rows(m, s, rows, first, count, to, at, stride):
-    """Write `count` rows of scratch memory to the array `to`, from `to[at]` on.
-
-    The indices of these rows are `rows[first]`, `rows[first + 1]` and so on. If `m` is 1, only one
-    configuration is written, else eight.
-    """
+    """Write `count` scratch rows to the array `to`; if `m` is 1, write only one configuration."""
     i = 0
     if m == 1:
         for i in range(count):
@@ -254,7 +231,7 @@ def write_rows(m, s, rows, first, count, to, at, stride):
 
 @intrinsic
 def _fetch(context: Any, x: Any, at: Any) -> Any:
-    """Load the memory around `x[at]` into the cache. An address beyond the end of the array is harmless."""
+    """Load the memory around `x[at]` into the cache; an address beyond the array is harmless."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), ir.IntType(8).as_pointer())
@@ -270,7 +247,6 @@ def _fetch(context: Any, x: Any, at: Any) -> Any:
 
 @compiled
 def fetch(x, at, count):
-    """Load `count` inputs of the next block of configurations, which begin at `x[at]`, into the cache."""
     if count <= _MOST_FETCHED:
         for number in range(at, at + count, LANES):
             _fetch(x, number)
@@ -298,11 +274,10 @@ def _plus_squares(total, x, at):
 
 @compiled
 def add_squares(total, x, at, count):
-    """Add to `total` the squares of `count` numbers that begin at `x[at]`; load later numbers into the cache.
+    """Add to `total` the squares of `count` numbers that begin at `x[at]`.
 
-    The function adds eight numbers at once. If `count` is not a multiple of eight, each remaining number is
-    added to all eight partial sums. This has no effect, because the sum is only compared with a very large
-    bound.
+    If `count` is not a multiple of eight, each remaining number is added to all eight partial sums. This is
+    harmless, because the sum is only compared with a very large bound.
     """
     # Four independent sums take a quarter of the time, because additions to one sum wait for each other.
     second, third, fourth = same(0.0), same(0.0), same(0.0)
@@ -352,7 +327,7 @@ def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
     A processor reads a cache line before it writes a part of the line, but not before it writes the whole
-    line. `address` is the address of `to[0]`.
+    line.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

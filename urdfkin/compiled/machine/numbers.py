@@ -1,16 +1,13 @@
 """Number types for compiled code: a value of such a type is one double or a vector of doubles.
 
 A value of type `Lanes(8)` is eight doubles in one vector register, and a value of type `Lanes(1)` is one
-double. Both are Numba types that use LLVM's vectors, so a value stays in a register from one equation to the
-next. A product x y is stored as two factors, and multiplied only when it is needed. In the sum x y + z, the
+double. A product x y is stored as two factors, and multiplied only when it is needed. In the sum x y + z, the
 product and the sum are one fused multiply-add, which is rounded only once. This module, and not the compiler,
 decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same
 doubles, on every machine.
 
-`zero()` and `one()` are the numbers 0 and 1, known at compile time. A product with one of these numbers, or a
-sum with zero, costs no time. If the axis is `(zero(), zero(), one())`, the compiler therefore simplifies the
-equations for any axis to those for the z axis. `nothing()` stands for a number that is not needed. A result
-computed from `nothing()` is also `nothing()` and costs no time.
+`zero()` and `one()` are the numbers 0 and 1, known at compile time. `nothing()` is the placeholder for a
+number that is not needed. Operations with these constants are simplified at compile time.
 """
 
 from __future__ import annotations
@@ -31,18 +28,14 @@ _DOUBLE = ir.DoubleType()
 
 
 class Lanes(types.Type):
-    """The type of a vector of `width` doubles."""
-
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"Lanes({width})")
 
     def can_convert_from(self, context: Any, other: Any) -> Any:
-        """Return Numba's code for the conversion from a `Product` of the same width, else None."""
         return Conversion.safe if isinstance(other, Product) and other.width == self.width else None
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return this type if the type `other` is a `Product` with the same number of doubles, else None."""
         return self if isinstance(other, Product) and other.width == self.width else None
 
 
@@ -54,7 +47,6 @@ class Product(types.Type):
         super().__init__(name=f"Product({width})")
 
     def unify(self, context: Any, other: Any) -> Any:
-        """Return `other` if it is a `Lanes` type of the same width, else None."""
         return other if isinstance(other, Lanes) and other.width == self.width else None
 
 
@@ -106,7 +98,6 @@ class _Value:
         return pair.x, pair.y
 
     def number(self, width: int) -> Any:
-        """Return the number as an LLVM vector. The factors of a `Product` are multiplied."""
         if self.is_product:
             return self.builder.fmul(*self.factors())
         if isinstance(self.type, Known):
@@ -117,7 +108,6 @@ class _Value:
 
 
 def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
-    """Return an LLVM vector of `width` copies of a double."""
     empty = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
     first = builder.insert_element(empty, double, ir.Constant(ir.IntType(32), 0))
     mask = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
@@ -125,7 +115,6 @@ def in_all_lanes(builder: Any, double: Any, width: int) -> Any:
 
 
 def fused(builder: Any, x: Any, y: Any, z: Any) -> Any:
-    """Return `x y + z`, which is rounded only once."""
     function = builder.module.globals.get(name := f"llvm.fma.v{x.type.count}f64")
     if function is None:
         function = ir.Function(builder.module, ir.FunctionType(x.type, [x.type] * 3), name)
@@ -141,7 +130,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether all types are integers or types of this module, and at least one is no integer."""
+    """Return whether all types are integers or types of this module, but not only integers."""
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)
@@ -224,7 +213,7 @@ def _lower_mul(context: Any, builder: Any, signature: Any, arguments: Any) -> An
 
 
 def as_number(context: Any, builder: Any, kind: Any, value: Any, width: int) -> Any:
-    """Return a number as an LLVM vector; it must not be `nothing()`."""
+    """Return a number, which must not be `nothing()`, as an LLVM vector."""
     return _Value(context, builder, kind, value).number(width)
 
 
@@ -238,7 +227,7 @@ def _negate(context: Any, builder: Any, x: _Value) -> Any:
 
 
 def _lower_sum(*, negative: bool) -> Callable[..., Any]:
-    """Return the code generator of x + y, or of x - y if `negative` is true."""
+    """Return the function that generates the code for x + y, or for x - y if `negative` is true."""
 
     def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def signed(value: Any) -> Any:
@@ -299,8 +288,6 @@ zero, one, nothing = map(_known_number, (ZERO, ONE, NOTHING))
 
 @intrinsic
 def rounded(context: Any, x: Any) -> Any:
-    """Multiply the factors of a product and round the result; return other numbers unchanged."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if not isinstance(x, Product):
             return arguments[0]

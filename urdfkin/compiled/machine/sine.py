@@ -2,11 +2,11 @@
 
 Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the rest is in [-pi/4, pi/4]. The
 rounding error of this subtraction is computed too. The polynomials come from fdlibm (Sun Microsystems,
-k_sin.c and k_cos.c). For angles below 2^20 quarter turns, pi/2 is represented by the sum of two doubles. Two
-doubles are enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the
-cosine is near 0, and this small value has an error of up to 1e-27. The sine and the cosine of a larger angle
-are computed by the C library. Only the large angles of a vector use the C library. Otherwise, the result of a
-configuration would depend on the other configurations in the vector.
+k_sin.c and k_cos.c). For angles below 2^20 quarter turns, pi/2 is the sum of two doubles. Two doubles are
+enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the cosine is
+near 0, and this small value has an error of up to 1e-27. The C library computes the sine and the cosine of a
+larger angle, but not of the other angles in the vector, so that a result does not depend on other
+configurations.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def sine_cosine(s, row, x):
 
 @intrinsic
 def _of_small(context: Any, x: Any) -> Any:
-    """Return the sines and cosines of angles below 2^20 quarter turns; the code has no branch."""
+    """Return the sines and cosines of angles below 2^20 quarter turns, without a branch."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         (x,) = arguments
@@ -64,7 +64,8 @@ def _of_small(context: Any, x: Any) -> Any:
         shifted = fused(builder, x, all_lanes(_2_PI), all_lanes(NO_FRACTION))
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
-        # x - n pi/2 is exact, because the two terms are multiples of 2^-53 and differ by less than 1.
+        # Let d be the double nearest to pi/2. If n is not 0, x and n d are multiples of 2^-53.
+        # The difference x - n d is then exact, because x and n d differ by less than 1.
         # The variable `lost` is the rounding error of r, and `z_lost` is the rounding error of z = r^2.
         near = fused(builder, n, all_lanes(-PI_2), x)
         r = fused(builder, n, all_lanes(-PI_2_REST), near)
@@ -74,7 +75,7 @@ def _of_small(context: Any, x: Any) -> Any:
         # The variable `most` is 1 - z/2, which begins the cosine's series; `most_lost` is its error.
         most = fused(builder, z, all_lanes(-0.5), all_lanes(1.0))
         most_lost = fused(builder, z, all_lanes(-0.5), builder.fsub(all_lanes(1.0), most))
-        # sin(r + lost) = sin r + lost cos r, cos(r + lost) = cos r - lost sin r.
+        # To first order, sin(r + lost) = sin r + lost cos r and cos(r + lost) = cos r - lost sin r.
         # The largest term is added last, because the other terms and their rounding errors are small.
         sine = fused(builder, builder.fmul(r, z), polynomial(z, SINE), builder.fmul(lost, most))
         sine = builder.fadd(r, sine)
@@ -118,8 +119,6 @@ def _any_large(context: Any, x: Any) -> Any:
 
 @intrinsic
 def _with_lane(context: Any, x: Any, lane: Any, value: Any) -> Any:
-    """Return a copy of the vector x whose element with index `lane` is the double `value`."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, lane, value = arguments
         return builder.insert_element(x, value, lane)

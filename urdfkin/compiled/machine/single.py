@@ -1,11 +1,9 @@
 """Compute one configuration with compiled functions that Python calls like built-in functions.
 
-A call through Numba checks the type of each argument and unpacks every array, which takes as long as the
-recursion itself. CPython calls a built-in function without these checks: it passes the addresses of the
-arguments. This module therefore compiles a function that CPython calls as a built-in function. The function
-reads only a few 8-byte words of each array object, at the offsets that CPython and NumPy guarantee to C code.
-The function holds Python's global interpreter lock for about a microsecond. For arguments that it does not
-support, the function returns None.
+CPython passes the addresses of the arguments to a built-in function. The compiled function reads a few 8-byte
+words of each array object, at the offsets that CPython and NumPy guarantee to C code. The function holds
+Python's global interpreter lock for about a microsecond. For unsupported arguments, the function returns
+None.
 
 A call marks its scratch memory as busy. This is one atomic operation, so it is also safe in a Python without
 a global interpreter lock. If another thread is using the scratch memory, the function also returns None. The
@@ -57,8 +55,6 @@ _call_one_arg = types.ExternalFunction("PyObject_CallOneArg", types.int64(types.
 
 @intrinsic
 def _call(context: Any, address: Any, argument: Any) -> Any:
-    """Call the kernel whose code is at an address, and return the kernel's result."""
-
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         whole = ir.IntType(64)
         kind = ir.FunctionType(whole, [whole]).as_pointer()
@@ -105,18 +101,12 @@ def _doubles_address(array, ndarray, flags, axes, rows, columns):
 
 @Core
 def one_configuration(bound, arguments, count):
-    """Compute the result for one configuration.
+    """Compute the result for one configuration; return None if the arguments are not supported.
 
-    The arguments are q, or q and v, or q, v and a. The last argument is the output array, or None for a new
-    array. The function returns None if it does not support the arguments, or if another thread is using the
-    scratch memory.
-
-    Args:
-        bound: Address of a tuple of Python objects. The first item is the array of kernel arguments. The next
-            items are NumPy's array type, None, and the function that creates the result array. The shape of
-            the result array and objects that must stay alive come last.
-        arguments: Address of the Python call's arguments.
-        count: Number of these arguments.
+    The function also returns None if another thread is using the scratch memory. The `count` arguments at the
+    address `arguments` are q, or q and v, or q, v and a, and then the output array or None. The tuple at the
+    address `bound` contains the array of kernel arguments, NumPy's array type, None, the function that
+    creates the result array, the shape of the result array, and objects that must stay alive.
     """
     items, inputs = whole_numbers_at(bound), whole_numbers_at(arguments)
     address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
@@ -136,7 +126,7 @@ def one_configuration(bound, arguments, count):
 
 @compiled
 def _compute_into(address, inputs, to, ndarray):
-    """Write the kernel's result into the array `to`; return whether the type and the shape of `to` fit."""
+    """Write the kernel's result into the array `to`; return whether the result is valid."""
     task = whole_numbers_at(address)
     orders, rows, columns, width = task[_ORDERS], task[_ROWS], task[_COLUMNS], task[_NQ]
     out = _doubles_address(to, ndarray, _WRITABLE, task[_AXES], rows, columns)
@@ -160,8 +150,6 @@ def _compute_into(address, inputs, to, ndarray):
 
 
 class _Method(ctypes.Structure):
-    """CPython's structure PyMethodDef, which describes a built-in function."""
-
     _fields_ = (
         ("name", ctypes.c_char_p),
         ("address", ctypes.c_void_p),
@@ -175,7 +163,7 @@ _FUNCTION = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.POINTER(_Method), ctypes.
 
 
 def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArray | None]:
-    """Return a Python function that runs the code at an address and keeps the objects `bound` alive."""
+    """Return a Python function that runs the code at an address and keeps `bound` alive."""
     method = _Method(name.encode(), address, _FASTCALL, None)
     new = _FUNCTION(("PyCFunction_NewEx", ctypes.pythonapi))
     function: Callable[..., FloatArray | None] = new(ctypes.byref(method), (*bound, method), None)
@@ -184,7 +172,7 @@ def _built_in(name: str, address: int, *bound: object) -> Callable[..., FloatArr
 
 @cache
 def arrays_are_known() -> bool:
-    """Return whether the installed NumPy has the memory layout of arrays that `single` uses."""
+    """Return whether NumPy's arrays have the memory layout that `single` uses."""
     x = np.zeros((2, 3))
     if np.ndarray.__basicsize__ < 8 * (_FLAGS + 1) or np.dtype.__basicsize__ < 8 * (_KIND_AND_ORDER + 1):
         return False
@@ -213,10 +201,8 @@ def single(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Return a function that computes a quantity for one configuration, and the kernel's arguments.
 
-    The compiled tree must have only one frame, and the base must be fixed. The arguments of the function are
-    q, then v and a if the quantity needs them, and then the output array or None. The function returns None
-    for arguments that it does not support. The kernel's arguments also contain a counter of the results that
-    the function has computed.
+    The compiled tree must have only one frame, and the base must be fixed. The function that is returned
+    gives None for unsupported arguments.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
@@ -234,10 +220,7 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that calls a C function instead of a kernel, and the arguments of the C function.
-
-    `orders` is the number of inputs: 1 for q, 2 for q and v, 3 for q, v and a. `shape` is that of the result.
-    """
+    """Return a function that calls a C function instead of a kernel, and the C function's arguments."""
     address = ctypes.cast(core, ctypes.c_void_p).value
     return _called(address or 0, orders, shape, plan, core)
 

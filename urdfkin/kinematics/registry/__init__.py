@@ -1,4 +1,4 @@
-"""The textbook's equations as data: each has its statement, its meaning, its functions and its tests.
+"""The textbook's equations as data: the statement, meaning, functions and tests of each equation.
 
 The TOML files in `data` are the only source of `docs/equations.md` and of `urdfkin explain 7.130`.
 """
@@ -41,10 +41,7 @@ class Equation:
     """One numbered equation.
 
     Attributes:
-        number: The printed number, for example "7.130".
         statement: The equation in urdfkin's notation, in plain characters.
-        latex: The statement in LaTeX.
-        meaning: One or two sentences.
         written: Names of the functions of `urdfkin.kinematics.equations` that state the equation.
         functions: Functions that compute the equation, as "module:name".
         tests: Tests that fail if the equation is computed wrongly, as "file::name".
@@ -72,13 +69,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Misprint:
-    """A wrong or incomplete statement in the chapter.
-
-    Attributes:
-        where: The place of the misprint in the chapter.
-        proof: The reason why the printed statement is wrong, in one sentence.
-        test: The test that proves the misprint, as "file::name".
-    """
+    """A wrong or incomplete statement in the chapter; `test` is the proving test, as "file::name"."""
 
     where: str
     printed: str
@@ -184,11 +175,7 @@ _NUMBER = re.compile(r"^\(?(?:eq\.?|equation)?\s*(7\.\d{1,3})\)?$", re.IGNORECAS
 
 
 def explain(number: str) -> str | None:
-    """Return a page of plain text about "7.130", "(7.130)" or "eq. 7.130"; None if there is no such equation.
-
-    >>> print(explain("7.5").splitlines()[2])
-    R_0_1 = R(theta1) = [[cos, -sin], [sin, cos]]
-    """
+    """Return a page of text about "7.130", "(7.130)" or "eq. 7.130"; None for other text."""
     match = _NUMBER.match(number.strip())
     if match is None or not 1 <= int(match[1].split(".")[1]) <= LAST:
         return None
