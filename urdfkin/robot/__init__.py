@@ -519,9 +519,8 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        q = configuration.checked(
-            self.tree, q, "q", look=False
-        )  # The returned lines mention degrees.
+        # The returned lines mention degrees, so no warning is needed.
+        q = configuration.checked(self.tree, q, "q", look=False)
         return configuration.limit_violations(self.tree, q)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
