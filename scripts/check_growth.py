@@ -36,7 +36,7 @@ def _robot(inside: str) -> bytes:
 
 
 def _filled(size: int, piece: str) -> str:
-    """Return many copies of a piece, up to a size in bytes; {i} in the piece is the number of the copy."""
+    """Repeat a piece up to a size in bytes; {i} in the piece is the number of the copy."""
     count = max(size // len(piece.format(i=10**6)), 2)
     return piece * count if piece == piece.format(i=0) else "".join(piece.format(i=i) for i in range(count))
 
