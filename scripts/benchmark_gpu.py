@@ -176,7 +176,7 @@ def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
         chains[kind] = copy.deepcopy(chain).to(dtype=kind, device=device)
         found = chains[kind].jacobian(torch.tensor(q[:, columns], dtype=kind, device=device))
         if not np.abs(found.cpu().numpy() - robot.jacobian(q, frame)[..., columns]).max() <= most:
-            raise ValueError(f"PyTorch Kinematics computes another Jacobian in {real} precision")
+            raise ValueError(f"PyTorch Kinematics computes a wrong Jacobian in {real} precision")
     return lambda q: chains[q.dtype].jacobian(q[:, columns])
 
 

@@ -52,7 +52,9 @@ def files(parts: list[str]) -> list[Path]:
     found = {name: path for name, path in below.items() if name not in COMPILED}
     for part in parts:
         if not any(name.startswith(part) for name in found):
-            raise ValueError(f"{part}: no file below {PACKAGE.name}/ with this prefix can be mutated")
+            raise ValueError(
+                f"{part}: no file below {PACKAGE.name}/ that can have mutants begins with this path"
+            )
     return [path for name, path in found.items() if not parts or name.startswith(tuple(parts))]
 
 

@@ -42,11 +42,15 @@ DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links"
 
 
 class CertifiedModel(TypedDict):
+    """Name and source of one of the two compared models."""
+
     name: Annotated[str, says("Name of the robot.")]
     source: Annotated[str, says("Path, catalogue name, - for standard input, or <text>.")]
 
 
 class CertifiedRule(TypedDict):
+    """Mimic rule: the joint's value is multiplier * (value of `leader`) + offset."""
+
     leader: Annotated[str, says("Name of the mimicked joint.")]
     multiplier: Annotated[float, says("Factor by which the mimicked joint's value is multiplied.")]
     offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
@@ -56,6 +60,8 @@ Value = str | float | list[str | float | None] | CertifiedRule | None
 
 
 class DifferenceEntry(TypedDict):
+    """A difference between the two models at one joint or link."""
+
     place: Annotated[str, says("Name of the joint or link of A that differs.")]
     what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
     a: Annotated[Value, says("Value of the parameter in A; null if A has none.")]
@@ -79,6 +85,8 @@ class CertifiedConversion(TypedDict):
 
 
 class CertifiedJoint(TypedDict):
+    """A joint of A and the matching joint of B: value in B = `sense` * value in A + `offset`."""
+
     a: Annotated[str, says("Name of the joint in A.")]
     b: Annotated[str, says("Name of the joint in B.")]
     sense: Annotated[Literal[1, -1], says("1 or -1; value in B = `sense` * (value in A) + `offset`.")]
@@ -90,17 +98,23 @@ class CertifiedJoint(TypedDict):
 
 
 class ToolEntry(TypedDict):
+    """Two matched links with different poses on their rigid body; `same` reports them as different tools."""
+
     a: Annotated[str, says("Link of A.")]
     b: Annotated[str, says("Link of B.")]
     pose: Annotated[Matrix, says("Pose of the link of B in the frame of the link of A.")]
 
 
 class Rounding(TypedDict):
+    """Largest distance (m) and angle (rad) between matching frames that `same` treats as rounding errors."""
+
     metres: Size
     radians: Size
 
 
 class FrameEntry(TypedDict):
+    """An interval that contains the largest distance between a frame of A and the matching frame of B."""
+
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
     lower: Annotated[Size, says("Lower bound of the largest distance, metres: the distance at `q_a`, `q_b`.")]
@@ -124,6 +138,8 @@ class FrameEntry(TypedDict):
 
 
 class Confirmed(TypedDict):
+    """Pinocchio's confirmation of the bounds."""
+
     state: Annotated[ConfirmationState, says("Whether the oracle confirmed the bounds.")]
     by: Annotated[str, says("Name and version of the oracle; empty without a confirmation.")]
     configurations: Annotated[Count, says("Number of configurations at which the oracle checked the bounds.")]
@@ -148,7 +164,8 @@ class SameCertificate(Header):
     joints: Annotated[list[CertifiedJoint], says("Matched pairs of a joint of A and a joint of B.")]
     links: Annotated[list[Annotated[list[str], of_length(2)]], says("Pairs of a link of A and a link of B.")]
     tools: Annotated[
-        list[ToolEntry], says("Matched links with different poses, which count as different tools.")
+        list[ToolEntry],
+        says("Matched links whose poses differ; each counts as a different tool."),
     ]
     orders: Annotated[
         list[list[str]], says("Consecutive joints of B whose order was changed, in the new order.")
@@ -399,7 +416,7 @@ def _as_written_errors(
     distances = search.sampled_distances(written.frames)[0].max(axis=0)
     if claim["upper"] is not None and distances.max() > claim["upper"] + rounding[0]:
         farthest = links[0][written.frames[int(distances.argmax())].a]
-        yield f"`as_written`: frame {farthest} is {distances.max():.6g} m off, which is farther"
+        yield f"`as_written`: frame {farthest} has a larger distance, {distances.max():.6g} m"
     problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
     yield from (f"`as_written`: {line}" for line in problems)
 
@@ -457,9 +474,11 @@ def _lower_bound_errors(
         poses = search.poses_at(q_a, q_b, [frame], computed)
         radians, metres = pose_difference(*(T[0, 0] for T in poses))
         if metres < claim["lower"] - rounding[0]:
-            yield f"{place}: {by} finds {metres:.6g} m at its configuration, not {claim['lower']:.6g} m"
+            yield f"{place}: {by} finds {metres:.6g} m at `q_a`, `q_b`, not {claim['lower']:.6g} m"
         if radians < claim["radians_seen"] - rounding[1]:
-            yield f"{place}: {by} finds {radians:.6g} rad there, not {claim['radians_seen']:.6g} rad"
+            yield (
+                f"{place}: {by} finds {radians:.6g} rad at `q_a`, `q_b`, not {claim['radians_seen']:.6g} rad"
+            )
 
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:

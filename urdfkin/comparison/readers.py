@@ -237,16 +237,16 @@ def _cause(
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
         is_free = np.abs(T_theirs - joint.T_parent_joint).max() <= tolerance
-        return "mimic", "leaves it free" if is_free else "applies another rule"
+        return "mimic", "leaves the joint free" if is_free else "applies a different mimic rule"
     if difference[0, :3, :3].max() > tolerance:
         origin = None if element is None else element.find("origin")
         quaternion = origin is not None and origin.get("quat_xyzw") is not None
-        return f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has another rotation at q = 0"
+        return f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has a different rotation at q = 0"
     if difference[0].max() > tolerance:
-        return "origin xyz", "has another position at q = 0"
+        return "origin xyz", "has a different position at q = 0"
     if joint.name in own and joint.kind.has_axis:
         return "axis", _motion(joint, T, T_theirs, tolerance)
-    words = "moves it differently" if joint.name in own else "has no coordinate for it"
+    words = "moves the joint differently" if joint.name in own else "has no coordinate for the joint"
     return f"type {joint.kind.value}", words
 
 
@@ -257,17 +257,17 @@ def _motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float)
         d = ours[:, :3, 3] @ joint.axis
         k = float(theirs[:, :3, 3] @ joint.axis @ d / np.sum(d**2))
         if np.abs(theirs[:, :3, 3] - k * ours[:, :3, 3]).max() <= tolerance:
-            return f"moves it {k:.6g} times as far"
+            return f"moves the joint {k:.6g} times as far"
     elif np.abs(theirs - np.linalg.inv(ours)).max() <= tolerance:
-        return "turns it the other way"
+        return "turns the joint in the opposite direction"
     elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > tolerance:
-        return "returns a matrix that is no rotation"
+        return "returns a matrix that is not a rotation"
     direction, own = (_direction(joint, T[0]) for T in (theirs, ours))
     if (length := math.hypot(*direction)) <= tolerance:
-        return "does not move it"
+        return "does not move the joint"
     sense = 1.0 if own @ joint.axis >= 0.0 else -1.0
     x, y, z = (f"{number:.4g}" for number in np.round(direction / length * sense, 6) + 0.0)
-    return f"moves it along another axis: {x} {y} {z}"
+    return f"uses a different joint axis: {x} {y} {z}"
 
 
 def _direction(joint: Joint, T: FloatArray) -> FloatArray:

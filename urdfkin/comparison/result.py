@@ -143,7 +143,7 @@ class Difference:
             case "mimic rule" if a is not None and b is None:
                 return f"{place} is a mimic joint in A and an independent joint in B: {_rule(a)}"
             case "mimic rule":
-                return f"{place} has another mimic rule: {_rule(a)} in A, {_rule(b)} in B"
+                return f"{place} has different mimic rules: {_rule(a)} in A, {_rule(b)} in B"
             case "independent joint":
                 return f"{place} is a mimic joint only in A, and moves alike in A and B: {_rule(a)}"
             case "idle":
@@ -513,10 +513,10 @@ class Sameness(Displayable):
                 )
             if one.conversion is not None:
                 raise InputError(
-                    "a planar or floating joint has another frame in B",
+                    "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with to_b, because a convention cannot describe another joint frame",
+                    remedy="convert q with to_b; a convention cannot describe a different joint frame",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)

@@ -786,7 +786,7 @@ class JointComparison:
             [mechanism.homes[path[0] + 1] for mechanism, path in ends],
         ):
             if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
-                why = "follows a planar or floating joint with another frame"
+                why = "follows a planar or floating joint with a different frame"
                 yield JointDifference(name, "", None, why)
 
     def _rule_differences(self, step: MatchedJoints) -> Iterator[JointDifference]:

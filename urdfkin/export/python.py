@@ -209,11 +209,11 @@ class Kinematics(torch.nn.Module):
 def gradients(device="cpu"):
     """Return, for each function, whether `torch.autograd.gradcheck` accepts its derivatives in float64.
 
-    A difference quotient has the rounding errors of two values, divided by twice the step, and a truncation
-    error: a sixth of the squared step times the third derivative. A coordinate rotates each vector by at most
-    r rad for each rad. A term of F vectors, at most 4, has a third derivative of at most (F r)^3 times its
-    size, and its error bound is at least 24 F eps times its size. This is not a bound for a coordinate that
-    moves a prismatic joint and also a revolute one.
+    A difference quotient has two errors. The first error is the rounding error of two values, divided by
+    twice the step. The second error is the truncation error: a sixth of the squared step times the third
+    derivative. If a coordinate changes by 1 rad, a vector rotates by at most r rad. A product of F vectors
+    (F <= 4) has a third derivative of at most (F r)^3 times its size, and an error bound of at least 24 F eps
+    times its size. The tolerance is not a bound for a coordinate that moves a prismatic and a revolute joint.
     """
     accepted, step = {{}}, 1e-6 / {rate!r}  # r
     for function in ({all}):

@@ -647,7 +647,9 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     k = np.flatnonzero(np.abs(np.diff(change)) > 1.0)
     what = "quaternion changes its sign" if floating else "angle jumps by a whole turn"
     more = f" and {len(k) - 1} more samples" if len(k) > 1 else ""
-    return f"joint {joint.name}: its {what} after sample {k[0]}{more}; this is not a motion and was removed"
+    return (
+        f"joint {joint.name}: its {what} after sample {k[0]}{more}; this change is no motion and was removed"
+    )
 
 
 _UNWRAP = {JointKind.CONTINUOUS: _turning, JointKind.PLANAR: _turning, JointKind.FLOATING: _floating}
@@ -679,8 +681,8 @@ def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterato
         if np.abs(moved).max() > _ROUNDING * max(1.0, abs(rule.multiplier)):
             k = int(np.flatnonzero(np.abs(moved) > _ROUNDING)[0])
             yield (
-                f"joint {joint.name} follows {rule.leader} with multiplier {rule.multiplier:g}, also"
-                f" beyond one turn: from sample {k} on it is at"
-                f" {rule.multiplier * new[k, at] + rule.offset:.4g}, not at"
-                f" {rule.multiplier * q[k, at] + rule.offset:.4g}"
+                f"joint {joint.name} mimics {rule.leader} with multiplier {rule.multiplier:g}; unwrapping"
+                f" {rule.leader} changes the value of {joint.name}, at sample {k} from"
+                f" {rule.multiplier * q[k, at] + rule.offset:.4g} to"
+                f" {rule.multiplier * new[k, at] + rule.offset:.4g}"
             )
