@@ -39,7 +39,7 @@ from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 
-#: Number of random configurations at which the search computes distances first.
+#: Number of random configurations that the search tries first.
 SAMPLES = 512
 #: Number of sampled configurations in which each variable is at an end of its range.
 CORNERS = 128
@@ -82,7 +82,7 @@ class DistanceSearch:
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether joints between a root and its base link change the distances.
+        #: Whether joints between a robot's root and its base link change the distances.
         #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
         self.unbounded = as_written and not all(self.base_fixed)
 
@@ -97,7 +97,7 @@ class DistanceSearch:
         )
 
     def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return q (n, nq) of A and of B at `z`; `moved` draws planar and floating joints."""
+        """Return configurations (n, nq) of A and B; `moved` draws planar and floating joints at random."""
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
         q_a = sample(tree_a, len(z), self.rng) if moved else np.tile(neutral(tree_a), (len(z), 1))
@@ -289,7 +289,7 @@ class Boxes:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
 
     def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
-        """Bound |D + sum_i D_i x_i| over |x_i| <= h_i, (n,) for middles `c` (n, variables)."""
+        """Bound the first-order part of the distance in boxes with middles `c` and half widths `h`."""
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
         along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
@@ -297,7 +297,7 @@ class Boxes:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and its derivatives (n, 3, variables) at the middles `c` of boxes."""
+        """Return the position differences (n, 3) and their derivatives (n, 3, variables) at `c`."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -321,7 +321,11 @@ class Boxes:
 def tighten(
     search: DistanceSearch, frame: FramePair, target: float, upper: float, most: int = MOST_BOXES
 ) -> float:
-    """Return a smaller proven bound (m) on a frame's distance, down to `target`, or `upper`."""
+    """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
+
+    `upper` is a proven bound, and is returned if no smaller bound is proven. The search for smaller bounds
+    ends at `target`.
+    """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]

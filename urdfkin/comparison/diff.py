@@ -42,7 +42,7 @@ _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Attributes that move a link, if the two versions have different formats.
+#: Changes that move a link, for two versions of different formats.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -311,7 +311,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect if only this joint is changed, or None."""
+    """Return the effect of a change of only this joint, or None."""
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None

@@ -56,7 +56,7 @@ class LibraryReading:
 
     Attributes:
         refused: Reason why the library does not read the file; None if it reads the file.
-        missing: Links that the library's model does not contain; in a USD file, only links with a prim.
+        missing: Links that the library's model lacks. Links without a prim in a USD file do not count.
         worst: Largest difference of link poses relative to the first common link; 0 if only rounding differs.
     """
 
@@ -128,7 +128,7 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _reading(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Compare one library's poses, from a separate process, with `ours` at `q`."""
+    """Run a library in a separate process, and compare its poses with `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].forms:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")

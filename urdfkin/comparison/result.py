@@ -76,8 +76,8 @@ class SameQuestion:
 class Interval:
     """Bounds on the largest distance between matching frames, over all configurations within limits.
 
-    `lower` is the distance (m) at `q_a` and `q_b`, less the rounding error; `radians_seen` is the angle
-    there. `upper` (m; inf without a bound) and `radians` are proven upper bounds.
+    `lower` is the distance (m) at `q_a` and `q_b`, less the rounding error. `radians_seen` is the angle at
+    `q_a` and `q_b`. `upper` (m; inf without a bound) and `radians` are proven upper bounds.
     """
 
     frame: str
@@ -211,7 +211,7 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Matched links that `same` reports as different tools; `pose` (4, 4) is relative to A's link."""
+    """Matched links that `same` reports as different tools; `pose` (4, 4) is B's link in A's link frame."""
 
     a: str
     b: str
@@ -789,7 +789,7 @@ def remarks(
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return the differences without effect on motion; `single` is a relative error, or 0."""
+    """Return differences without effect on motion; `single` is the relative error of single precision."""
     some = list[Difference]()
     for step in alignment.steps:
         if not step.unlike:

@@ -121,7 +121,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         demand_joint_names(robot.tree, list(names), which)
-    # The copies protect the user's robots: a comparison stores many compiled trees in its robots.
+    # A comparison stores many compiled trees in its robots, so `same` copies the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -294,7 +294,7 @@ class Comparator:
     def _compared_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
-        # The poses of a Denavit-Hartenberg table's other links depend on the table's convention.
+        # In a Denavit-Hartenberg table, the poses of links with other names depend on the convention.
         return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -356,7 +356,7 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) for all frames."""
+        """Return one bound (m, rad) on the distances of all frames of the unchanged models."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf

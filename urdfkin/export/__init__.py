@@ -30,12 +30,12 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return code with exact constants for sympy-exact; VerificationError if Pinocchio disagrees."""
+    """Return code with exact constants for sympy-exact; raise VerificationError if results differ."""
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
 def write(code: FrameCode, to: str) -> str:
-    """Return the text of an exported file with its digest; VerificationError as in `code_in`."""
+    """Return the text of an exported file with its digest."""
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
     return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))

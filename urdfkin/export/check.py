@@ -93,7 +93,7 @@ def _has_gpu() -> bool:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
-    """Run in double and single precision; without a GPU, only the CPU functions are checked."""
+    """Run a compiled file in both precisions; without a GPU, only the CPU functions are checked."""
     name = _name_of_program(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")
     command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]

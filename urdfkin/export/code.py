@@ -30,9 +30,9 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame. No name contains characters that end a comment in the exported file.
 
-    `identifiers` belong to the entries of "q", "v" and "a", and to the path's joints ("s"). `maybe_proof` is
-    None for code that urdfkin compiles for its own use. `exact` returns this code with fractions as
-    constants.
+    `identifiers` contains identifiers for the entries of "q", "v" and "a", and for the path's joints ("s").
+    `maybe_proof` is None for code that urdfkin compiles for its own use. `exact` returns this code with
+    fractions as constants.
     """
 
     name: str
@@ -244,7 +244,7 @@ class Writer:
         return _arithmetic(x, self.text, precedence)
 
     def expanded(self, x: Number, input_text: Callable[[Node], str], precedence: int = _SUM) -> str:
-        """Return an expression, such as an angle, without variables."""
+        """Return an expression as text, with inputs and constants instead of variables."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.identifiers:

@@ -161,7 +161,7 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results; eight configurations then use at most half a megabyte of stack.
+#: Maximum number of results; the results of eight configurations then fit in half a megabyte of stack.
 _MOST_RESULTS = 8192
 # Plain integers are several times as fast as members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(

@@ -111,7 +111,7 @@ def exact_plan(
 
 
 def _aligning(axis: Vector, z: float) -> Matrix:
-    """Return the rotation of `axis_aligning`, with the unit axis as its third column."""
+    """Return the rotation matrix whose third column is the unit axis, as in `axis_aligning`."""
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
     scale = -1 / (sign + own)

@@ -76,7 +76,7 @@ class Node:
 
 
 class Graph:
-    """The expressions of one function; the equations in `chapter` store their numbers in new nodes."""
+    """The expressions of one function; each node stores the number of the equation that created it."""
 
     #: Constant that replaces products with 0 and differences such as x - x.
     zero: float = 0.0
@@ -137,7 +137,7 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Make an equation store its number in new nodes; an outer equation has precedence."""
+        """Return an equation that stores its number in new nodes, unless another equation calls it."""
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
             return equation

@@ -1,8 +1,9 @@
 """A function of the exported code, which computes one quantity of one frame.
 
-The exported code assigns an expression to a variable in three cases: it is used more than once, it is a
-number of a link's state (pose, velocity, acceleration), or it is a sine, cosine, root or quotient. A long
-expression is split into several assignments. All other expressions are written where they are used.
+The exported code assigns an expression to a variable in three cases: the code uses the expression more than
+once, the expression is a number of a link's state (pose, velocity, acceleration), or the expression is a
+sine, cosine, root or quotient. A long expression is split into several assignments. The code contains all
+other expressions at the place of their use.
 """
 
 from __future__ import annotations

@@ -146,7 +146,7 @@ def compare(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    """Compare the results of `evaluate` with Pinocchio; raise VerificationError if they differ."""
+    """Compare the results of `evaluate` with Pinocchio; raise VerificationError for a difference."""
     checker = copy(verifier)  # The copy keeps these checks out of the user's certificate.
     drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:

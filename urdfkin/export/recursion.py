@@ -27,7 +27,7 @@ class NumberKind:
     """A kind of number, and callbacks of the recursion; `chapter` contains the textbook's equations.
 
     `begin_step` is called before each joint, before the final frame and before the results. `end_step` is
-    called after each joint and after the final frame. The integer is the number of earlier calls.
+    called after each joint and after the final frame. Their integer argument is the number of earlier calls.
     """
 
     chapter: Any

@@ -21,7 +21,7 @@ def seal(text: str) -> str:
 
 
 def is_sealed(text: str) -> bool | None:
-    """Return whether the digest is correct, for any line ends; None without a digest."""
+    """Return whether the file's digest is correct; None without a digest."""
     text = text.replace("\r\n", "\n")
     if (found := _LINE.search(text)) is None:
         return None

@@ -261,7 +261,7 @@ class Robot(Displayable):
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the URDF text as UTF-8; for MJCF and USD, of the file without included files.
+        """SHA-256 of the URDF text as UTF-8, or of an MJCF or USD file without its included files.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").sha256[:8]
@@ -333,7 +333,7 @@ class Robot(Displayable):
 
     @property
     def link_frames(self) -> tuple[LinkFrame, ...]:
-        """Names `link:NAME` of the frames of all links, each unique; `placement` and others accept this list.
+        """Unique names `link:NAME` of all links' frames; methods such as `placement` accept this list.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -389,7 +389,7 @@ class Robot(Displayable):
 
     @property
     def tip_frame(self) -> str:
-        """The default tip: the tip in the robot catalogue, or the leaf link after the most moving joints.
+        """The default tip: the catalogue's tip of the robot, or the leaf link after the most moving joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame

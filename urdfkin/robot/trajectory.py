@@ -145,7 +145,7 @@ class Trajectory:
         notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
-            with too few samples.
+            if there are too few samples.
 
     >>> import urdfkin
     >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
@@ -593,7 +593,7 @@ def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
     """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
     Between two samples, a joint is assumed to turn in the shorter direction. If the angles of a joint span
-    more than one turn, the file does not wrap them, and they stay unchanged.
+    more than one turn, the angles are not wrapped, so they stay unchanged.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
