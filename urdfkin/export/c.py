@@ -139,7 +139,6 @@ def reserve(code: FrameCode, function: Function) -> int:
 
 
 def advance(code: FrameCode, function: Function) -> str:
-    """Return C code that moves each pointer by `LANES` configurations."""
     return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 
@@ -156,7 +155,6 @@ class InputLayout:
         self.size = max(1, self.first + 3 * len(self.angles))
 
     def index(self, node: Node) -> int:
-        """Return the index of an input, an angle, or the sine or cosine of an angle."""
         if node.op in ("sin", "cos"):
             return self.index(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:

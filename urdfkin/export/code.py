@@ -104,11 +104,7 @@ def code_of(
     verify: bool | None,
     about: str = "",
 ) -> FrameCode:
-    """Return the code of a frame, with test vectors and the result of the comparison with Pinocchio.
-
-    `plan_of` returns the compiled tree of the joints that move given links. `about` is text for the header.
-    Raise VerificationError if Pinocchio computes another result.
-    """
+    """Return the code of a frame, compared with Pinocchio, with test vectors."""
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
     rows = _exported_quantities(quantities)
@@ -176,10 +172,7 @@ def _exported_quantities(names: Collection[str]) -> list[Quantity]:
 
 
 class Writer:
-    """Writes the expressions of a function in a language that writes sums as a + b.
-
-    `literal` writes a constant. Without `sine`, sines and cosines are inputs of the written code.
-    """
+    """Writes expressions as code; without `sine`, sines and cosines are inputs of the code."""
 
     def __init__(
         self,
@@ -238,7 +231,6 @@ class Writer:
         return self.value(x, precedence)
 
     def value(self, x: Node, precedence: int = _SUM) -> str:
-        """Return the right-hand side of an assignment."""
         if x.op in ("sin", "cos", "sqrt"):
             return f"{x.op}({self.text(x.of[0])})"
         return _arithmetic(x, self.text, precedence)

@@ -381,10 +381,7 @@ class CompiledFrame:
     def _are_plain(
         self, inputs: Sequence[Given], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
-        """Return whether all arguments are arrays that the machine code can use without a copy.
-
-        Such arrays skip `Call`, which would take a tenth of the time of a large batch.
-        """
+        """Return whether the machine code can use all arguments without a copy."""
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
             out, (n, *row.own_shape(self._tree.nv))

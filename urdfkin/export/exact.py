@@ -49,10 +49,7 @@ class PiMultiple:
 
 
 class ExactGraph(Graph):
-    """The expressions of a function whose constants are exact numbers, not doubles.
-
-    `recognised` contains each angle of the URDF that was replaced, with its multiple of pi.
-    """
+    """Expressions with exact constants; `recognised` maps each replaced angle to its multiple of pi."""
 
     zero = 0
 
@@ -91,7 +88,6 @@ class ExactGraph(Graph):
 def exact_plan(
     graph: ExactGraph, text: str, tree: KinematicTree, plan: CompiledTree, link: int
 ) -> CompiledTree:
-    """Return the compiled tree `plan` with the exact constants of the URDF text of `tree`."""
     graph.place = -1
     eq, path = graph.chapter, tree.path(link)
     joints = read_exact(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
@@ -159,11 +155,7 @@ def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """The checks of an exported file with exact constants.
-
-    `angles` is the number of different angles that became multiples of pi, and `most` is the largest change
-    of an angle (rad).
-    """
+    """Checks of an export with exact constants; `most` is the largest change of an angle (rad)."""
 
     angles: int = 0
     most: float = 0.0
@@ -189,10 +181,7 @@ def exact_functions(
     proof: Proof,
     verify: bool | None,
 ) -> tuple[tuple[Function, ...], ExactProof]:
-    """Return functions with exact constants, compared with Pinocchio at fifty digits.
-
-    The test vectors are those of `proof`. Raise VerificationError if Pinocchio computes another result.
-    """
+    """Return functions with exact constants, compared with Pinocchio; `proof` has the test vectors."""
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
         for other in functions:

@@ -25,14 +25,11 @@ class Dialect:
     """The code for one Python library.
 
     Attributes:
-        about: Description of a function's inputs and results.
         imports: Import lines. `{}` is replaced by the used functions among `cos`, `sin` and `sqrt`. If none
             of them is used, the line is left out.
-        values: Body of the exported function `_values`, which evaluates a function for a list of
-            configurations.
+        values: Body of the exported function `_values`, which evaluates a function for some configurations.
         index: Pattern for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported function `check`, with its default; "" for none.
-        single: Whether the functions also compute in single precision.
     """
 
     about: str
