@@ -51,10 +51,10 @@ TOOLS = Path.home() / ".cache" / "urdfkin-audit" / "node_modules"
 SCREENS = tuple(product((390, 768, 1000, 1280), (False, True)))
 #: Time limit (s) of axe-core; a page of 100,000 elements takes half a minute.
 _AXE_SECONDS = 600
-#: Violations of other severities are printed only.
+#: Violations of these severities count as errors; other violations are only printed.
 IMPACTS = ("serious", "critical")
 UNFOLD = "document.querySelectorAll('details').forEach((part) => { part.open = true; })"
-#: Maximum number of presses of the Tab key on a page, and of printed pages that are drawn.
+#: Maximum number of presses of the Tab key on a page, and maximum number of drawn pages.
 _PRESSES, _PAGES = 60, 12
 FOREIGN = ("Attribute “autocomplete” is only allowed when the input type is",)
 #: The site's theme hides some elements if Chromium reports no mouse.
@@ -118,7 +118,6 @@ def html_checker() -> Path | None:
 
 
 def reports(folder: Path) -> dict[str, Callable[[], str]]:
-    """Return the name of each page of a report or comparison, and the function that makes it."""
     right = PinocchioOracle.velocities
     bad = folder / "broken.urdf"
     bad.write_text('<robot name="broken"><link name="a"/><link name="a"/><joint name="j"/></robot>')
@@ -127,7 +126,7 @@ def reports(folder: Path) -> dict[str, Callable[[], str]]:
         return as_html(validate(robots, samples=samples).as_dict())
 
     def disagreement() -> str:
-        """Return a report with disagreements: Pinocchio's velocities are changed by a factor of 1 + 1e-6."""
+        """Report disagreements, with Pinocchio's velocities changed by a factor of 1 + 1e-6."""
         with patch.object(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-6)):
             return page(["panda", "ur5"], 6)
 
@@ -151,13 +150,12 @@ def reports(folder: Path) -> dict[str, Callable[[], str]]:
 
 
 def comparison(b: str, within: float | None) -> str:
-    """Return the page that compares the UR5 with another robot."""
     robots = urdfkin.load("ur5"), urdfkin.load(b)
     return same_page(same(*robots, within=within), robots, SameQuestion(within))
 
 
 def fleet_pages(folder: Path) -> Iterator[Page]:
-    """Yield the pages of a report of all robots: the page, a page for each robot, and one page with all."""
+    """Yield the pages of a report of all robots."""
     document = validate(urdfkin.robots(), samples=1).as_dict()
     (folder / "fleet-robots").mkdir()
     texts = {**dict(as_files(document, "fleet.html")), "fleet-text.html": as_html(document)}
@@ -172,7 +170,6 @@ def fleet_pages(folder: Path) -> Iterator[Page]:
 
 
 def site(folder: Path) -> Iterator[Page]:
-    """Build the documentation site and yield some of its pages."""
     from mkdocs.commands.build import build
     from mkdocs.config import load_config
 
@@ -187,7 +184,6 @@ def site(folder: Path) -> Iterator[Page]:
 
 
 def made(folder: Path, wanted: Callable[[str], bool]) -> Iterator[Page]:
-    """Write the wanted pages of reports, comparisons and the site, and yield them."""
     for name, make in reports(folder).items():
         if wanted(name):
             path = folder / f"{name}.html"
@@ -211,7 +207,7 @@ def viewer(plays: bool = False) -> Iterator[Page]:
         Viewer(server, robot, q, line(robot, q, -q, 2.0, 20) if plays else None)
         host = f"127.0.0.1:{server.get_port()}"
         own = (f"http://{host}", f"ws://{host}", "data:", "blob:", "chrome")
-        ready = (  # on the screen of a telephone, the controls are hidden
+        ready = (  # The controls are hidden on a phone.
             "return !!document.querySelector('canvas')"
             " && (!!document.getElementById('fold') || document.body.innerText.includes('verified'))"
         )
@@ -222,7 +218,7 @@ def viewer(plays: bool = False) -> Iterator[Page]:
 
 
 def load(browser: Browser, page: Page) -> None:
-    browser.chrome.get("about:blank")  # otherwise a new fragment would not reload the page
+    browser.chrome.get("about:blank")  # A change of the fragment alone does not reload a page.
     browser.chrome.get(page.url)
     if page.ready:
         browser.wait(page.ready)
@@ -275,7 +271,7 @@ def walk(browser: Browser, page: Page) -> list[str]:
     for _ in range(_PRESSES):
         ActionChains(browser.chrome).send_keys(Keys.TAB).perform()
         stop = browser.js(_FOCUS)
-        if stop is None:  # the Tab key has left the page
+        if stop is None:  # The Tab key has left the page.
             break
         what, shown, sized, named = stop
         seen.append(what)

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # import from this checkout without an installation
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # idle threads of PyTorch must not slow other libraries
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # Idle threads of PyTorch slow other libraries.
 
 from scripts.benchmarking import sections as measured
 from scripts.benchmarking.contenders import ALWAYS, PEERS, Contender
@@ -53,10 +53,10 @@ QUICK = Plan(1_000, 3, ("placement",), (6, 12), 20_000, (1, 1000), 100, (100, 1_
 
 
 def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender]) -> dict[str, Any]:
-    """Measure everything; raise DifferenceError if two contenders have different results."""
+    """Measure everything; raise DifferenceError if two libraries have different results."""
     name, frame = SUBJECTS[0]
     n, rounds = plan.configurations, plan.rounds
-    ways: dict[str, Iterator[Row]] = {  # a generator measures only when its rows are read
+    ways: dict[str, Iterator[Row]] = {  # A generator measures when its rows are read.
         **{name: measured.contest_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
         "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
         "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),

@@ -4,8 +4,8 @@
     python scripts/benchmark_gpu.py panda --compile-only        # needs no GPU
 
 The program first runs the file's test vectors on the GPU; a wrong number ends the run. Each time is the
-median of several launches. The share of the memory's bandwidth is a ratio of two data rates: that of the
-code, and that of a copy in the GPU's memory. A data rate counts the bytes that are read and written.
+median of several launches. The share of the memory's bandwidth is the data rate of the code, divided by the
+data rate of a copy in the GPU's memory. A data rate counts the bytes that are read and written.
 
 If PyTorch with CUDA is installed, the program also measures the export for PyTorch, called directly and by
 `torch.compile`. If PyTorch Kinematics is installed, the program also measures its Jacobian. The numbers of
@@ -71,12 +71,10 @@ def gpus() -> int:
 
 
 def bytes_of(code: FrameCode, function: Function, real: str) -> int:
-    """Return the number of bytes that one configuration reads and writes."""
     return _BYTES[real] * (sum(code.widths(function).values()) + len(function.results))
 
 
 def program(code: FrameCode) -> str:
-    """Return the text of the program that prints one JSON line for each measurement."""
 
     def filled(text: str, **values: object) -> str:
         for name, value in values.items():
@@ -116,7 +114,6 @@ def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
 
 
 def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
-    """Yield the measurements, with configurations per second and the share of the memory's bandwidth."""
     found = [json.loads(line) for line in lines]
     if not found or "bandwidth" not in found[0]:
         raise ValueError("the program printed no bandwidth of the memory")
@@ -137,10 +134,7 @@ def table(measured: Iterable[dict[str, Any]]) -> str:
 
 
 def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") -> Iterator[str]:
-    """Yield a JSON line for each measurement of the export to PyTorch and of PyTorch Kinematics.
-
-    Raise ValueError if a result is wrong.
-    """
+    """Yield a JSON line for each measurement with PyTorch; raise ValueError for a wrong result."""
     try:
         import torch
         from torch.utils.benchmark import Timer
@@ -182,7 +176,7 @@ def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
         chains[kind] = copy.deepcopy(chain).to(dtype=kind, device=device)
         found = chains[kind].jacobian(torch.tensor(q[:, columns], dtype=kind, device=device))
         if not np.abs(found.cpu().numpy() - robot.jacobian(q, frame)[..., columns]).max() <= most:
-            raise ValueError(f"PyTorch Kinematics computes another Jacobian in {real} precision")
+            raise ValueError(f"PyTorch Kinematics computes a wrong Jacobian in {real} precision")
     return lambda q: chains[q.dtype].jacobian(q[:, columns])
 
 

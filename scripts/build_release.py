@@ -34,14 +34,13 @@ def _run(*command: str | Path, **environment: str) -> None:
 
 
 def _commit_time() -> str:
-    """Return the time of the last commit in seconds, or 1980-01-01 outside a repository."""
+    """Return the time of the last commit (s), or 1980-01-01 outside a repository."""
     command = ["git", "log", "-1", "--format=%ct"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     return done.stdout.strip() or "315532800"
 
 
 def build(folder: Path) -> tuple[Path, Path]:
-    """Build the sdist from the checkout and the wheel from the sdist; return the paths of the two files."""
     build_: list[str | Path] = [sys.executable, "-m", "build", "--no-isolation", "--outdir", folder]
     time = _commit_time()
     _run(*build_, "--sdist", ROOT, SOURCE_DATE_EPOCH=time)

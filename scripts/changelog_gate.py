@@ -24,7 +24,6 @@ class CannotTellError(Exception):
 
 
 def git(root: Path, *words: str) -> str:
-    """Return git's output; raise CannotTellError if git fails."""
     try:
         done = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=True)
     except FileNotFoundError:
@@ -35,7 +34,7 @@ def git(root: Path, *words: str) -> str:
 
 
 def left_main(root: Path) -> str:
-    """Return the commit at which HEAD left main; raise CannotTellError if there is none."""
+    """Return the commit at which HEAD left main."""
     head = git(root, "rev-parse", "HEAD").strip()
     for main in ("origin/main", "main"):
         try:
@@ -48,7 +47,6 @@ def left_main(root: Path) -> str:
 
 
 def main(root: Path = ROOT, base: str | None = None) -> int:
-    """Check the branch; return 1 if a line is missing, else 0."""
     try:
         base = base or left_main(root)
         entries = git(root, "diff", "--numstat", "-z", "-M", base, "HEAD")

@@ -76,7 +76,6 @@ class Subject:
         return cls(name, robot, (robot.sample(n), v, a), (robot.tip_frame, *links))
 
     def results(self) -> Iterator[tuple[str, Quantity, Reference, tuple[FloatArray, ...]]]:
-        """Yield (name, quantity, reference, inputs) of each result."""
         for quantity in recursive_quantities():
             for reference in Reference if quantity.referred else (Reference.LOCAL_WORLD_ALIGNED,):
                 what = f"{self.name}/{quantity.name}/{reference.name}"
@@ -97,12 +96,11 @@ class Subject:
 
 
 def same(x: FloatArray, y: FloatArray) -> bool:
-    """Return whether two arrays have the same bits; 0 and -0 are different."""
     return x.shape == y.shape and x.tobytes() == y.tobytes()
 
 
 def differing(subject: Subject, now: Arrays) -> Iterator[str]:
-    """Yield the results of batches and prepared evaluators that differ from single calls."""
+    """Yield results of batches and prepared evaluators that differ from single calls."""
     frame = subject.frames[0]
     for what, quantity, reference, inputs in subject.results():
         few = [x[:KEPT] for x in inputs]
@@ -129,7 +127,6 @@ def differing(subject: Subject, now: Arrays) -> Iterator[str]:
 
 
 def differing_interpreted(subject: Subject) -> Iterator[str]:
-    """Yield the results that differ between plain Python and the kernels."""
     for what, quantity, reference, inputs in subject.results():
         row, found = [x[INTERPRETED] for x in inputs], []
         for way in WAYS:
@@ -140,7 +137,6 @@ def differing_interpreted(subject: Subject) -> Iterator[str]:
 
 
 def to_keep(subject: Subject) -> dict[str, Any]:
-    """Return the inputs, the frames, and each result with its bound, as named arrays for an .npz file."""
     stored: dict[str, Any] = {f"{subject.name}/{x}": y for x, y in zip("qva", subject.inputs, strict=True)}
     stored[f"{subject.name}/frames"] = np.array(subject.frames)
     for what, quantity, reference, inputs in subject.results():
@@ -155,7 +151,6 @@ def to_keep(subject: Subject) -> dict[str, Any]:
 
 
 def digest(now: Arrays) -> str:
-    """Return a digest of all results, which is equal on every machine."""
     whole = hashlib.sha256()
     for what in sorted(now):
         if what.count("/") == 2:
@@ -164,7 +159,7 @@ def digest(now: Arrays) -> str:
 
 
 def share(what: str, now: Arrays, stored: Arrays) -> float:
-    """Return the difference from the stored result as a fraction of the stored bound; 0 for equal bits."""
+    """Return the difference from the stored result as a fraction of the stored bound."""
     if same(now[what], stored[what]):
         return 0.0
     apart = np.abs(now[what] - stored[what])

@@ -91,7 +91,7 @@ def _largest(found: Sequence[float], count: int) -> float:
 
 
 def subjects(tips: bool) -> Iterator[tuple[str, Robot, str]]:
-    """Yield the tip frame of each robot, then the other leaf links in a fixed random order."""
+    """Yield the tip frame of each robot, then other leaf links in a fixed random order."""
     robots = {name: urdfkin.load(name) for name in examples()}
     for name, robot in robots.items():
         yield name, robot, robot.tip_frame
@@ -114,7 +114,6 @@ def found_of(robot: Robot, frame: str, ways: Collection[str]) -> dict[str, Any]:
 
 
 def check(tips: bool, keep: Path | None, ways: Collection[str]) -> int:
-    """Check every leaf or tip that has no stored result, and print a summary; return 1 for an error."""
     lines = lines_of(keep)
     stored = {(line["robot"], line["frame"]) for line in lines}
     for name, robot, frame in subjects(tips):
@@ -158,7 +157,7 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _files(library: str, folder: Path) -> Iterator[Path]:
-    """Write two files for each tip: one in a library's export format, and one in the format `array`."""
+    """Write each tip in a library's format, and in the format `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)
@@ -184,14 +183,12 @@ def store(keep: Path | None, line: str) -> None:
 
 
 def tell(lines: Sequence[dict[str, Any]]) -> None:
-    """Print the largest error of each way to run the code."""
     ways = sorted({way for line in lines for way, share in line.items() if isinstance(share, float)})
     worst = ", ".join(f"{way} {max(line.get(way, 0.0) for line in lines):.2g}" for way in ways)
     print(f"worst error as a share of the bound: {worst}")
 
 
 def page(text: str) -> str:
-    """Return the page with the sizes of the code for three frames and each quantity."""
     rows = []
     frames = ("panda", "panda_hand"), ("talos", "gripper_left_base_link"), (chain_urdf(100), "tip")
     for (source, frame), quantity in product(frames, QUANTITIES):

@@ -60,18 +60,15 @@ _DOCUMENT = r"""\documentclass{article}
 
 
 class Missing(Exception):  # noqa: N818  only this format is skipped
-    """Error if an interpreter or library of a format is not installed."""
+    """An interpreter or a library of a format is not installed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A table, and configurations (n, coordinates) of the table's coordinates."""
-
     table: DHTable
     q: FloatArray
 
     def given(self, form: str) -> list[list[float]]:
-        """Return the configurations with their coordinates in the order that the exported code uses."""
         if form not in LANGUAGES or form == "sympy":
             return list(self.q.tolist())
         names = coordinate_names(to_tree(self.table))
@@ -91,7 +88,6 @@ def in_python(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
 
 
 def elsewhere(form: str, interpreter: str, jobs: Sequence[Job], folder: Path) -> Poses:
-    """Run the Python formats in another interpreter."""
     given, found = folder / "jobs.json", folder / "poses.json"
     data = [{"form": form, "text": export(job.table, form), "q": job.q.tolist()} for job in jobs]
     given.write_text(json.dumps(data), "utf-8")
@@ -116,7 +112,6 @@ def in_c(jobs: Sequence[Job], folder: Path) -> Poses:
 
 
 def in_octave(form: str, jobs: Sequence[Job], folder: Path) -> Poses:
-    """Run one of MATLAB's formats in one process of Octave."""
     octave, lines = _program("octave-cli"), [_FIRST.get(form, "")]
     for k, job in enumerate(jobs):
         text = export(replace(job.table, robot=f"t{k}"), form)
@@ -174,7 +169,7 @@ RUN: dict[str, Run] = {
 
 
 def too_wide(tables: Sequence[str], folder: Path) -> list[float]:
-    """Return the excess width of each LaTeX table on the page of an `article`, in points; 0 if it fits."""
+    """Return the excess width (points) of each LaTeX table on the page of an `article`."""
     latex = _program("pdflatex")
     marked = (f"\\typeout{{table {k}}}\n{table}\n\\clearpage\n" for k, table in enumerate(tables))
     (folder / "tables.tex").write_text(_DOCUMENT + "".join(marked) + "\\end{document}\n", "utf-8")
@@ -196,7 +191,7 @@ def _program(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A table, its coordinates at some configurations, and Pinocchio's poses of its tip in its base."""
+    """A table, its coordinates, and Pinocchio's poses of its tip in its base."""
 
     name: str
     job: Job
@@ -207,7 +202,7 @@ class Subject:
         return self.job.table
 
     def off(self, found: FloatArray) -> tuple[float, float]:
-        """Return the tip's distance from Pinocchio's (m), and the table's error as a share of its bound."""
+        """Return the tip's distance from Pinocchio's (m), and the error as a share of its bound."""
         apart = np.abs(found - self.table.placement(self.job.q))[:, :3].max(axis=(-1, -2))
         # A table without lengths still has rounding errors of its angles.
         allowed = 2.0 * np.maximum(self.table.rounding(self.job.q), EPS * of_rows(len(self.table.rows)))
@@ -215,7 +210,6 @@ class Subject:
 
 
 def subjects(leaves: bool) -> Iterator[Subject]:
-    """Yield tables; `robot.dh` has compared each of them with Pinocchio."""
     for name in examples():
         robot = urdfkin.load(name)
         tips = [robot.tree.frame_name(leaf) for leaf in robot.tree.leaves()] if leaves else [robot.tip_frame]
@@ -232,7 +226,7 @@ def subject(robot: Robot, name: str, table: DHTable) -> Subject:
 
 
 def fits(form: str, table: DHTable) -> bool:
-    """Return whether the format can represent the table; the code formats of `urdfkin export` always can."""
+    """Return whether a format can represent the table."""
     if form in LANGUAGES:
         return True
     try:
@@ -270,7 +264,6 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def _compared(form: str, found: Sequence[Subject], folder: Path) -> tuple[list[str], list[str]]:
-    """Return the cells of an export format, and the names of wrong exported tables."""
     taken = [one for one in found if form not in FORMATS or fits(form, one.table)]
     if form == "matlab-symbolic":
         taken = [one for one in taken if 0 < len(one.table.rows) <= SMALL][:FEW]

@@ -36,7 +36,7 @@ def _robot(inside: str) -> bytes:
 
 
 def _filled(size: int, piece: str) -> str:
-    """Return many copies of a piece, up to a size in bytes; {i} in the piece is the number of the copy."""
+    """Repeat a piece up to a size in bytes; {i} in the piece is the number of the copy."""
     count = max(size // len(piece.format(i=10**6)), 2)
     return piece * count if piece == piece.format(i=0) else "".join(piece.format(i=i) for i in range(count))
 
@@ -69,7 +69,7 @@ _SHAPE = '<visual><geometry><box size="1 1 1"/></geometry><material name="m"/></
 _MARKS = "a" + "\u0301\u0323" * 100
 
 KINDS: dict[str, Kind] = {
-    # inputs with long or many numbers
+    # Inputs with long or many numbers.
     "one long number": lambda n: _origin(f"{'1' * n}e+ 0 0"),
     "one long decimal": lambda n: _origin(f"0.{'1' * n} 0 0"),
     "many numbers in a vector": lambda n: _origin("1 " * (n // 2)),
@@ -78,23 +78,23 @@ KINDS: dict[str, Kind] = {
     "a number by long references": lambda n: _origin(f"&#{'0' * n}49; 0 0"),
     "bad numbers": _many(f'{_FIXED}<origin xyz="a b c"/></joint>', ""),
     "signs and points": lambda n: _origin(f"{'+.' * (n // 2)} 0 0"),
-    # many comments that suppress findings
-    "comments that silence nothing": _many("<!-- urdfkin: ignore[x{i}] y -->\n"),
-    "comments behind each other": _many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
+    # Inputs with many comments that suppress findings.
+    "comments that suppress no finding": _many("<!-- urdfkin: ignore[x{i}] y -->\n"),
+    "consecutive comments": _many("<!-- urdfkin: ignore[URDF207] y --><x{i}/>"),
     "one long comment": lambda n: _robot(f"<!-- urdfkin: ignore[{'207 ' * (n // 4)}] y -->{_LINK}"),
-    # inputs with long or many names
+    # Inputs with long or many names.
     "one long name": lambda n: _robot(f'<link name="{"a" * n}"/>'),
     "one long tag": lambda n: _link("base", f"<{'a' * n}/>"),
     "one long attribute's name": lambda n: _link("base", f'<visual {"a" * n}="1"/>'),
     "one long type": lambda n: _robot(f'{_LINK}<joint name="j" type="{"a" * n}"/>'),
     "one long version": lambda n: f'<robot name="r" version="{"1" * n}.0">{_LINK}</robot>'.encode(),
     "one long address": lambda n: _link("base", _MESH.format("a" * n)),
-    "names that say the same": _many('<link name="a"/>', ""),
+    "equal names": _many('<link name="a"/>', ""),
     "names of combining marks": _many(f'<link name="{{i}}{_MARKS}"/>', ""),
     "names that look alike": _many(
         f'<link name="{"ab" * 40}{{i}}"/><joint name="{{i}}" type="x{"ba" * 40}"/>', ""
     ),
-    "links by misspelt names": _many(
+    "misspelt names of links": _many(
         f'<link name="{"ab" * 25}{{i}}"/>{_FIXED}<parent link="{"ba" * 25}{{i}}"/><child link="c"/></joint>',
         "",
     ),
@@ -102,20 +102,20 @@ KINDS: dict[str, Kind] = {
     "unknown leaders": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="x{}"/>'),
     "undeclared prefixes": _many("<p{i}:x/>"),
     "declared prefixes": _many('<gazebo xmlns:p{i}="http://p" p{i}:a="1"/>'),
-    # inputs with many attributes
+    # Inputs with many attributes.
     "attributes of one link": lambda n: _robot('<link name="l" ' + _filled(n, 'a{i}="1" ') + "/>"),
     "unknown attributes": _many('<link name="l{i}" ' + "".join(f'a{k}="1" ' for k in range(60)) + "/>", ""),
     "one long value": lambda n: _robot(f'{_LINK}<material file="{"a" * n}"/>'),
     "openings of expressions": lambda n: _robot(f'{_LINK}<material file="{"${" * (n // 2)}"/>'),
     "references in a value": lambda n: _robot(f'{_LINK}<material file="{"&amp;" * (n // 5)}"/>'),
-    # long or much content between elements
+    # Inputs with long content between elements.
     "text": _many("words "),
     "lines": _many("\n"),
     "lines, then a broken tag": lambda n: _robot(_LINK + "\n" * n + "<"),
     "references in text": _many("&lt;"),
     "text between elements": _many("a<gazebo/>"),
-    "text like attributes": _many("\t", f'{_LINK}="'),
-    "text like many attributes": _many("=\"\t='"),
+    "text that looks like attributes": _many("\t", f'{_LINK}="'),
+    "text that looks like many attributes": _many("=\"\t='"),
     "one comment": lambda n: _robot(f"{_LINK}<!--{'a' * n}-->"),
     "comments": _many("<!---->"),
     "one instruction": lambda n: f"<?a {'a' * n}?>".encode() + _robot(_LINK),
@@ -127,11 +127,11 @@ KINDS: dict[str, Kind] = {
     "a long encoding": lambda n: f'<?xml version="1.0" encoding="{"a" * n}"?>'.encode() + _robot(""),
     "undefined entities": lambda n: _robot(f'<link name="&{"a" * n};"/>'),
     "a document type": lambda n: f"<!DOCTYPE {'a' * n}>".encode() + _robot(_LINK),
-    # structure
-    "links that nothing connects": _many('<link name="l{i}"/>\n', ""),
+    # Inputs with an unusual structure.
+    "links without joints": _many('<link name="l{i}"/>\n', ""),
     "a chain": lambda n: _tree(n, lambda i: i),
     "a star": lambda n: _tree(n, lambda i: 0),
-    "one place for all joints": lambda n: _tree(n, lambda i: 0, "continuous"),
+    "one parent of all joints": lambda n: _tree(n, lambda i: 0, "continuous"),
     "a chain of mimic joints": lambda n: _tree(n, lambda i: i, "continuous", '<mimic joint="j{}"/>'),
     "a loop": lambda n: _tree(n, lambda i: i).replace(b'<child link="l1"/>', b'<child link="l0"/>', 1),
     "several parents": _many(
@@ -149,7 +149,7 @@ KINDS: dict[str, Kind] = {
     "materials": _many("".join(f'<material name="m{k}"/>' for k in range(9))),
     "tags that are never closed": lambda n: b'<robot name="r">' + b"<link>" * (n // 6),
     "a file cut in a tag": lambda n: b'<robot name="r"><link name="' + b"a" * n,
-    # bytes
+    # Inputs with unusual bytes.
     "no XML": lambda n: b"a" * n,
     "blanks": lambda n: b" " * n,
     "zero bytes": lambda n: _robot("\0" * n),

@@ -36,7 +36,7 @@ ROUNDING = 1e-10
 
 
 def pair(name: str, what: str) -> dict[str, Any] | None:
-    """Check one change of one robot; return None if the change cannot be made to this robot."""
+    """Check one change of one robot; return None if the change is impossible."""
     a, b = robot(name), changed(name, what)
     if b is None:
         return None

@@ -24,7 +24,7 @@ A, B = ROBOTS / "elbow.urdf", ROBOTS / "planar_two_link.urdf"
 
 
 def files_run(call: Callable[[], object]) -> list[str]:
-    """Return the files of urdfkin, relative to the package, whose functions run during a call."""
+    """Return the files of urdfkin whose functions run during a call."""
     found: set[str] = set()
     importing = 0
 
@@ -50,7 +50,7 @@ def files_of_load(source: Path) -> list[str]:
 
 
 def files_of_same(first: Path, second: Path) -> list[str]:
-    """Return the files whose functions run during `same`, without the compilation of kernels."""
+    """Return the files whose functions run during `same`, without compiling kernels."""
     same = partial(urdfkin.same, first, second)
     with only("compiled"):
         same()

@@ -96,7 +96,6 @@ _FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n?", re.DOTALL | re.MULTILINE)
 
 
 def on_config(config: Any) -> Any:
-    """Add the pages that mkdocs.yml does not name to the end of the menu."""
     named = set(re.findall(r"[\w/-]+\.md", json.dumps(config.nav)))
     docs = Path(config.docs_dir)
     pages = sorted(str(path.relative_to(docs)) for path in docs.rglob("*.md"))
@@ -120,7 +119,6 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Put formulas on separate lines, let pictures follow the chosen theme, and link the notebook."""
     markdown = _DISPLAYED.sub(r"\n$`\1`$\n", markdown)
     markdown = _PICTURE.sub(r'<img src="\2#only-light"\3><img src="\1#only-dark"\3>', markdown)
     if not page.file.src_uri.startswith(LESSONS):
@@ -145,13 +143,12 @@ def on_page_content(content: str, **_: Any) -> str:
 
 
 def on_post_page(output: str, **_: Any) -> str:
-    """Give the search dialog a name for screen readers, because the theme gives it none."""
+    """Name the search dialog for screen readers; the theme gives it no name."""
     dialog = 'data-md-component="search" role="dialog"'
     return output.replace(dialog, f'{dialog} aria-label="Search"')
 
 
 def notebook(page: str) -> dict[str, Any]:
-    """Convert a page to a notebook. The outputs are copied from the page; a test checks them."""
     cells: list[dict[str, Any]] = []
     at = 0
     for block in _FENCE.finditer(page):
@@ -169,7 +166,6 @@ def notebook(page: str) -> dict[str, Any]:
 
 
 def _tell(cells: list[dict[str, Any]], text: str) -> None:
-    """Add a text cell with formulas in notebook syntax, without pictures and links."""
     text = re.sub(r"\$`(.*?)`\$", r"$\1$", _DISPLAYED.sub(r"$$\1$$", text), flags=re.DOTALL)
     if text := text.strip():
         cells.append(_cell("markdown", text))
@@ -203,7 +199,6 @@ def subject_page(page: str) -> str:
 
 
 def address(name: str) -> str:
-    """Return the full path of a name in `LIBRARY`."""
     if "." in name:
         return name
     return f"{urdfkin._HOMES[name]}.{name}" if name in urdfkin.__all__ else f"{_ROBOT}.{name}"

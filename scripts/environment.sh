@@ -1,6 +1,6 @@
-# Sourced by try.sh, test.sh and test_long.sh: a virtual environment in .venv with urdfkin and the extras named in $1.
-# Needs a Python >= 3.11; installs Debian's python3-venv if the Python there cannot make environments.
-# install_nvcc adds CUDA's compiler.
+# Functions for try.sh, test.sh and test_long.sh. make_environment makes a virtual environment in .venv with urdfkin
+# and the extras in $1. It needs Python >= 3.11. If Python cannot make virtual environments, make_environment
+# installs Debian's python3-venv. install_nvcc installs CUDA's compiler.
 
 cd "$(dirname "$0")/.." || exit 2
 

@@ -57,7 +57,7 @@ def case(seed: int, family: str, number: int) -> Case:
 
 
 class Worker:
-    """A process that tests one document after another, and may crash; `work` is its main function."""
+    """A process that tests one document after another, and may crash."""
 
     def __init__(self, work: Callable[[Connection], None], timeout: float) -> None:
         self.work, self.timeout = work, timeout
@@ -73,7 +73,7 @@ class Worker:
                 self.stop(0.0)
                 return "hangs", f"no answer in {self.timeout:g} s"
             word, details = self.pipe.recv()
-        except (EOFError, OSError):  # the process has ended
+        except (EOFError, OSError):  # The process has ended.
             return "kills the process", f"exit status {self.stop(5.0)}"
         return word, details
 
@@ -86,7 +86,6 @@ class Worker:
             raise RuntimeError("the worker process does not start")
 
     def stop(self, seconds: float) -> int | None:
-        """Kill the process if it does not end within this time; return its exit status."""
         if (process := self.process) is None:
             return None
         self.pipe.close()
@@ -98,7 +97,7 @@ class Worker:
 
 
 def work(seed: int, pipe: Connection) -> None:
-    """Main function of the worker process: receive a family and a number, send the outcome, and repeat."""
+    """Run in the worker process: receive a family and a number, and send the outcome."""
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)
@@ -138,7 +137,6 @@ def fuzz(
 
 
 def shares(families: Sequence[str], mutants: int, whole: int) -> list[tuple[str, int]]:
-    """Return the family and the number of each mutant and each random robot; the families alternate."""
     chosen = [family for family in families if family != MUTANTS]
     asked = [(MUTANTS, number) for number in range(mutants) if MUTANTS in families]
     return asked + [(chosen[i % len(chosen)], i // len(chosen)) for i in range(whole) if chosen]

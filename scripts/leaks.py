@@ -28,7 +28,6 @@ _ROBOT = """<robot name="r{k}">
 
 
 def use(k: int, folder: Path) -> None:
-    """Load robot `k` from a file, check it and compute with it; some robots are rejected."""
     text = _ROBOT.format(k=k, x=0.1 + 1e-6 * k, odd="&lt;b&gt; " if k % 3 else "")
     path = folder / f"{k % 10}.urdf"
     path.write_text(text if k % 5 else text.replace("</robot>", ""))
@@ -42,7 +41,7 @@ def use(k: int, folder: Path) -> None:
 
 
 def usage() -> dict[str, float]:
-    """Return the resident memory in MiB, the open descriptors, and the objects of the garbage collector."""
+    """Return the resident memory (MiB), the open descriptors and the number of objects."""
     gc.collect()
     here = psutil.Process()
     memory = here.memory_info().rss / 2**20
@@ -50,7 +49,6 @@ def usage() -> dict[str, float]:
 
 
 def measure(n: int) -> list[dict[str, float]]:
-    """Process n robots in several groups, and return the usage after each group."""
     # A kernel that is loaded later would look like a leak.
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), only("compiled"):
         warnings.simplefilter("ignore")

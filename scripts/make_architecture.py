@@ -76,13 +76,11 @@ def named(text: str) -> Iterator[str]:
 
 @cache
 def all_named() -> Mapping[str, frozenset[str]]:
-    """Return the imported names of each module, foreign libraries included."""
     return {module: frozenset(named(path.read_text(encoding="utf-8"))) for module, path in modules().items()}
 
 
 @cache
 def imports() -> Mapping[str, frozenset[str]]:
-    """Return the modules of this repository that each module imports."""
     found: dict[str, frozenset[str]] = {}
     for module, names in all_named().items():
         heads = {name: name.rpartition(".")[::2] for name in names}
@@ -97,7 +95,7 @@ def imports() -> Mapping[str, frozenset[str]]:
 
 @cache
 def _reexported(package: str) -> frozenset[str]:
-    """Return the names that a package's `__init__` imports; such a name hides a submodule of this name."""
+    """Return names from a package's `__init__`; each hides a submodule of this name."""
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
@@ -107,7 +105,7 @@ def _reexported(package: str) -> frozenset[str]:
 
 
 def upwards() -> list[str]:
-    """List the forbidden imports, in which a package imports a package that comes later in the order."""
+    """List the imports of a package that comes later in the order."""
     rank = {package.name: number for number, package in enumerate(PACKAGES)}
     return sorted(
         f"{module} imports {other}"
@@ -118,7 +116,6 @@ def upwards() -> list[str]:
 
 
 def cycles() -> list[list[str]]:
-    """Return a list of modules that import each other in a cycle, if there are any."""
     try:
         TopologicalSorter(imports()).prepare()
     except CycleError as error:
@@ -127,7 +124,6 @@ def cycles() -> list[list[str]]:
 
 
 def arrows() -> set[tuple[str, str]]:
-    """Return the pairs (package, imported package)."""
     pairs = ((package_of(one), package_of(other)) for one, others in imports().items() for other in others)
     return {(one, other) for one, other in pairs if one != other}
 
@@ -136,7 +132,7 @@ _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
 
 
 def picture() -> str:
-    """Draw the packages in order. The row of a package has a dot for each package that it imports."""
+    """Draw the packages in order, with a dot for each imported package."""
     place = {package.name: number for number, package in enumerate(PACKAGES)}
     width, height = _LEFT + _CELL * len(PACKAGES) + 470, _TOP + _ROW * len(PACKAGES) + 12
     lines = [
@@ -165,7 +161,6 @@ def picture() -> str:
 
 
 def page() -> str:
-    """Return docs/architecture.md with a current table."""
     rows = [(f"`{one.name}`", one.purpose, one.contents) for one in PACKAGES]
     packages = table(("Package", "Purpose", "Contents"), rows)
     return inserted(PAGE.read_text(encoding="utf-8"), packages=packages)

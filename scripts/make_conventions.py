@@ -1,7 +1,7 @@
 """Write docs/conventions.md: the conventions of urdfkin, Pinocchio and MuJoCo, determined by experiment.
 
 For each row, the script compares a library's result with several candidate definitions, on a random robot and
-motion. It writes the definition that matches. A test checks that the page is current.
+motion. The script writes the definition that matches. A test checks that the page is current.
 
 The tables of other tools come from urdfkin/model/conventions/conventions.toml. With --measure, the script
 first runs each installed library on all robots of the catalogue, in the library's convention, and writes the
@@ -47,13 +47,13 @@ def _joint(name: str, kind: str, parent: str, child: str, more: str = "") -> str
 
 
 def _robot(*joints: str) -> str:
-    """Return a robot with links `base`, `l1`, `l2`, `l3`; MuJoCo does not merge them."""
+    """Return a robot with links `base`, `l1`, `l2`, `l3`; MuJoCo does not merge the links."""
     links = "".join(f'<link name="{name}">{_BODY}</link>' for name in ("base", *(f"l{i}" for i in (1, 2, 3))))
     compiler = '<mujoco><compiler fusestatic="false"/></mujoco>'
     return f'<robot name="r">{compiler}{links}{"".join(joints)}</robot>'
 
 
-ARM = _robot(  # the joints are in reverse alphabetical order
+ARM = _robot(  # The joints are in reverse alphabetical order.
     _joint("c", "revolute", "base", "l1", '<axis xyz="0 0 1"/>'),
     _joint("b", "revolute", "l1", "l2", '<axis xyz="0 1 0"/>'),
     _joint("a", "revolute", "l2", "l3", '<axis xyz="0.6 0 0.8"/>'),
@@ -104,7 +104,7 @@ Readings = Mapping[str, FloatArray]
 
 
 def which(found: FloatArray, readings: Readings) -> str:
-    """Return the name of the definition that matches a result; raise ValueError unless exactly one does."""
+    """Return the only definition that matches a result."""
     named = [
         name for name, x in readings.items() if found.shape == x.shape and np.allclose(found, x, 1e-6, 1e-6)
     ]
@@ -158,7 +158,6 @@ class MeasuredMotion:
         return R, T[0][:3, 3], rate[:3, 3], w, rate_2[:3, 3], alpha
 
     def velocity_readings(self) -> dict[str, FloatArray]:
-        """Return the velocity by six definitions: two row orders, three choices of point and axes."""
         R, p, v, w, _, _ = self.motion()
         points = {
             "of the frame's origin, in world axes": (v, w),
@@ -170,7 +169,6 @@ class MeasuredMotion:
         return linear_first | other
 
     def acceleration_readings(self, *, flipped: bool) -> dict[str, FloatArray]:
-        """Return the accelerations by four definitions: classical or spatial, with or without gravity."""
         _, _, v, w, a, alpha = self.motion()
         up, spatial = np.array([0.0, 0.0, 9.81]), a - np.cross(w, v)
         linear = {
@@ -182,7 +180,6 @@ class MeasuredMotion:
         return {name: np.concatenate((alpha, x) if flipped else (x, alpha)) for name, x in linear.items()}
 
     def mujocos(self, function: Callable[..., None], local: int) -> FloatArray:
-        """Return a six-vector (6,) in MuJoCo's own order."""
         six = np.empty(6)
         function(self.mj_model, self.mj_data, mujoco.mjtObj.mjOBJ_XBODY, self.body, six, local)
         return six
@@ -195,7 +192,6 @@ def rows() -> Iterator[Row]:
 
 
 def _motions(asked: MeasuredMotion) -> Iterator[Row]:
-    """Yield the rows about velocities, Jacobians and accelerations."""
     robot, readings, frame = asked.robot, asked.velocity_readings(), (asked.model, asked.data, asked.frame)
     for name, local in (("local_world_aligned", 0), ("local", 1), ("world", None)):
         theirs = pin.getFrameVelocity(*frame, getattr(pin, name.upper())).vector
@@ -287,7 +283,6 @@ def _layout() -> Iterator[Row]:
 
 
 def _readers(text: str) -> tuple[str, str, str]:
-    """Return for urdfkin, Pinocchio and MuJoCo whether each accepts a URDF text."""
 
     def reads(load: Callable[..., object], **how: bool) -> bool:
         try:
@@ -308,7 +303,6 @@ def _readers(text: str) -> tuple[str, str, str]:
 
 
 def _free() -> Iterator[Row]:
-    """Yield the two rows of the table about a free body: the order of q, and the axes of v."""
     rng = np.random.default_rng(1)
     xyzw = rng.normal(size=4)
     xyzw /= np.linalg.norm(xyzw)
@@ -404,7 +398,6 @@ def measure() -> None:
 
 
 def _measured(name: str, make: Callable[[Any, Path], Any]) -> str:
-    """Return the number of robots on which a library agrees with urdfkin, and the largest difference."""
     from tests.model.conventions.test_libraries import _conversion, _differences, _loaded
 
     agree, worst, share, robots = 0, 0.0, 0.0, sorted(catalogue())

@@ -48,19 +48,16 @@ VERDICTS = {
 
 
 def configurations(robot: urdfkin.Robot) -> list[dict[str, Any]]:
-    """Return random values within limits, by the names of the independent joints."""
     return [values_of(robot, q) for q in robot.sample(CONFIGURATIONS, seed=0)]
 
 
 def expected(robot: urdfkin.Robot) -> list[dict[str, Any]]:
-    """Return the poses of all links in the base frame for each configuration; Pinocchio checks each pose."""
     links = list(robot.link_names)
     T = robot.placement(robot.sample(CONFIGURATIONS, seed=0), links)
     return [dict(zip(links, one, strict=True)) for one in T]
 
 
 def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a verdict, and the largest difference or a message."""
     if "error" in answer:
         return {"verdict": "refused", "message": answer["error"][:_QUOTED]}
     if any("tip" not in theirs for theirs in answer["poses"]):
@@ -86,7 +83,6 @@ def cell(feature: Feature, robot: urdfkin.Robot, library: str, answer: Mapping[s
 
 
 def environment(folder: Path, library: str) -> Path:
-    """Return the Python of a library's environment; install the environment if it is missing."""
     place, package = folder / library, LIBRARIES[library].package
     python = place / "bin" / "python"
     wanted = f"{package}=={DATA['versions'][library]}"
@@ -98,7 +94,6 @@ def environment(folder: Path, library: str) -> Path:
 
 
 def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Yield a library's answer to each case; start a new process after a crash or a timeout."""
     todo = list(cases)
     while todo:
         try:
@@ -117,7 +112,7 @@ def answers(python: Path, library: str, cases: list[dict[str, Any]]) -> Iterator
 
 
 def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the versions and cells of the given libraries; all other libraries keep their earlier values."""
+    """Measure some libraries; all other libraries keep their earlier values."""
     robots = {name: urdfkin.load(feature.text) for name, feature in FEATURES.items()}
     cases = [
         {"name": name, "text": feature.text, "configurations": configurations(robots[name])}
@@ -142,7 +137,6 @@ def measure(folder: Path, libraries: list[str], before: Mapping[str, Any]) -> di
 
 
 def page(text: str, figures: Mapping[str, Any]) -> str:
-    """Return the page with the cells, the stated differences, the features and the reasons."""
     cells, versions = figures["cells"], figures["versions"]
     titles = {name: LIBRARIES[name].title for name in cells}
     notes: dict[str, Any] = {}  # the documented differences; a key is the letter of a footnote

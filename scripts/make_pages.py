@@ -80,7 +80,6 @@ LIMITS = {
 
 
 def findings() -> dict[str, str]:
-    """Return the limits, the codes, and the warnings of the robots in the catalogue."""
     limits = [
         (f"{limit:,} {words}", f"`{option}`" * bool(option)) for option, (limit, words) in LIMITS.items()
     ]
@@ -116,7 +115,6 @@ def warnings_of(robot: str) -> list[Finding]:
 
 
 def reports() -> dict[str, str]:
-    """Return the layout of the JSON report, from its schema."""
     whole = VALIDATION.schema()
     parts = {"The document": whole, **{f"`{name}`": part for name, part in whole["$defs"].items()}}
     layout = []
@@ -132,7 +130,7 @@ def reports() -> dict[str, str]:
 
 
 def _type(entry: dict[str, Any]) -> str:
-    """Return a type as text, such as `number or null`, `list of Check`, or the allowed values of an enum."""
+    """Return a type as text, such as `number or null` or `list of Check`."""
     if "$ref" in entry:
         return f"`{entry['$ref'].rpartition('/')[2]}`"
     if "anyOf" in entry:
@@ -203,7 +201,7 @@ def _errors(lines: tuple[AccuracyLine, ...]) -> str:
     return table(("quantity", "reference", "numbers", *sides), rows, left=2)
 
 
-#: Robots whose enclosures are measured: arms, a hand with mimic joints, humanoids, a quadruped, a hobby arm.
+#: Robots whose enclosures are measured.
 PROVEN = ("panda", "ur5", "xarm7", "allegro_left_hand", "talos", "icub", "anymal", "so100")
 LENGTHS = (3, 10, 30, 100)
 
@@ -254,9 +252,9 @@ def _of_chains() -> Iterator[tuple[object, ...]]:
 
 
 def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosures], float]:
-    """Return interval results of random motions, and the processor time (ms) of one motion."""
+    """Return interval results of random motions, and the processor time (ms) per motion."""
     found, times = [], []
-    for seed in (0, *range(count)):  # the first motion is not timed
+    for seed in (0, *range(count)):  # The first motion is not timed.
         v, a = np.random.default_rng(seed).standard_normal((2, robot.nv))
         q, begin = robot.sample(1, seed)[0], time.process_time()
         found.append(robot.enclose(q, v, a, robot.tip_frame, digits=digits))
@@ -265,7 +263,6 @@ def _proofs(robot: Robot, count: int, digits: int | None) -> tuple[list[Enclosur
 
 
 def askew(length: int) -> str:
-    """Return a chain of continuous joints with oblique axes."""
     joints = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous"><parent link="l{i}"/>'
         f'<child link="l{i + 1}"/><origin xyz="0.1 0.2 0.3" rpy="1.5708 0.3 -0.2"/>'

@@ -64,7 +64,6 @@ def reference_frames() -> Any:
 
 
 def photograph_report(folder: Path) -> None:
-    """Make light and dark screenshots of a report about two robots, with the first robot expanded."""
     page = folder / "report.html"
     found = urdfkin.validate(["panda", "ur5"], samples=1000)
     text = as_html(found.as_dict())
@@ -79,7 +78,6 @@ def photograph_report(folder: Path) -> None:
 
 
 def photograph_viewer(folder: Path) -> None:
-    """Make screenshots of the viewer on a wide screen and on a phone, in light and dark themes."""
     server = new_server(port=8099)
     try:
         viewer = Viewer(server, urdfkin.load("panda"), POSE)
@@ -105,7 +103,6 @@ def photograph_viewer(folder: Path) -> None:
 
 
 def keep(browser: Browser, name: str) -> None:
-    """Save a screenshot with few colours, as a small file."""
     image = Image.open(io.BytesIO(browser.chrome.get_screenshot_as_png())).convert("RGB")
     image.quantize(128).save(IMAGES / f"{name}.png", optimize=True)
 

@@ -165,7 +165,7 @@ def convergence(figure: Any) -> None:
 
 
 def acceleration_parts(figure: Any) -> None:
-    """Draw a point that slides on a rotating arm, and the terms of its acceleration (7.125)."""
+    """Draw a point that slides on a rotating arm, and its acceleration (7.125)."""
     axes = figure.subplots()
     theta, w, alpha = 0.5, 1.4, 1.8
     z = np.array([0.0, 0.0, 1.0])
@@ -191,14 +191,13 @@ def acceleration_parts(figure: Any) -> None:
 
 
 def _named(axes: Any, at: FloatArray, along: FloatArray, name: str) -> None:
-    """Write a name to the right of an arrow, so that readers need not rely on its colour."""
+    """Write a name beside an arrow, because colour alone is not enough."""
     side = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     place = at[:2] + 0.04 * side
     axes.text(*place, name, ha="left" if side[0] > 0.0 else "right", va="center", fontsize=9)
 
 
 def two_link(figure: Any) -> None:
-    """Draw the planar two-link manipulator in four configurations, with velocity ellipses (7.90)."""
     axes = figure.subplots()
     robot = urdfkin.load("planar_two_link")
     poses = np.array([[0.15, 0.35], [0.5, 1.0], [0.75, 1.7], [0.9, 2.5]])
@@ -215,7 +214,6 @@ def two_link(figure: Any) -> None:
 
 
 def breakdown(figure: Any) -> None:
-    """Draw the terms of the tool's acceleration, for each joint of the elbow robot."""
     robot = urdfkin.load("elbow")
     q, v = [0.4, 0.5, 0.7, 0.3, 0.6, 0.2], [1.0, 0.8, -1.2, 2.0, 1.0, -1.0]
     parts = robot.acceleration_breakdown(q, v, [0.5, 1.0, -0.5, 1.0, 1.0, 1.0], "tool")

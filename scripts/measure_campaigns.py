@@ -78,7 +78,6 @@ def measure(robots: list[str], ways: list[str], samples: int, rounds: int) -> No
 
 def measure_chunk() -> None:
     def cost(work: Callable[[int], object], times: int = 100) -> float:
-        """Return the median processor time in milliseconds."""
         moments = [time.process_time()]
         for i in range(times):
             work(i)

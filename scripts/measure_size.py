@@ -20,10 +20,7 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
-    """Return the sizes (bytes) of a package and its dependencies.
-
-    The package named `without` is left out, and so are packages that only this package needs.
-    """
+    """Return the sizes (bytes) of a package and its dependencies, but not of `without`."""
     found: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()
     waiting = [(name, frozenset(extras))]
@@ -43,7 +40,6 @@ def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[st
 
 
 def own() -> int:
-    """Return the size in bytes of urdfkin's unpacked wheel: the package and the files from pyproject.toml."""
     places = (ROOT / "urdfkin", ROOT / "robots", ROOT / "docs" / "questions.md")
     files = (file for place in places for file in (place.rglob("*") if place.is_dir() else (place,)))
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")

@@ -57,7 +57,6 @@ ROWS = (
 
 
 def seconds(words: Sequence[str], cache: Path | None) -> float:
-    """Return the processor time of a process and its children; `cache` is a folder for kernels."""
     environ = {name: x for name, x in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     environ["PYTHONPATH"] = str(ROOT)
     if cache is not None:
@@ -69,7 +68,7 @@ def seconds(words: Sequence[str], cache: Path | None) -> float:
 
 
 def medians(rounds: int, folder: Path) -> list[float]:
-    """Return the times of the rows; an additional first round writes the bytecode and does not count."""
+    """Return the times of the rows; the first round writes the bytecode and does not count."""
     robot = folder / "MY.urdf"
     robot.write_bytes((ROOT / "robots" / "elbow.urdf").read_bytes())
     found: list[list[float]] = [[] for _ in ROWS]
@@ -81,7 +80,6 @@ def medians(rounds: int, folder: Path) -> list[float]:
 
 
 def main() -> int:
-    """Measure and write the page; return 1 if a time exceeds its limit."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--rounds", type=int, default=11, help="number of processes for each row")
     given = parser.parse_args()

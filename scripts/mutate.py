@@ -36,7 +36,7 @@ from scripts.mutating.operators import changes_of, function_at
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
-_NO_TESTS = 5  # pytest's exit code if no test was collected
+_NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
 #: Numba compiles the source text of these files, so a changed syntax tree has no effect.
 #: tests/laws/test_mutation.py mutates them without the compiler.
@@ -48,7 +48,6 @@ COMPILED = {
 
 
 def files(parts: list[str]) -> list[Path]:
-    """Return the package's files in the given folders; raise ValueError if a folder has no file."""
     below = {path.relative_to(PACKAGE).as_posix(): path for path in sorted(PACKAGE.rglob("*.py"))}
     found = {name: path for name, path in below.items() if name not in COMPILED}
     for part in parts:
@@ -60,19 +59,18 @@ def files(parts: list[str]) -> list[Path]:
 
 
 def module_of(path: Path) -> str:
-    """Return the module of a file, such as `urdfkin.dh.parse_table`."""
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
 @cache
 def _texts() -> dict[Path, str]:
-    own = ("test_mutate", "test_named_mutants")  # these tests make their own mutants
+    own = ("test_mutate", "test_named_mutants")  # These tests make their own mutants.
     tests = (path for path in TESTS.rglob("test_*.py") if path.stem not in own)
     return {path: path.read_text(encoding="utf-8") for path in tests}
 
 
 def near_tests(path: Path) -> list[str]:
-    """Return the tests that mention a module, then the tests of its package or of the whole robot."""
+    """Return tests that mention a module, then tests of its package."""
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -111,7 +109,7 @@ def named_mutants() -> list[Named]:
 
 @cache
 def argued() -> dict[tuple[str, str], str]:
-    """Return the reason why each mutant is harmless, by the mutant's function and text."""
+    """Map each harmless mutant, by function and text, to the reason."""
     page = (ROOT / "docs" / "mutation.md").read_text(encoding="utf-8")
     # A line is "- `urdfkin.model.tree.build_tree`: `1  ->  2`: the reason."
     lines = re.findall(r"^- `([\w.]+)`: `([^`]+)`: (\S.+)$", page, re.MULTILINE)
@@ -120,8 +118,6 @@ def argued() -> dict[tuple[str, str], str]:
 
 @dataclass(frozen=True)
 class Mutant:
-    """A change of a file that introduces a mistake, which a test should detect."""
-
     name: str  # name for --only
     file: str
     line: int
@@ -153,7 +149,6 @@ def mutants(parts: list[str]) -> list[Mutant]:
 
 
 def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool = False) -> Outcome:
-    """Run the tests on a mutant until one fails."""
     if (mutant.place, mutant.what) in argued():
         return Outcome(mutant, "argued", "docs/mutation.md")
     near = near_tests(ROOT / mutant.file)
@@ -166,11 +161,10 @@ def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool 
 
 
 def evaluate_named(named: Named, *, timeout: float) -> Outcome:
-    """Run the test that must fail for this mutant."""
     texts = json.dumps([named.before, named.after])
     word, by = _run({"URDFKIN_MUTANT": named.module, "URDFKIN_MUTANT_TEXTS": texts}, [named.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {named.test}"):
-        word = "not run"  # the test failed, but not because of the mutant
+        word = "not run"  # The test failed, but not because of the mutant.
     file = named.file.relative_to(ROOT).as_posix()
     mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.module)
     return Outcome(mutant, word, by)
@@ -198,7 +192,7 @@ def _run(change: dict[str, str], tests: list[str], timeout: float) -> tuple[str,
 
 
 def _ask(change: dict[str, str], tests: list[str], output: str) -> None:
-    """Inject a mutant into this new process and its children, run the tests, and exit with pytest's code."""
+    """Run the tests on a mutant in this process, and exit with pytest's code."""
     import pytest
 
     hook = ROOT / "scripts" / "mutating" / "hook"

@@ -8,10 +8,7 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
 def inserted(page: str, **parts: str) -> str:
-    """Return a page with the given parts in their places.
-
-    Raises:
-        ValueError: the page does not have exactly one place for a part.
+    """Return a page with the given parts; a part must have exactly one place.
 
     >>> print(inserted("before <!-- size --> old <!-- end --> after", size="new"))
     before <!-- size -->
@@ -28,7 +25,6 @@ def inserted(page: str, **parts: str) -> str:
 
 
 def insert(path: Path, **parts: str) -> None:
-    """Insert the parts into a page, write the page, and print its path."""
     path.write_text(inserted(path.read_text("utf-8"), **parts), "utf-8")
     print(path)
 

@@ -49,15 +49,12 @@ _SKIPPED = {
 
 
 class Passage(NamedTuple):
-    """A text for people: a line of a page, a docstring, a comment or a message."""
-
     file: str  # the file, relative to the repository
     line: int  # first line of the passage
     text: str
 
 
 def passages(paths: list[Path]) -> Iterator[Passage]:
-    """Yield the texts of files and folders: lines of pages; docstrings, comments and strings of modules."""
     for file in (file for path in paths for file in (sorted(path.rglob("*")) if path.is_dir() else [path])):
         name = file.relative_to(ROOT)
         if file.suffix not in _SUFFIXES or _SKIPPED & set(name.parts):
@@ -79,7 +76,6 @@ def passages(paths: list[Path]) -> Iterator[Passage]:
 
 
 def complaints(paths: list[Path]) -> list[str]:
-    """Return a line for each listed word of a text, with its place and its replacement."""
     found = []
     for passage in passages(paths):
         for pattern, plain in PLAIN.items():

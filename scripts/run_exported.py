@@ -19,7 +19,7 @@ from typing import Any
 
 
 def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float]]:
-    """Yield each check's largest error as a share of its bound; 0 or inf for a check without numbers."""
+    """Yield each check's largest error as a share of its bound."""
     scope = runpy.run_path(path)
     if library == "jax":
         import jax
@@ -42,7 +42,6 @@ def shares(path: str, library: str, compiled: bool) -> Iterator[tuple[str, float
 
 
 def of_hessian(scope: dict[str, Any], library: str) -> float:
-    """Return the largest error of the Jacobian's derivatives as a share of the Hessian's bound."""
     if library == "torch":
         import torch
 
@@ -61,7 +60,7 @@ def of_compiled(scope: dict[str, Any]) -> float:
 
     found = 0.0
     for name, letters in scope["INPUTS"].items():
-        if name == "hessian":  # the compilation takes minutes
+        if name == "hessian":  # The compilation takes minutes.
             continue
         compiled = torch.compile(scope[name], fullgraph=True)
         inputs = [scope["GIVEN"][letter] for letter in letters]
@@ -73,7 +72,7 @@ def of_compiled(scope: dict[str, Any]) -> float:
 
 
 def worst(found: Any, true: Any, within: Any, eps: float) -> float:
-    """Return the largest ratio of a row's error to the row's bound; NaN counts as the largest number."""
+    """Return the largest ratio of a row's error to its bound; NaN counts as the largest number."""
     largest = 0.0
     for rows in zip(found, true, within, strict=True):
         for x, y, k in zip(*rows, strict=True):

@@ -48,7 +48,7 @@ pathlib.Path(to + ".xml").write_text(spec.to_xml())
 
 
 class Tool(NamedTuple):
-    """A converter: its program, and the tool that writes its input file (empty if it reads the URDF)."""
+    """A converter: its program, and the tool that writes its input file."""
 
     reads: str
     program: str
@@ -104,11 +104,11 @@ _LENIENT = {"boundmass": "1e-3", "boundinertia": "1e-6", "balanceinertia": "true
 
 
 class RefusalError(Exception):
-    """A converter refuses a robot, or its result cannot be compared; the message is printed in the table."""
+    """A converter refuses a robot, or its result cannot be compared."""
 
 
 def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
-    """Return the file that a tool reads for a URDF, and the file that it writes; or raise RefusalError."""
+    """Return the file that a tool reads for a URDF, and the file that it writes."""
     reads, program, writes = TOOLS[tool]
     source = converted(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
@@ -126,7 +126,6 @@ def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -
 
 
 def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sameness:
-    """Return the comparison of a tool's source and result; or raise RefusalError."""
     with tempfile.TemporaryDirectory() as folder:
         files = converted(tool, pythons, _without_shapes(robot.urdf, Path(folder)), Path(folder))
         try:
@@ -137,7 +136,7 @@ def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sa
 
 
 def _without_shapes(urdf: str, folder: Path) -> Path:
-    """Write a URDF without shapes, and with MuJoCo's lenient settings, which other tools ignore."""
+    """Write a URDF without shapes, and with MuJoCo's lenient settings."""
     robot = ElementTree.fromstring(urdf)
     for link in robot.iterfind("link"):
         for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:
@@ -151,8 +150,7 @@ def _without_shapes(urdf: str, folder: Path) -> Path:
 def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
     """Return the verdict, and the largest distance and angle between the models as written.
 
-    For a converter from URDF to USD, the angle is replaced by the largest distance that single precision can
-    cause.
+    For a converter from URDF to USD, the largest distance from single precision replaces the angle.
     """
     try:
         found = _compared(tool, pythons, robot)
@@ -172,7 +170,6 @@ def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple
 
 
 def wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Iterator[str]:
-    """Yield a cell for each tool; write long verdicts to stderr."""
     for tool in tools:
         verdict, far, _ = row_of(tool, tools, robot)
         print(f"{name}, {tool}: {verdict} {far}", file=sys.stderr, flush=True)
@@ -181,7 +178,7 @@ def wide_row(tools: Mapping[str, str], name: str, robot: urdfkin.Robot) -> Itera
 
 
 def _loaded(file: Path) -> urdfkin.Robot:
-    """Return the robot of a file. If a USD file has several articulations, read all of them."""
+    """Return the robot of a file; read all articulations of a USD file."""
     try:
         return urdfkin.load(file)
     except urdfkin.UrdfkinError as error:

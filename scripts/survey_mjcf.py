@@ -15,7 +15,6 @@ from urdfkin.urdf.mjcf import is_mjcf
 
 
 def said_of(path: Path) -> str:
-    """Return the results of urdfkin and of Pinocchio's MJCF reader for one file, or the reading error."""
     try:
         robot = urdfkin.load(path)
         robot.placement(robot.sample(2), robot.link_frames)

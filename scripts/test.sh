@@ -1,14 +1,14 @@
 #!/bin/sh
-# Set everything up and pass the tests: format, lint, types, then every test but the long ones of test_long.sh.
+# Install urdfkin, check format, lint and types, and run all tests except the long tests of test_long.sh.
 . "$(dirname "$0")/environment.sh"
 make_environment "[test]"
 set -e
 ruff format --check .
 ruff check .
 python scripts/changelog_gate.py
-urdfkin warm  # once, by both processors, and not by every worker for itself
+urdfkin warm  # Compile the kernels once here, not in every worker.
 types=$(mktemp)
-mypy >"$types" 2>&1 &  # beside the tests, which wait now and then
+mypy >"$types" 2>&1 &  # Mypy runs at the same time as the tests.
 mypy=$!
 trap 'kill "$mypy" 2>/dev/null || true; rm -f "$types"' EXIT
 status=0

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Set everything up and pass the long tests: processes, mutants, fuzzing, benchmark, packages, site, browsers.
-# In CI also with CUDA's compiler, if it installs.
+# Install urdfkin, and run the long tests: processes, mutants, fuzzing, benchmark, packages, site, browsers.
+# In CI, the tests also use CUDA's compiler, if it can be installed.
 . "$(dirname "$0")/environment.sh"
 make_environment "[test]"
 [ "${CI:-}" != true ] || install_nvcc ||

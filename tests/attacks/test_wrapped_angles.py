@@ -95,7 +95,7 @@ def test_a_mimic_joint_of_an_unwrapped_joint_is_reported(
     more = mimic("wheel", ratio) + limit(-6, 6)
     mimic_joint = joint("f", kind, "b", "c", 'xyz="1 0 0"', more=more)
     motion = read(wheel(mimic_joint), tmp_path / "w.csv", wrapped(2.0 * T))
-    assert any("joint f follows wheel" in note for note in motion.notes) is told
+    assert any("joint f mimics wheel" in note for note in motion.notes) is told
     np.testing.assert_allclose(motion.q[:, 0], 2.0 * T, atol=1e-12)
 
 

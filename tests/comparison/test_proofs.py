@@ -278,7 +278,7 @@ FORGED: dict[str, tuple[str, Callable[[Any], None], str]] = {
     "another pose of a floating joint": ("one_millimetre", forge_lower, "do not correspond"),
     "a lower bound above the upper bound": ("one_millimetre", forge_order, "larger than the upper bound"),
     "another engine": ("one_millimetre", lambda d: d["checked"].update(by="NASA 1.0"), "`checked`"),
-    "a nearer frame": ("reversed_axis", forge_frame, "which is farther"),
+    "a nearer frame": ("reversed_axis", forge_frame, "has a larger distance"),
     "no distance as written": ("reversed_axis", lambda d: d.update(as_written=None), "is missing"),
 }
 

@@ -22,10 +22,16 @@ TEXTS = {name: feature.text for name, feature in FEATURES.items()}
 @pytest.mark.parametrize(
     ("feature", "library", "joint", "element", "words"),
     [
-        ("mimic", "mujoco", "j2", "mimic", "MuJoCo leaves it free"),
-        ("mimic of a mimic", "yourdfpy", "j3", "mimic", "yourdfpy applies another rule"),
-        ("prismatic, axis of length 2", "yourdfpy", "j2", "axis", "yourdfpy moves it 2 times as far"),
-        ("quat_xyzw (URDF 1.1)", "mujoco", "j2", "origin quat_xyzw", "MuJoCo has another rotation at q = 0"),
+        ("mimic", "mujoco", "j2", "mimic", "MuJoCo leaves the joint free"),
+        ("mimic of a mimic", "yourdfpy", "j3", "mimic", "yourdfpy applies a different mimic rule"),
+        ("prismatic, axis of length 2", "yourdfpy", "j2", "axis", "yourdfpy moves the joint 2 times as far"),
+        (
+            "quat_xyzw (URDF 1.1)",
+            "mujoco",
+            "j2",
+            "origin quat_xyzw",
+            "MuJoCo has a different rotation at q = 0",
+        ),
     ],
 )
 def test_the_element_that_explains_a_difference_is_named(
@@ -41,8 +47,8 @@ def test_the_element_that_explains_a_difference_is_named(
 @pytest.mark.parametrize(
     ("change", "element", "words"),
     [
-        (('xyz="0 1 0"', 'xyz="0 -1 0"'), "axis", "X turns it the other way"),
-        (('xyz="0 1 0"', 'xyz="0.6 0 0.8"'), "axis", "X moves it along another axis: 0.6 0 0.8"),
+        (('xyz="0 1 0"', 'xyz="0 -1 0"'), "axis", "X turns the joint in the opposite direction"),
+        (('xyz="0 1 0"', 'xyz="0.6 0 0.8"'), "axis", "X uses a different joint axis: 0.6 0 0.8"),
         (('type="revolute">\n  <parent link="a"', 'type="prismatic">\n  <parent link="a"'), "axis", None),
         (('3"/><axis xyz="0 1 0"', '4"/><axis xyz="0 1 0"'), "origin rpy", None),
         (
@@ -182,7 +188,7 @@ def test_newton_moves_mimic_joints_and_lacks_no_link_that_urdfkin_added(
     robot = urdfkin.load(str(path))
     path.write_text(plain.replace('(prepend apiSchemas = ["NewtonMimicAPI"])', ""))
     (one,) = compare_readers(robot)[0].differences
-    assert (one.joint, one.words) == ("wrist", "Newton leaves it free")
+    assert (one.joint, one.words) == ("wrist", "Newton leaves the joint free")
 
 
 def test_a_body_that_a_library_lacks_is_missing_and_a_link_without_a_prim_is_not(
@@ -214,7 +220,7 @@ def test_the_command_readers_prints_and_writes_every_format(tmp_path: Path) -> N
     path.write_text(TEXTS["mimic"])
     done = run("readers", str(path), "--with", "mujoco,yourdfpy")
     assert done.code == 1
-    assert "MuJoCo leaves it free" in done.text
+    assert "MuJoCo leaves the joint free" in done.text
     data = run("readers", str(path), "--with", "mujoco,yourdfpy", "--format", "json").data
     assert [one["library"] for one in data["readers"]] == ["MuJoCo", "yourdfpy"]
     assert json.dumps(data)

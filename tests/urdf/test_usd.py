@@ -1459,7 +1459,7 @@ def test_a_free_base_must_have_the_same_frame_and_the_joints_after_it_may_be_rou
     if kind == "planar":  # 0.1 in single precision is 1.5e-9 from 0.1
         urdf, text = free_base(kind, (0.0, 0.0, 0.1))
         found = urdfkin.same(loaded(urdf), loaded(write(text)), bounds=False)
-        words = "link base: follows a planar or floating joint with another frame"
+        words = "link base: follows a planar or floating joint with a different frame"
         assert [str(one) for one in found.unexplained] == [words]
 
 

@@ -6,14 +6,14 @@ coordinate at a time. The largest distance found by the search is a lower bound.
 **Branch and bound.** The upper bound of `urdfkin.model.mechanisms.upper_bound` is a sum over all differences
 between the models. Each term is the largest effect of one difference over all configurations. If the models
 differ in many places, the sum is far above the largest distance. `tighten` computes a sharper bound. The
-function divides the space of all variables into boxes. In each box, it bounds D(q) = p_B - p_A, the
-difference of the frame's positions in B and A. In a box with middle c and half widths h,
+function divides the space of all variables into boxes. Let D(q) = p_B - p_A be the difference of the frame's
+positions in B and A. In a box with middle c and half widths h,
 
     |D(q)| <= max |D(c) + sum_i D_i(c) x_i| + (1/2) sum_ij M_ij h_i h_j,     |x_i| <= h_i.
 
 Here D_i is the derivative of D with respect to variable i, and M_ij bounds the second derivatives at every
-configuration (`urdfkin.model.mechanisms.upper_bound.curvature`). A box whose bound is at most the target
-needs no further work. Every other box is halved.
+configuration (`urdfkin.model.mechanisms.upper_bound.curvature`). If the bound of a box is at most the target,
+the box is finished. Otherwise, the box is halved.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from urdfkin.model.tree import FloatArray, inverse
 from urdfkin.robot import Robot
 from urdfkin.verify.oracle import QueryBatch
 
-#: Number of random configurations that are sampled before a search.
+#: Number of random configurations that the search tries first.
 SAMPLES = 512
 #: Number of sampled configurations in which each variable is at an end of its range.
 CORNERS = 128
@@ -49,7 +49,7 @@ STARTS = 4
 TRIED_VALUES = 13
 #: Number of frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: Fraction of a coordinate's range that the search covers in each round.
+#: For each round of the search, the fraction of a coordinate's range that the round covers.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -60,7 +60,7 @@ class DistanceSearch:
     """Search for the configurations at which two aligned robots differ most.
 
     If `as_written` is true, the pose of B's root in A's root frame is constant. Otherwise, the pose of B's
-    first matched link in the frame of A's first matched link is constant.
+    base link in the frame of A's base link is constant.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class DistanceSearch:
         self.base_fixed = tuple(
             m.body_of[link] == 0 for m, link in zip((alignment.a, alignment.b), alignment.base, strict=True)
         )
-        #: Whether joints between a root and its first matched link change the distances.
+        #: Whether joints between a robot's root and its base link change the distances.
         #: If true, the bounds of `upper_bounds` and `tighten` do not hold.
         self.unbounded = as_written and not all(self.base_fixed)
 
@@ -97,10 +97,7 @@ class DistanceSearch:
         )
 
     def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return configurations (n, nq) of A and of B for values `z` (n, variables).
-
-        A's planar and floating joints are neutral, or random if `moved` is true.
-        """
+        """Return configurations (n, nq) of A and B; `moved` draws planar and floating joints at random."""
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
         q_a = sample(tree_a, len(z), self.rng) if moved else np.tile(neutral(tree_a), (len(z), 1))
@@ -120,7 +117,7 @@ class DistanceSearch:
         return q_a, q_b
 
     def correspond(self, q_a: FloatArray, q_b: FloatArray) -> bool:
-        """Return whether `q_a` and `q_b` (1, nq) are corresponding configurations within the joint ranges."""
+        """Return whether `q_a` and `q_b` (1, nq) correspond and are within the joint ranges."""
         sizes = tuple(robot.nq for robot in self.robots)
         if (q_a.shape, q_b.shape) != ((1, sizes[0]), (1, sizes[1])):
             return False
@@ -137,13 +134,12 @@ class DistanceSearch:
         return alike and bool((low - rounding <= z).all() and (z <= high + rounding).all())
 
     def poses(self, z: FloatArray, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Return poses (n, frames, 4, 4) of A and of B in A's root frame, for values `z` (n, variables)."""
         return self.poses_at(*self.configurations(z), frames, own_poses)
 
     def poses_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (n, frames, 4, 4) of A and of B at configurations; `computed` computes the poses."""
+        """Return poses (n, frames, 4, 4) of A and of B in A's root frame at configurations."""
         a, b = self.robots
         Ts_a = computed(a, q_a, [a.tree.link_frames[frame.a] for frame in frames])
         base = b.tree.link_frames[self.alignment.base[1]]
@@ -161,21 +157,19 @@ class DistanceSearch:
     def distances_at(
         self, q_a: FloatArray, q_b: FloatArray, frames: Sequence[FramePair], computed: Placements
     ) -> FloatArray:
-        """Return the distances (n, frames), m, between matching frames."""
         a, b = self.poses_at(q_a, q_b, frames, computed)
         return np.asarray(np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1))
 
     def random_values(self, n: int) -> FloatArray:
-        """Return random values (n, variables) of the variables within their ranges."""
         low, high = self.ends.T
         return np.asarray(low + (high - low) * self.rng.random((n, len(self.names))))
 
     def distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances (n, frames), m, between matching frames for values `z`."""
+        """Return the distances (n, frames), m, at values `z` (n, variables)."""
         return self.distances_at(*self.configurations(z), frames, own_poses)
 
     def sampled_distances(self, frames: Sequence[FramePair]) -> tuple[FloatArray, FloatArray]:
-        """Sample the variables; return the distances (n, frames), m, and the values (n, variables)."""
+        """Return distances (n, frames), m, at sampled values, and the values (n, variables)."""
         low, high = self.ends.T
         z = self.random_values(SAMPLES)
         corners = np.where(self.rng.random((CORNERS, len(self.names))) < 0.5, low, high)
@@ -183,7 +177,6 @@ class DistanceSearch:
         return self.distances(z, frames), z
 
     def largest_distances(self, frames: Sequence[FramePair]) -> list[tuple[float, FloatArray]]:
-        """Search for each frame's largest distance (m); return it with the values of the variables."""
         largest: list[tuple[float, FloatArray]] = []
         for first in range(0, len(frames), SEARCHED_TOGETHER):
             batch = frames[first : first + SEARCHED_TOGETHER]
@@ -192,7 +185,6 @@ class DistanceSearch:
         return largest
 
     def largest_rotation(self, frame: FramePair) -> FloatArray:
-        """Return the sampled values (variables,) at which the frame's orientations in A and B differ most."""
         z = self.sampled_distances([frame])[1]
         Ts_a, Ts_b = self.poses(z, [frame])
         turned = [pose_difference(T, other)[0] for T, other in zip(Ts_a[:, 0], Ts_b[:, 0], strict=True)]
@@ -228,14 +220,14 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return the distances for the array `z` (frames, starts, values, variables)."""
-        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])  # the size -1 fails for an empty array
+        flat = z.reshape(
+            math.prod(z.shape[:-1]), z.shape[-1]
+        )  # NumPy rejects the size -1 for an empty array.
         distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(distances[n, :, :, n])
 
     def _variables_of(self, frame: FramePair) -> list[int]:
-        """Return the indices of the variables that move a frame in A or in B."""
         steps = set(self.alignment.indices(frame.previous))
         names = {
             line.variable
@@ -252,33 +244,26 @@ class DistanceSearch:
 
 
 def own_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
-    """Return poses (n, frames, 4, 4) computed by urdfkin's forward recursion."""
     return placements(*_flat_inputs(robot, q, frames))
 
 
 def _flat_inputs(robot: Robot, q: FloatArray, frames: Sequence[str]) -> tuple[CompiledTree, FloatArray]:
-    """Return the compiled tree of some frames, and configurations (n, nq) with unit quaternions."""
     tree = robot.tree
     return robot.plan([tree.frame_link(frame) for frame in frames]), with_unit_quaternions(tree, q)
 
 
 def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> FloatArray:
-    """Return poses (n, frames, 4, 4) computed by Pinocchio from the robot's text."""
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
 
-#: Maximum number of boxes in memory; with this number, bounding one frame takes one or two seconds.
+#: Maximum number of boxes in memory; one frame then takes one or two seconds.
 MOST_BOXES = 2**17
-#: Number of boxes computed in one batch; the Jacobians of more boxes would take gigabytes of memory.
+#: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
 BATCH = 2**16
 
 
 class Boxes:
-    """Upper bounds on the distance between a frame's origins in A and B, one bound for each box.
-
-    A box contains all configurations whose variables are in given ranges. `names` are the names of the
-    variables that change the distance.
-    """
+    """Upper bounds on the distance between a frame's origins in A and B, for boxes of configurations."""
 
     def __init__(self, search: DistanceSearch, frame: FramePair, names: Sequence[str]) -> None:
         self.search = search
@@ -304,7 +289,7 @@ class Boxes:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
 
     def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
-        """Bound |D + sum_i D_i x_i| over |x_i| <= h_i, (n,) for middles (n, variables)."""
+        """Bound the first-order part of the distance in boxes with middles `c` and half widths `h`."""
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
         along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
@@ -312,7 +297,7 @@ class Boxes:
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 
     def at_middles(self, c: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return D (n, 3) and its derivatives (n, 3, variables) at the midpoints `c` of boxes."""
+        """Return the position differences (n, 3) and their derivatives (n, 3, variables) at `c`."""
         z = np.tile(self.middle, (len(c), 1))
         z[:, self.at] = c
         (a, b), (q_a, q_b) = self.search.robots, self.search.configurations(z)
@@ -338,13 +323,13 @@ def tighten(
 ) -> float:
     """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
 
-    The argument `upper` is a bound that is already proven. The function returns `target` if it proves this
-    bound. Otherwise it returns the smallest bound that it proves, or `upper`.
+    `upper` is a proven bound, and is returned if no smaller bound is proven. The search for smaller bounds
+    ends at `target`.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)
     some = [pair for pair in pairs if pair is not None]
-    # One turn contains all poses of an unlimited revolute joint.
+    # An unlimited revolute joint repeats its poses after one turn.
     # Other unlimited ranges cannot be divided into boxes.
     ranges_are_covered = all(
         step.kind == "turns" and abs(line.slope) == 1.0
@@ -361,7 +346,7 @@ def tighten(
     c, h, proven = ends.mean(axis=1)[np.newaxis], (ends[:, 1] - ends[:, 0]) / 2.0, np.array([upper])
     if not np.isfinite(M).all() or 2 ** _halvings(h, M, upper) > most:
         return upper
-    if not names:  # the distance is the same in all configurations
+    if not names:  # The distance is constant.
         return min(upper, float(boxes.bounds(c, h)[0]))
     while len(c) and 2 * len(c) <= most:
         i = _worst_variable(h, M)
@@ -378,12 +363,11 @@ def tighten(
 
 
 def _worst_variable(h: FloatArray, M: FloatArray) -> int:
-    """Return the index of the variable that contributes most to the second-order term of the bound."""
     return int((h * (M @ h)).argmax())
 
 
 def _halvings(h: FloatArray, M: FloatArray, upper: float) -> int:
-    """Return how many times a box must be halved before its bound can be below `upper`."""
+    """Return how often a box must be halved before its bound can be below `upper`."""
     h, count = h.copy(), 0
     while 0.5 * h @ M @ h >= upper:
         h[_worst_variable(h, M)] /= 2.0

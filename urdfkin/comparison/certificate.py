@@ -30,12 +30,12 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Size, of_length, plain, says
 from urdfkin.verify.oracles import PINOCCHIO, versions
 
-#: Maximum number of boxes in memory when `recheck` proves a bound again.
+#: Maximum number of boxes in memory when `recheck` proves a bound by branch and bound.
 MOST_AGAIN = 2**22
 #: Relative tolerance of a number in a certificate, and absolute tolerance (m or rad) for numbers near zero.
-#: Another machine may have written the certificate, with other rounding errors.
+#: The machine that wrote the certificate may have other rounding errors.
 _RELATIVE, _ZERO = 1e-9, 1e-15
-#: Relative tolerance, in units of the machine epsilon, for a bound that `recheck` proves again.
+#: Relative tolerance of a bound, in units of the machine epsilon.
 _BOUND_TOLERANCE = 64.0
 #: Entries that `recheck` computes again from the two models, and compares with the certificate.
 DERIVED = ("up_to", "remarks", "joints", "orders", "links", "base", "base_links", "rounding")
@@ -56,7 +56,6 @@ class CertifiedRule(TypedDict):
     offset: Annotated[float, says("Offset that is added to the product, rad or m.")]
 
 
-#: Value of a parameter in one of the two models.
 Value = str | float | list[str | float | None] | CertifiedRule | None
 
 
@@ -194,7 +193,6 @@ SAME = DocumentKind(
 
 
 def certificate(result: Sameness, command: str | None = None) -> SameCertificate:
-    """Return the certificate of a result; `command` is the command line that computed the result."""
     a, b = (
         {"name": name, "source": source} for name, source in zip(result.names, result.sources, strict=True)
     )
@@ -212,7 +210,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     return cast("SameCertificate", plain(document))
 
 
-#: Attributes of `Sameness` that have the same name in the certificate.
+#: Attributes of `Sameness` that have equal names in the certificate.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
@@ -231,18 +229,11 @@ def words_of(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models, and return a line of text for each wrong statement.
 
-    The certificate states which joints match, and how the coordinates of A are converted to those of B. The
-    function checks these statements. The transforms must be rigid motions, and the named joints must exist.
-    If the certificate changes the order of joints, the new order must give the same motion. The function then
-    uses the stated joint pairs, so it does not search for matching joints. If the verdict is "differs", the
-    function does search, because other joint pairs could make the models agree. The function computes the
-    verdict, the changes and the remarks again, and compares them with the certificate. A lower bound is a
-    distance at a configuration in the certificate. urdfkin and Pinocchio both compute this distance again.
-    Each upper bound is proven again.
+    If the verdict is "differs", the function also searches for other pairs of joints that agree better.
+    urdfkin and Pinocchio both compute the distance of each lower bound. Each upper bound is proven again.
 
     Raises:
-        InputError: the certificate was made for models with other texts, or names a joint or link that a
-            model does not have.
+        InputError: the certificate was made for other models, or names an unknown joint or link.
     """
     for k, robot in enumerate((a, b)):
         if (claimed := document["sha256"][k : k + 1]) != [robot.sha256]:
@@ -325,7 +316,6 @@ def _statement_errors(document: SameCertificate, comparator: Comparator, result:
 def _same_difference(
     claimed: DifferenceEntry, expected: DifferenceEntry, rounding: tuple[float, float]
 ) -> bool:
-    """Return whether two entries describe the same difference; metres and radians may differ by rounding."""
     return (
         all(_equal(claimed[part], expected[part]) for part in ("a", "b", "detail"))
         and math.isclose(claimed["metres"], expected["metres"], rel_tol=_RELATIVE, abs_tol=rounding[0])
@@ -370,7 +360,7 @@ def _choices(document: SameCertificate) -> AlignmentChoices:
 def _choices_error(
     document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
 ) -> str | None:
-    """Return the reason why the certificate's alignment of B with A is not allowed, or None."""
+    """Return why the certificate's alignment of B with A is not allowed, or None."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -389,7 +379,7 @@ def _choices_error(
 
 
 def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
-    """Return whether two entries of certificates are equal; the last digits of numbers may differ."""
+    """Compare two entries; the last digits of numbers may differ."""
     if isinstance(expected, dict):
         return (
             isinstance(claimed, dict)
@@ -410,7 +400,6 @@ def _equal(claimed: Any, expected: Any, zero: float = _ZERO) -> bool:
 def _as_written_errors(
     claim: FrameEntry | None, comparator: Comparator, alignment: Alignment, *, sharply: bool
 ) -> Iterator[str]:
-    """Check the statements about the largest distance between the unchanged models; yield errors."""
     written = comparator.as_written(alignment)
     if claim is None:
         if written.frames:
@@ -427,7 +416,7 @@ def _as_written_errors(
     distances = search.sampled_distances(written.frames)[0].max(axis=0)
     if claim["upper"] is not None and distances.max() > claim["upper"] + rounding[0]:
         farthest = links[0][written.frames[int(distances.argmax())].a]
-        yield f"`as_written`: frame {farthest} is {distances.max():.6g} m off, which is farther"
+        yield f"`as_written`: frame {farthest} has a larger distance, {distances.max():.6g} m"
     problems = _interval_errors(search, frame, claim, rounding, sharply=sharply)
     yield from (f"`as_written`: {line}" for line in problems)
 
@@ -440,11 +429,7 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Compute an interval's lower bound again, prove its upper bounds again, and yield wrong statements.
-
-    Two frames are treated as equal if they differ by at most `rounding` (m, rad). If `sharply` is true, the
-    function may prove an upper bound by branch and bound, which is slow.
-    """
+    """Check an interval; `sharply` allows the slow branch and bound. `rounding` is (m, rad)."""
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)
@@ -480,7 +465,6 @@ def _interval_errors(
 def _lower_bound_errors(
     search: DistanceSearch, frame: FramePair, claim: FrameEntry, rounding: tuple[float, float]
 ) -> Iterator[str]:
-    """Check a lower bound, and yield a message for each error."""
     place = f"frame {claim['frame']}"
     q_a, q_b = np.array([claim["q_a"]]), np.array([claim["q_b"]])
     if not search.correspond(q_a, q_b):
@@ -490,11 +474,12 @@ def _lower_bound_errors(
         poses = search.poses_at(q_a, q_b, [frame], computed)
         radians, metres = pose_difference(*(T[0, 0] for T in poses))
         if metres < claim["lower"] - rounding[0]:
-            yield f"{place}: {by} finds {metres:.6g} m at its configuration, not {claim['lower']:.6g} m"
+            yield f"{place}: {by} finds {metres:.6g} m at `q_a`, `q_b`, not {claim['lower']:.6g} m"
         if radians < claim["radians_seen"] - rounding[1]:
-            yield f"{place}: {by} finds {radians:.6g} rad there, not {claim['radians_seen']:.6g} rad"
+            yield (
+                f"{place}: {by} finds {radians:.6g} rad at `q_a`, `q_b`, not {claim['radians_seen']:.6g} rad"
+            )
 
 
 def _within(proven: float, claimed: float, rounding: float) -> bool:
-    """Return whether the proven bound is at most the claimed bound, up to rounding."""
     return proven <= claimed + rounding + _BOUND_TOLERANCE * EPS * abs(claimed) or not math.isfinite(claimed)

@@ -1,7 +1,7 @@
 """List the changes between two versions of a robot description, and bound how far they move the frames.
 
 Two files of the same format are compared attribute by attribute. Files of different formats have different
-attributes, so `diff` then lists the differences that `same` finds.
+attributes; `diff` then lists the differences that `same` finds.
 """
 
 from __future__ import annotations
@@ -35,7 +35,6 @@ from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source, Text, is_usd
 from urdfkin.urdf.writer import to_urdf
 
-#: Names of the numbers in a URDF attribute with several numbers.
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
 #: Default values of joint attributes: for every joint, for a joint with an axis, and for a mimic joint.
 _ORIGIN_DEFAULTS = {f"origin {part}": 0.0 for parts in _PARTS.values() for part in parts}
@@ -43,7 +42,7 @@ _AXIS_DEFAULTS = {"axis x": 1.0, "axis y": 0.0, "axis z": 0.0}
 _MIMIC_DEFAULTS = {"mimic multiplier": 1.0, "mimic offset": 0.0}
 #: Joint attributes that affect the motion of links.
 _MOVING = ("", "origin", "axis", "mimic", "type", "parent", "child", "fixed", "kind")
-#: Attributes that move a link when they change; used if the two versions have different formats.
+#: Changes that move a link, for two versions of different formats.
 _MOVING_LINKS = ("origin", "place", "base", "carried by")
 
 Value = float | str
@@ -53,12 +52,8 @@ Value = float | str
 class ModelChange:
     """One changed attribute, or an element that only one version has.
 
-    Attributes:
-        element: The element, for example "joint elbow" or "link tool".
-        what: The attribute, for example "origin x" or "mass"; "" if the whole element was added or removed.
-        old: The value in the old version; None if the old version has no value.
-        new: The value in the new version; None if the new version has no value.
-        size: Size of the change as text if the versions have different formats; otherwise empty.
+    `what` is the attribute, for example "origin x", or "" for a new or removed element. If the formats
+    differ, `size` is the size of the change as text.
     """
 
     element: str
@@ -84,14 +79,13 @@ class ModelChange:
 
 
 def word(value: Value | None) -> str:
-    """Return a value as text; the text of a number has enough digits to give the same number again."""
+    """Return a value as text; a number has enough digits to be read back exactly."""
     if isinstance(value, float):
         return next(text for text in (f"{value:.15g}", repr(value)) if float(text) == value)
     return "none" if value is None else value
 
 
 def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> str:
-    """Return as text how far a frame moves: the distance, or the angle if the frame only rotates."""
     if frame.lower == 0.0:
         return f"{turns} {frame.frame} by up to {up_to(angle, frame.radians_seen, frame.radians)}"
     return f"{moves} {frame.frame} by up to {up_to(length, frame.lower, frame.upper)}"
@@ -99,14 +93,13 @@ def motion_words(frame: Interval, moves: str = "move", turns: str = "turn") -> s
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """The effect of one joint's changes: the frame with the largest displacement, and this displacement."""
+    """The frame with the largest displacement if only one joint is changed, and this displacement."""
 
     element: str
     interval: Interval
 
     @property
     def words(self) -> str:
-        """The effect as text, for example "moves tool0 by up to 38 mm"."""
         return motion_words(self.interval, "moves", "turns")
 
     def __str__(self) -> str:
@@ -118,13 +111,10 @@ class Changes:
     """The changes between two versions of a description; the result of `urdfkin.diff`.
 
     Attributes:
-        sources: The sources of the old and the new version, as the user gave them.
-        changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each joint whose changes move links, the effect if only this joint is changed.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
-        rounding: (m, rad) bound on the pose error that the single precision of USD files causes in any frame.
-            `changes` does not list this error. None if the files also have other differences; infinite if the
-            bound was not computed.
+        rounding: Bound (m, rad) on the pose error from the single precision of USD files. `changes` omits
+            this error. None if the files also have other differences; infinite if the bound was not computed.
     """
 
     sources: tuple[str, str]
@@ -138,7 +128,6 @@ class Changes:
 
     @property
     def effect_of(self) -> dict[str, Effect]:
-        """The effect for each changed joint, by the element's name, for example "joint elbow"."""
         return {effect.element: effect for effect in self.effects}
 
 
@@ -174,7 +163,6 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
 
 
 def _format(robot: Robot) -> str:
-    """Return the format of a robot's source: "USD", "MJCF", or "URDF" for all other sources."""
     if is_usd(robot.source):
         return "USD"
     return "MJCF" if robot.origin.sha256 else "URDF"
@@ -198,7 +186,6 @@ def _across_formats(old: Robot, new: Robot, *, effects: bool) -> Changes:
 
 
 def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelChange]:
-    """Yield the differences of joints, then all other differences, then names and remarks."""
     for at in result.unexplained:
         if at.what and at.a is None:
             yield ModelChange(at.place, at.what, None, None, str(at.b))
@@ -229,7 +216,6 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
-    """Yield the differences that `same` finds if the models cannot be compared joint by joint."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}
@@ -259,7 +245,7 @@ def _renamed(result: Sameness) -> KinematicTree:
     old, tree = result.trees
     links = {theirs: ours for ours, theirs in result.links}
     names = {one.b: one.a for one in result.joints}
-    for i, joint in enumerate(tree.joints):  # use the name of A's joint with the same child link
+    for i, joint in enumerate(tree.joints):
         link = links.get(tree.links[i + 1])
         if joint.name not in names and link in old.links[1:]:
             names[joint.name] = old.joints[old.link_index(link) - 1].name
@@ -293,7 +279,7 @@ def _changes(old: str, new: str) -> Iterator[ModelChange]:
 
 
 def _all_attributes(element: Element, tag: str) -> dict[str, Value]:
-    """Map names such as "origin x" to the attributes of an element and its children, with defaults."""
+    """Map names such as "origin x" to the attributes of an element and its children."""
     found = dict(_attributes(element, ""))
     found.pop("name", None)
     if tag == "joint":
@@ -325,7 +311,7 @@ def _value(text: str) -> Value:
 
 
 def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> Effect | None:
-    """Return the effect of one joint's changes: `same` compares the old robot with a changed copy."""
+    """Return the effect of a change of only this joint, or None."""
     names, new_names = ({joint.name for joint in tree.joints} for tree in (old, new))
     if name not in names & new_names:
         return None
@@ -338,13 +324,12 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
     joints[i] = replace(joint, parent=joints[i].parent)
     try:
         changed, unchanged = (_quiet_robot(tree) for tree in (replace(old, joints=tuple(joints)), old))
-    except InputError:  # a URDF cannot describe the changed tree
+    except InputError:  # A URDF cannot describe the changed tree.
         return None
     worst = same(unchanged, changed).worst_as_written
     return None if worst is None else Effect(element, worst)
 
 
 def _quiet_robot(tree: KinematicTree) -> Robot:
-    """Return a robot for a tree, and suppress warnings about the URDF that urdfkin writes for the tree."""
     text = Text(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Tolerance for the entries of poses, relative to max(1, largest entry).
 #: Libraries that compute in double precision differ by less than 1e-13.
 _TOLERANCE = 1e-9
-#: The same tolerance for libraries that compute in single precision.
+#: Tolerance for libraries that compute in single precision.
 _TOLERANCE_SINGLE = 1e-5
 #: Time limit for the process of one library, in seconds.
 _PATIENCE = 60.0
@@ -42,11 +42,7 @@ _MOST_CHARACTERS = 200
 
 @dataclass(frozen=True, slots=True)
 class ReaderDifference:
-    """A joint that a library reads differently, and the element of the file that explains the difference.
-
-    `size` is the largest difference between entries of the child link's pose relative to the parent link.
-    The entries are coordinates (m) or entries of a rotation matrix.
-    """
+    """A joint that a library reads differently; `size` is the largest difference in its pose."""
 
     joint: str
     element: str
@@ -60,13 +56,8 @@ class LibraryReading:
 
     Attributes:
         refused: Reason why the library does not read the file; None if it reads the file.
-        joints: The joints that have a coordinate in the library, in the library's order.
-        same_order: Whether the library has the same joints as urdfkin, in the same order.
-        missing: Links that the library's model does not contain. Links without their own prim in a USD file
-            do not count.
-        worst: Largest difference between link poses (relative to the root link) in the library and in
-            urdfkin; 0 if all poses are equal up to rounding.
-        differences: The joints that the library reads differently from urdfkin.
+        missing: Links that the library's model lacks. Links without a prim in a USD file do not count.
+        worst: Largest difference of link poses relative to the first common link; 0 if only rounding differs.
     """
 
     library: str
@@ -87,7 +78,6 @@ class LibraryReading:
 
 
 def installed(form: str = "urdf") -> tuple[str, ...]:
-    """Return the names of the installed libraries that have an adapter for a format."""
     return tuple(name for name, one in LIBRARIES.items() if form in one.forms and version(name) is not None)
 
 
@@ -102,12 +92,6 @@ def compare_readers(
         UnknownNameError: a library has no adapter.
         InputError: a library is not installed, none reads the format, a joint is locked, the robot is MJCF
             text without a file, or a variant or an articulation of a USD stage was selected.
-
-    >>> import urdfkin
-    >>> from urdfkin.comparison.readers import compare_readers
-    >>> reading, = compare_readers(urdfkin.load("planar_two_link"), ["pinocchio"])
-    >>> reading.agrees, reading.joints
-    (True, ('joint_1', 'joint_2'))
     """
     source, form = _source(robot)
     names = installed(form) if libraries is None else tuple(libraries)
@@ -134,7 +118,6 @@ def compare_readers(
 
 
 def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
-    """Return the values of a configuration by joint: a number, or a list for a planar or floating joint."""
     return {
         joint.name: q[i : i + joint.nq].tolist() if joint.nq > 1 else float(q[i])
         for joint, i in zip(robot.tree.joints, robot.tree.q_index, strict=True)
@@ -145,7 +128,7 @@ def values_of(robot: Robot, q: FloatArray) -> dict[str, Any]:
 def _reading(
     robot: Robot, name: str, source: str, form: str, q: FloatArray, ours: FloatArray
 ) -> LibraryReading:
-    """Run one library in a separate process, and compare its poses with `ours` at `q`."""
+    """Run a library in a separate process, and compare its poses with `ours`."""
     title, number = LIBRARIES[name].title, version(name) or ""
     if form not in LIBRARIES[name].forms:
         return LibraryReading(title, number, f"the adapter of the library does not read {form.upper()}")
@@ -193,7 +176,7 @@ def _reading(
 
 
 def _source(robot: Robot) -> tuple[str, str]:
-    """Return a library's input (a URDF text without shapes, or an MJCF or USD path) and its format."""
+    """Return a library's input (a URDF text, or an MJCF or USD path) and its format."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
@@ -210,7 +193,7 @@ def _source(robot: Robot) -> tuple[str, str]:
 
 
 def _without_shapes(text: str) -> str:
-    """Return a URDF text without shapes; with shapes, some libraries search the disk for mesh files."""
+    """Return a URDF without shapes; some libraries search the disk for mesh files."""
     from xml.etree.ElementTree import tostring
 
     robot = plain_xml(text)
@@ -250,24 +233,20 @@ def _differences(
 def _cause(
     joint: Joint, T: FloatArray, T_theirs: FloatArray, element: Any, own: Sequence[str], tolerance: float
 ) -> tuple[str, str]:
-    """Return the element that explains a difference, and the difference in words.
-
-    `T` (urdfkin) and `T_theirs` (library) are poses of the child link relative to the parent link. The first
-    pose is at q = 0.
-    """
+    """Return the element that causes a difference, and a description; the first pose is at q = 0."""
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
         is_free = np.abs(T_theirs - joint.T_parent_joint).max() <= tolerance
-        return "mimic", "leaves it free" if is_free else "applies another rule"
+        return "mimic", "leaves the joint free" if is_free else "applies a different mimic rule"
     if difference[0, :3, :3].max() > tolerance:
         origin = None if element is None else element.find("origin")
         quaternion = origin is not None and origin.get("quat_xyzw") is not None
-        return f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has another rotation at q = 0"
+        return f"origin {'quat_xyzw' if quaternion else 'rpy'}", "has a different rotation at q = 0"
     if difference[0].max() > tolerance:
-        return "origin xyz", "has another position at q = 0"
+        return "origin xyz", "has a different position at q = 0"
     if joint.name in own and joint.kind.has_axis:
         return "axis", _motion(joint, T, T_theirs, tolerance)
-    words = "moves it differently" if joint.name in own else "has no coordinate for it"
+    words = "moves the joint differently" if joint.name in own else "has no coordinate for the joint"
     return f"type {joint.kind.value}", words
 
 
@@ -278,21 +257,20 @@ def _motion(joint: Joint, T: FloatArray, T_theirs: FloatArray, tolerance: float)
         d = ours[:, :3, 3] @ joint.axis
         k = float(theirs[:, :3, 3] @ joint.axis @ d / np.sum(d**2))
         if np.abs(theirs[:, :3, 3] - k * ours[:, :3, 3]).max() <= tolerance:
-            return f"moves it {k:.6g} times as far"
+            return f"moves the joint {k:.6g} times as far"
     elif np.abs(theirs - np.linalg.inv(ours)).max() <= tolerance:
-        return "turns it the other way"
+        return "turns the joint in the opposite direction"
     elif np.abs(theirs[:, :3, :3] @ theirs[:, :3, :3].swapaxes(-1, -2) - np.eye(3)).max() > tolerance:
-        return "returns a matrix that is no rotation"
+        return "returns a matrix that is not a rotation"
     direction, own = (_direction(joint, T[0]) for T in (theirs, ours))
     if (length := math.hypot(*direction)) <= tolerance:
-        return "does not move it"
+        return "does not move the joint"
     sense = 1.0 if own @ joint.axis >= 0.0 else -1.0
     x, y, z = (f"{number:.4g}" for number in np.round(direction / length * sense, 6) + 0.0)
-    return f"moves it along another axis: {x} {y} {z}"
+    return f"uses a different joint axis: {x} {y} {z}"
 
 
 def _direction(joint: Joint, T: FloatArray) -> FloatArray:
-    """Return a vector along a prismatic joint's displacement, or along a rotation's axis."""
     if joint.kind is JointKind.PRISMATIC:
         return T[:3, 3]
     return np.array([T[2, 1] - T[1, 2], T[0, 2] - T[2, 0], T[1, 0] - T[0, 1]])

@@ -43,10 +43,10 @@ _LEAST_WITHOUT_PREFIX, _LEAST_WITH_PREFIX = 0.89955, 0.09995
 
 
 class Verdict(Enum):
-    """The verdict: two models are the same, are the same after some changes of B, or differ.
+    """Verdict of a comparison of two models.
 
-    Two models are the same up to single precision if each joint differs by no more than the error that single
-    precision can cause in the numbers of this joint.
+    `UP_TO_SINGLE` means that each joint differs by no more than the rounding of its numbers to single
+    precision.
     """
 
     SAME = "same"
@@ -63,13 +63,9 @@ BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 @dataclass(frozen=True, slots=True)
 class SameQuestion:
-    """A yes-or-no question: are two models equivalent, or are matching frames within a given distance?
+    """The question whether two models are equivalent, or within a distance (m and rad) of each other.
 
-    Attributes:
-        within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they are
-            written. With None, the question is whether the models are equivalent.
-        strict: If true, the answer is also no for models that are equivalent only after changes, and for
-            models with remarks, such as different joint limits.
+    With `strict`, changes of B and remarks count as differences.
     """
 
     within: float | None = None
@@ -78,19 +74,10 @@ class SameQuestion:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """An interval that contains the largest distance between a frame of A and the matching frame of B.
+    """Bounds on the largest distance between matching frames, over all configurations within limits.
 
-    The largest distance is taken over all configurations within the joint limits.
-
-    Attributes:
-        frame: The link of A.
-        frame_b: The link of B.
-        lower: Lower bound of the largest distance, metres. The bound is the distance at `q_a` and `q_b`.
-        upper: Proven upper bound of the distance, metres; inf if there is no bound.
-        radians: Proven upper bound of the angle between the two orientations of the frame.
-        radians_seen: The angle between the two orientations at `q_a` and `q_b`.
-        q_a: Configuration of A.
-        q_b: The corresponding configuration of B.
+    `lower` is the distance (m) at `q_a` and `q_b`, less the rounding error. `radians_seen` is the angle at
+    `q_a` and `q_b`. `upper` (m; inf without a bound) and `radians` are proven upper bounds.
     """
 
     frame: str
@@ -114,12 +101,8 @@ class Difference:
     Attributes:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
-        a: The parameter's value in A. None if the parameter has no value, for example a missing limit.
-        b: The parameter's value in B. None if the parameter has no value.
-        radians: Angular part of the difference, radians; 0 if the difference has no angular part.
-        metres: Linear part of the difference, metres; 0 if the difference has no linear part.
         detail: "alone" if the joint's axis differs, but the links after the joint agree. "converted" if the
-            limits of B were converted to the coordinate of A. Otherwise empty.
+            limits of B are in A's coordinate. Otherwise empty.
     """
 
     place: str
@@ -132,7 +115,6 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
-        """The parameter's values in A and in B, as numbers or words; None if a model has no value."""
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -142,7 +124,6 @@ class Difference:
 
     @property
     def words(self) -> str:  # noqa: PLR0911, PLR0912  each kind of difference has its own return
-        """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         match what:
             case "axis":
@@ -162,7 +143,7 @@ class Difference:
             case "mimic rule" if a is not None and b is None:
                 return f"{place} is a mimic joint in A and an independent joint in B: {_rule(a)}"
             case "mimic rule":
-                return f"{place} has another mimic rule: {_rule(a)} in A, {_rule(b)} in B"
+                return f"{place} has different mimic rules: {_rule(a)} in A, {_rule(b)} in B"
             case "independent joint":
                 return f"{place} is a mimic joint only in A, and moves alike in A and B: {_rule(a)}"
             case "idle":
@@ -209,13 +190,11 @@ class JointDifference:
     """A difference at one joint or link that is too large to be caused by rounding.
 
     Attributes:
-        place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        a: The parameter's value in A; None if `b` contains no value.
-        b: The parameter's value in B. If `a` is None, `b` is a text: the size of the difference, or the
-            reason why the models cannot be compared here.
-        explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
+        b: The parameter's value in B. If `a` is None, the text states the size of the difference, or why the
+            models cannot be compared here.
+        explained: The largest difference that rounding can cause; empty if no number is rounded.
     """
 
     place: str
@@ -232,10 +211,7 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Two matched links that `same` reports as different tools (end-effector frames).
-
-    `pose` (4, 4) is the pose of B's link `b` in the frame of A's link `a`.
-    """
+    """Matched links that `same` reports as different tools; `pose` (4, 4) is B's link in A's link frame."""
 
     a: str
     b: str
@@ -251,11 +227,7 @@ _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified
 
 @dataclass(frozen=True, slots=True)
 class Confirmation:
-    """Pinocchio's confirmation of the bounds, or the reason why there is none.
-
-    `metres` is the largest distance that Pinocchio computed; `configurations` is the number of
-    configurations.
-    """
+    """Pinocchio's confirmation; `metres` is the largest distance that Pinocchio computed."""
 
     state: ConfirmationState
     by: str = ""
@@ -272,10 +244,9 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class JointMap:
-    """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
+    """Joints that match: value_b = sense * value_a + offset (rad, m).
 
-    For a planar or floating joint, `sense` is 1 and `offset` is 0. If A and B define the joint's frames
-    differently, `conversion` converts the pose in A to the pose in B.
+    `conversion` converts the pose of a planar or floating joint, if A and B define different joint frames.
     """
 
     a: str
@@ -368,7 +339,6 @@ class Sameness(Displayable):
 
     @property
     def _verdict(self) -> str:
-        """The verdict in words; `Verdict.SAME_AFTER` includes the kinds of the changes of B."""
         after = self.verdict is Verdict.SAME_AFTER
         return f"equivalent up to {', '.join(self.up_to)}" if after else self.verdict.value
 
@@ -546,7 +516,7 @@ class Sameness(Displayable):
                     "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with to_b, because a convention cannot describe another joint frame",
+                    remedy="convert q with to_b; a convention cannot describe a different joint frame",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
@@ -560,16 +530,13 @@ class Sameness(Displayable):
             joints=tuple(joints),
             rules=rules,
         )
-        Conversion(tree_a, "", found)  # raises an error if B has no coordinate for a joint of A
+        # The constructor raises an error if B has no coordinate for a joint of A.
+        Conversion(tree_a, "", found)
         return found
 
 
 def length(metres: float) -> str:
-    """Return a length as text, with a unit prefix.
-
-    >>> length(0.0019), length(2e-9), length(1.5), length(math.inf)
-    ('1.9 mm', '2 nm', '1.5 m', 'without bound')
-    """
+    """Return a length as text with a unit prefix, for example "1.9 mm"."""
     return _with_prefix(metres, "m")
 
 
@@ -586,11 +553,6 @@ def up_to(words: Callable[[float], str], lower: float, upper: float) -> str:
 
 
 def angle(radians: float) -> str:
-    """Return an angle as text, with a unit prefix.
-
-    >>> angle(0.0003), angle(1.5)
-    ('0.3 mrad', '1.5 rad')
-    """
     return _with_prefix(radians, "rad")
 
 
@@ -606,18 +568,13 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def size_words(metres: float, radians: float) -> str:
-    """Return the size of a difference as text; a part that is 0 is omitted.
-
-    >>> size_words(0.0019, 0.0003), size_words(0.0, 0.0003)
-    ('1.9 mm off and turned by 0.3 mrad', 'turned by 0.3 mrad')
-    """
+    """Return text such as "1.9 mm off and turned by 0.3 mrad"."""
     parts = [f"{length(metres)} off"] if metres else []
     parts += [f"turned by {angle(radians)}"] if radians else []
     return " and ".join(parts)
 
 
 def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> None:
-    """Raise UnknownNameError for a name that no joint has, and InputError for a name that occurs twice."""
     for name in names:
         tree.joint_index(name)
     if len(set(names)) < len(names):
@@ -628,10 +585,10 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 def changes_of_b(
     alignment: Alignment, rounding: Tolerance, *, tables: bool = False
 ) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A; each is a kind (an entry of `FREE`) and a line of text.
+    """Return the changes that make B equal to A, as (kind, text); set the tools in `alignment`.
 
-    The function sets the tool poses in `alignment`. If one model is a Denavit-Hartenberg table (`tables`),
-    every frame that differs counts as a tool, because the poses of a table's frames depend on its convention.
+    With `tables`, every frame that differs counts as a tool. The frames of a Denavit-Hartenberg table depend
+    on its convention.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -666,10 +623,7 @@ def changes_of_b(
 
 
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """For each changed tool, yield the string "tools" and a line that describes the change.
-
-    A frame that differs counts as a tool if it has no children, or if it only describes the robot's mounting.
-    """
+    """Yield the changed tools: frames without children, and frames of the robot's mounting."""
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
         is_mount = (frame.a, frame.b) in mounts
@@ -678,7 +632,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.homes[frame.a], alignment.b.homes[frame.b])
             ):
-                continue  # the line about the base reports the displacement of this frame
+                continue  # The line about the base already reports this displacement.
         if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -688,11 +642,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
 
 
 def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
-    """Return the matching frames of the root body that only describe how the robot is mounted.
-
-    Some of these frames are links before the first link with a moving joint. The other frames are links such
-    as a world or a table, which carry no moving joint and have the same pose in the root frames of A and B.
-    """
+    """Return matching frames of the root body that only describe the robot's mounting."""
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
     (before_a, beside_a), (before_b, beside_b) = (
@@ -711,11 +661,10 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the links of the root body that carry all moving joints, and those that carry none.
+    """Return the links of the root body before the robot, and the links beside the robot.
 
     A link before the robot, such as a pedestal, has a fixed child link that carries all moving joints. A link
-    beside the robot, such as a table, carries no moving joint. If the robot has no moving joint, both sets
-    are empty.
+    beside the robot, such as a table, carries no moving joint.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -743,7 +692,6 @@ def _conversion_words(
 
 
 def pose_words(T: FloatArray, rounding: Tolerance) -> str:
-    """Return a pose in URDF `<origin>` notation."""
     xyz, rpy = T[:3, 3], rpy_of(T[:3, :3])
     words = (
         " ".join(repr(_rounded(float(x), least)) for x in numbers)
@@ -753,15 +701,10 @@ def pose_words(T: FloatArray, rounding: Tolerance) -> str:
 
 
 def _rounded(x: float, rounding: float) -> float:
-    """Return the shortest decimal number that differs from `x` by no more than the rounding."""
     return round(x, math.ceil(-math.log10(rounding))) + 0.0
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
-    """Return whether a frame is fixed and has no children, in A and in B.
-
-    The child link of a mimic joint is no tool, even if the joint cannot move because its multiplier is 0.
-    """
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
             return False
@@ -771,7 +714,6 @@ def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
 
 
 def differences(alignment: Alignment, variables: Variables) -> tuple[Difference, ...]:
-    """Return the differences that affect motion, ordered from the base to the tips."""
     tree_a, tree_b, tolerance = alignment.a.tree, alignment.b.tree, tolerance_of(alignment.a, alignment.b)
     with_depth: list[tuple[float, list[Difference]]] = [
         (len(alignment.path(i)), _joint_differences(alignment, variables, i))
@@ -802,7 +744,6 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
 
 
 def _on_matched_bodies(alignment: Alignment, link: str) -> bool:
-    """Return whether a link's body in A and its body in B each have a matching body in the other model."""
     return all(
         mechanism.body_of[mechanism.tree.link_index(link)] not in {mechanism.body_of[j + 1] for j in only}
         for mechanism, only in ((alignment.a, alignment.only_a), (alignment.b, alignment.only_b))
@@ -810,7 +751,6 @@ def _on_matched_bodies(alignment: Alignment, link: str) -> bool:
 
 
 def _carrier(tree: KinematicTree, link: str) -> str:
-    """Return words for the last moving joint before a link."""
     path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
@@ -837,7 +777,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
 
 
 def _beyond_rounding(one: MatchedJoints | FramePair, rounding: Tolerance) -> tuple[float, float]:
-    """Return the tilt (rad) and shift (m) of a joint or frame between A and B; rounding errors become 0."""
+    """Return the tilt (rad) and the shift (m); rounding errors become 0."""
     return one.tilt if one.tilt > rounding.angle else 0.0, one.shift if one.shift > rounding.distance else 0.0
 
 
@@ -849,11 +789,7 @@ def remarks(
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return the differences that do not affect motion: joint limits, joint types, links of only one model.
-
-    `single` is the relative error of a number in single precision, or 0. Unless `as_written` is true, B's
-    limits are first converted to the coordinate of A's joint.
-    """
+    """Return differences without effect on motion; `single` is the relative error of single precision."""
     some = list[Difference]()
     for step in alignment.steps:
         if not step.unlike:
@@ -882,12 +818,10 @@ def remarks(
 
 
 def _in_order(which: str, value: Value) -> tuple[Value, Value]:
-    """Return a parameter's values in A and in B: None for the model that does not have it."""
     return (value, None) if which == "A" else (None, value)
 
 
 def idle(joint: Joint) -> Lock | None:
-    """Return the constant value of a mimic joint with the multiplier 0; None for any other joint."""
     lock = joint.lock
     return lock if lock and lock.joint.mimic and lock.joint.mimic.multiplier == 0.0 else None
 
@@ -898,8 +832,7 @@ def limit_differences(
     """Yield the differences between two joints' kinds and limits.
 
     `tolerance` is relative to the larger of 1 (rad or m) and the limit's absolute value. `single` is the
-    relative error of a limit in single precision, or 0. With `zero` = (sign, offset), B's limits are
-    converted to A's coordinate: (value in B) = sign * (value in A) + offset.
+    relative error of a limit. `zero` is (sign, offset): value in B = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

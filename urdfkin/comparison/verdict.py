@@ -1,4 +1,4 @@
-"""Decide whether two models are the same robot; the module contains the function `same` and its steps."""
+"""The function `same`, which decides whether two models are the same robot."""
 
 from __future__ import annotations
 
@@ -61,8 +61,7 @@ from urdfkin.verify.verifier import as_verify
 
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: Maximum number of frames that are searched for the largest distance between the unchanged models.
-#: At most this number of upper bounds is computed on the finer grid.
+#: Maximum number of frames that are searched for the largest distance, or bounded on the finer grid.
 FARTHEST = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 LONGEST = 1e150
@@ -122,7 +121,7 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         demand_joint_names(robot.tree, list(names), which)
-    # The copies protect the user's robots: a comparison stores many compiled trees in its robots.
+    # A comparison stores many compiled trees in its robots, so `same` copies the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -142,8 +141,6 @@ def _parse_map(joint_map: Mapping[str, str] | None) -> dict[str, str]:
 
 
 class Comparator:
-    """The comparison of two robots, step by step; `same` explains the arguments."""
-
     def __init__(
         self,
         robots: tuple[Robot, Robot],
@@ -180,7 +177,6 @@ class Comparator:
         self.has_table = any(robot.origin.table for robot in robots)
 
     def compare(self) -> Sameness:
-        """Return the complete result, with intervals and Pinocchio's confirmation."""
         alignment = self.alignment()
         self._check_map(alignment)
         variables = variables_of(alignment, self.tolerance)
@@ -200,11 +196,10 @@ class Comparator:
         return replace(result, frames=frames, as_written=farthest, written=bound, checked=checked)
 
     def alignment(self) -> Alignment:
-        """Search for the alignment of B with A for which most joints and links agree."""
         return align(*self.mechanisms, {**self.spellings, **self.joint_map})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
-        """Return the result without intervals and confirmation; set the tool frames in `alignment`."""
+        """Return the result without intervals; set the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         changes = changes_of_b(alignment, self.tolerance, tables=self.has_table)
@@ -259,11 +254,7 @@ class Comparator:
     def _single_precision_bound(
         self, alignment: Alignment, variables: Variables
     ) -> tuple[float, float] | None:
-        """Bound the distance and angle (m, rad) between frames that single precision can cause.
-
-        The bound is the sum of the errors of both files and of the rounding errors of double precision. The
-        result is None if both files have double precision.
-        """
+        """Bound the distance and the angle (m, rad) that single precision can cause."""
         if all(robot.single is None for robot in self.robots):
             return None
         pairs = [(frame.a, frame.b) for frame in alignment.frames]
@@ -276,10 +267,6 @@ class Comparator:
         return metres, radians
 
     def _unexplained_differences(self, alignment: Alignment) -> tuple[JointDifference, ...]:
-        """Return the differences of the unchanged models that rounding does not explain, joint by joint.
-
-        A is compared with B, and B with A, because the bounds differ (`JointComparison`).
-        """
         errors = [
             np.zeros((len(tree.joints), 3)) if robot.single is None else robot.single.joints
             for tree, robot in zip(self.trees, self.robots, strict=True)
@@ -297,11 +284,7 @@ class Comparator:
         return tuple(one if one.a is None else replace(one, a=one.b, b=one.a) for one in other.differences())
 
     def as_written(self, alignment: Alignment) -> Alignment:
-        """Return the alignment of the unchanged models, with the joint and link pairs of `alignment`.
-
-        If one model is a Denavit-Hartenberg table, only links with equal names are compared, because the
-        poses of the table's other links depend on its convention.
-        """
+        """Return the alignment of the unchanged models, with the pairs of `alignment`."""
         a, b = self.mechanisms
         choices = replace(AS_WRITTEN, X=base_as_written(a, b), orders=alignment.b.orders)
         written = align(a, b, alignment.names, choices)
@@ -311,6 +294,7 @@ class Comparator:
     def _compared_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
+        # In a Denavit-Hartenberg table, the poses of links with other names depend on the convention.
         return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -330,10 +314,10 @@ class Comparator:
         return DistanceSearch(self.robots, alignment, variables, as_written=as_written)
 
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
-        """Bound the distance and the angle (m, rad) between two frames that differ only by rounding.
+        """Bound the distance and the angle (m, rad) between frames that differ only by rounding.
 
-        `same` ignores a small rounding difference at each joint, and these differences add up along the path.
-        For a joint without limits, the sum uses the range in which the joint is sampled.
+        `same` ignores a small rounding difference at each joint. These differences add up along the path. A
+        planar or floating joint counts with its sampling range; an unlimited prismatic joint does not count.
         """
         pairs = [
             (step.kind, pair)
@@ -372,7 +356,7 @@ class Comparator:
     def _bound_as_written(
         self, written: Alignment, variables: Variables, farthest: Interval | None
     ) -> tuple[float, float]:
-        """Return one bound (m, rad) for all frames; use branch and bound only if it may prove `within`."""
+        """Return one bound (m, rad) on the distances of all frames of the unchanged models."""
         search = self.search(written, variables, as_written=True)
         if search.unbounded:
             return math.inf, math.inf
@@ -385,7 +369,6 @@ class Comparator:
         return largest[0] + metres, largest[1] + radians
 
     def _upper_bounds(self, alignment: Alignment, variables: Variables) -> list[tuple[float, float]]:
-        """Return an upper bound (m, rad) for each frame; compute the largest bounds on a finer grid."""
         frames = alignment.frames
         uppers = [upper_bounds(alignment, variables, frame) for frame in frames]
         different = [k for k, upper in enumerate(uppers) if max(upper) > 0.0]
@@ -405,7 +388,7 @@ class Comparator:
         search: DistanceSearch,
         target: float,
     ) -> None:
-        """Try to prove by branch and bound that matching frames are at most `target` (m) apart."""
+        """Try to prove by branch and bound that matching frames are within `target` (m)."""
         for _ in uppers:
             widest = max(range(len(uppers)), key=lambda k: uppers[k])
             if uppers[widest][0] <= target:
@@ -416,14 +399,13 @@ class Comparator:
                 break
 
     def _farthest_as_written(self, written: Alignment, variables: Variables) -> Interval | None:
-        """Search for the frame with the largest distance between A and B, and return its interval."""
         if not written.frames:
             return None
         metres, radians = self.rounding(written, variables)
         search = self.search(written, variables, as_written=True)
         distances = search.sampled_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:FARTHEST]]
-        if distances.max() <= metres:  # no position differs, so the frame with the largest angle counts
+        if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
         attained, frame = max(worst, key=lambda pair: pair[0][0])
@@ -455,7 +437,6 @@ class Comparator:
     def _confirm(
         self, alignment: Alignment, variables: Variables, frames: tuple[Interval, ...]
     ) -> Confirmation:
-        """Check the bounds with Pinocchio, which reads the texts of A and B with its own parser."""
         if not all(as_verify(robot.verifier.policy) for robot in self.robots):
             return Confirmation("not asked", reason="loaded with verify=False")
         for robot in self.robots:
@@ -473,7 +454,7 @@ class Comparator:
         return Confirmation("confirmed", PINOCCHIO.words, CONFIRMED, float(distances.max(initial=0.0)))
 
     def pinocchio_distances(self, alignment: Alignment, variables: Variables) -> FloatArray:
-        """Let Pinocchio compute each frame's largest distance (m) at `CONFIRMED` configurations."""
+        """Compute each frame's largest distance (m) at `CONFIRMED` configurations with Pinocchio."""
         search = self.search(alignment, variables)
         q_a, q_b = search.configurations(search.random_values(CONFIRMED), moved=True)
         distances = search.distances_at(q_a, q_b, alignment.frames, pinocchio_poses)
@@ -494,11 +475,7 @@ def _fixed_only_here(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> set[int]:
-    """Return the fixed joints of a tree that are moving joints in the other tree.
-
-    Two joints match if they have the same name, or if their child links have the same label. `names` maps the
-    name of a joint to its different name in the other tree. `labels` has a label for each link of both trees.
-    """
+    """Return the fixed joints that match, by name or child link, a moving joint of `other`."""
     moving = {joint.name for joint in other.joints if joint.kind.nv}
     ours = {names.get(joint.name, joint.name) for joint in tree.joints if joint.kind.nv}
     children = {
@@ -517,10 +494,9 @@ def _with_idle_joints_fixed(
     names: Mapping[str, str],
     labels: tuple[Sequence[str], Sequence[str]],
 ) -> KinematicTree:
-    """Return a tree in which mimic joints with the multiplier 0 are fixed joints at the rule's offset.
+    """Return the tree with each mimic joint of multiplier 0 fixed at its offset.
 
-    A joint with the multiplier 0 never moves. If a matching joint of the other model moves, the joint remains
-    a mimic joint, so that `same` compares the two joints. Joints match as in `_fixed_only_here`.
+    The joint remains a mimic joint if the matching joint of the other model moves.
     """
     moves = [joint.kind.nv > 0 and not _never_moves(joint) for joint in other.joints]
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
@@ -542,11 +518,7 @@ def _never_moves(joint: Joint) -> bool:
 def _spelled_alike(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Return link labels of two models, and joint pairs whose names differ only by USD's restrictions.
-
-    USD does not allow all names, so a USD file spells some names differently. Such a name is matched to a
-    name of the other model, unless a second name of the other model has the same spelling.
-    """
+    """Return link labels, and joint pairs whose names differ only because USD restricts names."""
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
         other = robots[1 - k]
@@ -561,7 +533,7 @@ def _spelled_alike(
 
 
 def _originals(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]:
-    """Map each name that the USD file spells differently to the original name in `names`."""
+    """Map the spelling in the USD file to the original name in `names`."""
     known, originals = set(usd_names), dict[str, set[str]]()
     for name in names:
         if name not in known:
@@ -571,10 +543,10 @@ def _originals(names: Sequence[str], usd_names: Sequence[str]) -> dict[str, str]
 
 
 def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
-    """Return the pose (4, 4) of B's root in A's root frame, if the two models are not changed.
+    """Return the pose (4, 4) of B's root in A's root frame for unchanged models.
 
-    If the root body of one model has a link with the name of the other model's root, these two links
-    coincide. Otherwise, the two roots coincide.
+    The two roots coincide, with one exception. If the root body of one model has a link with the name of
+    the other model's root, this link coincides with that root.
     """
     if (root := a.labels[0]) in b.labels and not b.body_of[link := b.labels.index(root)]:
         return inverse(b.homes[link])
@@ -584,7 +556,6 @@ def base_as_written(a: Mechanism, b: Mechanism) -> FloatArray:
 
 
 def parse_map(words: tuple[str, ...]) -> dict[str, str]:
-    """Parse words of the form NAME=NAME; raise InputError for a word of another form."""
     pairs = dict[str, str]()
     for word in words:
         ours, _, theirs = word.partition("=")
@@ -597,16 +568,15 @@ def parse_map(words: tuple[str, ...]) -> dict[str, str]:
 class JointComparison:
     """Prove joint by joint that single precision is the cause of every difference between two models.
 
-    Rounding errors of all joints add up in the pose of a frame. If a frame's displacement is compared only
-    with this sum, a smaller error in one joint is not detected. Therefore, the proof compares the models
+    The rounding errors of all joints add up in the pose of a frame. The sum of all errors is therefore a weak
+    limit: a wrong number in one joint can move a frame by less than this sum. The proof compares the models
     joint by joint. Each joint may differ only by the rounding of the numbers that define this joint.
 
-    **Compared quantities.** Two files can describe the same joint by different frames. For example, the
-    origin of a joint may be shifted along its axis, and a converter may add links or merge fixed links. The
-    proof therefore compares quantities that do not depend on the choice of frames. `same` computes these
-    quantities for each link that both models have. The robot is in the zero configuration, and the quantities
-    are expressed in the frame of a link P. P is the link's nearest ancestor in A that both models have. The
-    quantities are
+    **Compared quantities.** Two files can describe the same joint by different frames. For example, one file
+    may shift the origin of a joint along the joint's axis, and a converter may add or merge fixed links. The
+    proof therefore compares quantities that do not depend on the choice of frames. Let P be the nearest
+    ancestor (in A) of a link, such that both models have P. For each link that both models have, the proof
+    compares three quantities in the zero configuration, in the frame of P:
 
     - the pose of the link;
     - the direction and the line of the axis of each joint between P and the link;
@@ -619,13 +589,14 @@ class JointComparison:
     **Bound.** Let the joints 1 to n be the joints on the path from P to the link. Rounding can shift the
     frame after joint i by up to w_i, and rotate this frame by up to e_i. The function
     `urdfkin.verify.usd_check.single_precision` computes w_i and e_i from the numbers of joint i. Let R_i be
-    the constant rotation of joint i, and p_i its origin. A star marks the exact values. Then
+    the constant rotation of joint i, and p_i the position of its origin. Let R*_i and p*_i be the exact
+    values. The angle of a product of rotations is at most the sum of their angles. The angle between the
+    product R_1 ... R_n and the product R*_1 ... R*_n is therefore at most
 
-        R_1 ... R_n    and    R*_1 ... R*_n    are apart by at most    e_1 + ... + e_n,
+        e_1 + ... + e_n.
 
-    because the angle of a product of rotations is at most the sum of their angles. Let W be the position
-    error (m) and E the rotation error (rad) of the frame before joint i. The position error of the frame
-    after the joint is then at most
+    Let W be the position error (m) and E the rotation error (rad) of the frame before joint i. The position
+    error of the frame after the joint is then at most
 
         W + E |p_i| + w_i,
 
@@ -642,25 +613,23 @@ class JointComparison:
     double precision, so these errors are added to the bounds. If both models are rounded, the bounds of both
     models are added.
 
-    **Both orders.** The bound for one joint can contain the rounding of other joints. This happens if the
-    parent of the joint is a link that only B has, or if P is far from the joint in B. Therefore, `same`
-    compares A with B, and also B with A. If the first of the two models is rounded, the path from P to the
-    link must have at most one moving joint. In the second model, the path from the common ancestor to P must
-    then have no rounded joint. If a condition does not hold, `same` reports the difference as not explained.
+    **Both orders.** The bound for one joint can contain the rounding of other joints. One case is a joint
+    whose parent is a link that only B has. Another case is a link P that is far from the joint in B.
+    Therefore, `same` compares A with B, and also B with A. If the first of the two models is rounded, the
+    path from P to the link must have at most one moving joint. In the second model, the path from the common
+    ancestor to P must then have no rounded joint. If a condition does not hold, `same` reports the difference
+    as not explained.
 
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is
-    smaller than the rounding of the numbers that define it. A comparison of the two models cannot detect this
-    error. The proof does not cover planar joints, floating joints, joints in another order, and links on
-    different branches of A and B. These joints and links must agree up to double precision. If they do not,
-    `same` reports the difference as not explained.
+    smaller than the rounding of the numbers that define the joint. A comparison of the two models cannot
+    detect this error. The proof does not cover planar joints, floating joints, joints in another order, and
+    links on different branches of A and B. These joints and links must agree up to double precision. If they
+    do not, `same` reports the difference as not explained.
 
-    Args:
-        alignment: The alignment of the two models; only its pairs of joints and links are used.
-        errors: Bounds (joints, 3) on the errors of each joint of A and of B: m, rad, and the relative error
-            of its mimic rule. They are 0 for double precision.
-        base: (4, 4) pose of B's root in A's root frame, for unchanged models.
-        tolerance: The largest differences that count as rounding of double precision.
+    `errors` contains bounds (joints, 3) on the errors of each joint of A and of B: m, rad, and the relative
+    error of the joint's mimic rule. The bounds are 0 for double precision. `base` is the pose (4, 4) of B's
+    root in A's root frame.
     """
 
     def __init__(
@@ -681,7 +650,6 @@ class JointComparison:
         self.pairs[self.start[0]] = self.start[1]
 
     def differences(self) -> Iterator[JointDifference]:
-        """Yield each difference that is larger than rounding; the links come in A's order."""
         joints, links = self.trees[0].joints, self.trees[0].links
         starts = [m.homes[link] for m, link in zip(self.mechanisms, self.start, strict=True)]
         if not all(self.tolerance.holds(*pose_difference(IDENTITY, T)) for T in (self.base, *starts)):
@@ -701,10 +669,7 @@ class JointComparison:
                 yield JointDifference(f"joint {joints[step.a].name}", "", None, why)
 
     def _reference_link(self, link: int) -> tuple[int, list[int]]:
-        """Return the link's nearest ancestor in A that both models have, and the joints between them.
-
-        If there is no such ancestor, the result contains the link at which all paths begin.
-        """
+        """Return P, the link's nearest ancestor that both models have, and the joints between."""
         joints, path = self.trees[0].joints, list[int]()
         while link:
             path.insert(0, link - 1)
@@ -722,7 +687,6 @@ class JointComparison:
     def _path_differences(
         self, link: int, paths: Sequence[tuple[list[int], list[int]]]
     ) -> Iterator[JointDifference]:
-        """Yield the differences between A and B on the paths from the link P to a common link."""
         trees = self.trees
         moving = [
             [[i for i in path if tree.joints[i].kind.nv] for path in both]
@@ -734,7 +698,6 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "is carried by other joints in the other model")
             return
-        # The joints paths[1][0] of B lie between the common ancestor and the reference link P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(name, "", None, "is carried by joints without a common link between them")
             return
@@ -765,17 +728,15 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle between two axes, and the distance of a point of one axis from the other axis."""
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 
     def _screws_and_pose(
         self, which: int, back: Sequence[int], path: Sequence[int]
     ) -> tuple[Mapping[int, tuple[Screw, FloatArray]], FloatArray, FloatArray]:
-        """Return a path's joint screws and the pose at its end, with bounds (m, rad) on their errors.
+        """Return the joint screws and the link pose in the frame of P, with error bounds (m, rad).
 
-        Both joint lists begin at the last common ancestor: `back` leads to the link P, and `path` to the
-        compared link. The results are expressed in the frame of P. `which` is 0 for A and 1 for B.
+        Both joint lists begin at the last common ancestor. `back` leads to P, and `path` to the link.
         """
         joints = self.trees[which].joints
         T_common_P, P_errors = np.eye(4), np.zeros(2)
@@ -796,7 +757,7 @@ class JointComparison:
         return screws, T_P_common @ T, errors_in_P()
 
     def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
-        """Return the error bounds (m, rad) after a joint; `errors` contains the bounds before the joint."""
+        """Return the error bounds (m, rad) after a joint; `errors` are the bounds before it."""
         metres, radians = self.errors[which][joint, :2]
         lever = self.trees[which].joints[joint].length
         return np.array([errors[0] + errors[1] * lever + metres, errors[1] + radians])
@@ -804,7 +765,6 @@ class JointComparison:
     def _beyond_bound(
         self, place: str, what: str, tilt: float, shift: float, bound: FloatArray
     ) -> Iterator[JointDifference]:
-        """Yield a difference if the tilt (rad) or the shift (m) exceeds its bound (m, rad)."""
         metres, radians = bound.tolist()
         far, turned = shift > metres + self.tolerance.distance, tilt > radians + self.tolerance.angle
         if far or turned:
@@ -813,11 +773,11 @@ class JointComparison:
             yield JointDifference(place, what, None, sizes, " and ".join(explained))
 
     def _free_joint_differences(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Yield the differences of a planar or floating joint, which must be attached to the root body."""
+        """Compare a planar or floating joint, which must be attached to the root body."""
         ends = list(zip(self.mechanisms, paths, strict=True))
         parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
         bodies = [m.body_of[parent] for m, parent in zip(self.mechanisms, parents, strict=True)]
-        if any(bodies) or not all(len(path) == 1 for path in paths):  # the root body has the index 0
+        if any(bodies) or not all(len(path) == 1 for path in paths):
             why = "follows a planar or floating joint that is not compared joint by joint"
             yield JointDifference(name, "", None, why)
             return
@@ -826,7 +786,7 @@ class JointComparison:
             [mechanism.homes[path[0] + 1] for mechanism, path in ends],
         ):
             if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
-                why = "follows a planar or floating joint with another frame"
+                why = "follows a planar or floating joint with a different frame"
                 yield JointDifference(name, "", None, why)
 
     def _rule_differences(self, step: MatchedJoints) -> Iterator[JointDifference]:

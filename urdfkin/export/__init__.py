@@ -11,7 +11,7 @@ from urdfkin.export.seal import seal
 if TYPE_CHECKING:
     from urdfkin.export.code import FrameCode
 
-#: Module and file suffix of each language
+#: Module and file suffix of each language.
 LANGUAGES: dict[str, tuple[str, str]] = {
     "c": ("urdfkin.export.c", ".c"),
     "cpp": ("urdfkin.export.cpp", ".hpp"),
@@ -23,22 +23,19 @@ LANGUAGES: dict[str, tuple[str, str]] = {
     "matlab": ("urdfkin.export.matlab", "_kinematics.m"),
     "latex": ("urdfkin.export.latex", ".tex"),
 }
-#: Values of the argument `form` of `Robot.export`
+#: Values of the argument `form` of `Robot.export`.
 FORMS = ("tree", "dh", "screws")
-#: Quantities that are exported by default
+#: Quantities that are exported by default.
 QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return the code with exact constants for the language sympy-exact; otherwise return it unchanged.
-
-    Raise VerificationError if Pinocchio computes another result than the exact expressions.
-    """
+    """Return code with exact constants for sympy-exact; raise VerificationError if results differ."""
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 
 def write(code: FrameCode, to: str) -> str:
-    """Return the text of an exported file with its digest; raise VerificationError as `code_in` does."""
+    """Return the text of an exported file with its digest."""
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
     return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))

@@ -3,8 +3,8 @@
 The exported code allocates no memory and has no global variables. Each function is straight-line code. A call
 computes one configuration, or `LANES` configurations together. In the arrays of a call, the numbers of one
 configuration are `L` elements apart, where `L` is 1 or `LANES`. With `LANES`, a compiler turns each line of
-code into one vector instruction. Code that does not depend on the robot is in the templates of the folder
-`frames/`.
+code into one vector instruction. The templates in the folder `frames/` contain the code that all robots
+share.
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ _PLACEHOLDER = re.compile(r"@(\w+)@")
 
 
 def write(code: FrameCode, to: str = "c") -> str:
-    """Return the text of a C file; if `NAME_DECLARATIONS` is defined, the file contains declarations only."""
+    """Return the text of a C file; with `NAME_DECLARATIONS`, it contains declarations only."""
     return c_file(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
 def c_file(code: FrameCode, head: str = "", main: str = "") -> str:
-    """Return the text of a C file: a header comment, the functions, and a program that checks them."""
     return fill_template(
         "file.c",
         head=head,
@@ -47,7 +46,6 @@ def fill_template(name: str, /, **texts: str | int) -> str:
 
 
 def literal(x: float) -> str:
-    """Return a constant as C code, in the number type of the file."""
     return f"R({x!r})"
 
 
@@ -76,7 +74,7 @@ def _head(code: FrameCode) -> list[str]:
 
 
 def what(function: Function) -> str:
-    """Return the shape of a function's result and the numbers of its equations, as in "4 x 4, eq. 7.77"."""
+    """Return the shape of a result and its equations, as in "4 x 4, eq. 7.77"."""
     return f"{' x '.join(map(str, function.shape))}, eq. {', '.join(function.quantity.equations)}"
 
 
@@ -135,23 +133,17 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def reserve(code: FrameCode, function: Function) -> int:
-    """Return the smallest number of configurations for which every array has at least eight numbers."""
+    """Return the least number of configurations for which each array has eight or more numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 
 
 def advance(code: FrameCode, function: Function) -> str:
-    """Return C code that moves each pointer by `LANES` configurations, which are computed together."""
     return ", ".join(f"{x} += LANES * {width}" for x, width in code.widths(function).items())
 
 
 class InputLayout:
-    """Order of a function's array `in`: inputs, angles that are inputs, computed angles, sines, cosines.
-
-    Attributes:
-        first: Index of the first angle.
-        size: Length of the array.
-    """
+    """Order of the array `in`: inputs, angles that are inputs, computed angles, sines, cosines."""
 
     def __init__(self, function: Function) -> None:
         inputs = [node for node in function.nodes if node.op in function.inputs]
@@ -163,7 +155,6 @@ class InputLayout:
         self.size = max(1, self.first + 3 * len(self.angles))
 
     def index(self, node: Node) -> int:
-        """Return the index of an input, an angle, or the sine or cosine of an angle."""
         if node.op in ("sin", "cos"):
             return self.index(node.of[0]) + len(self.angles) * (1 if node.op == "sin" else 2)
         if node in self.angles:
@@ -219,7 +210,6 @@ def _lane_sines(writer: Writer, layout: InputLayout) -> Iterator[str]:
 
 
 def vectors(code: FrameCode) -> Iterator[str]:
-    """Yield C arrays with the test vectors: inputs, true values and tolerances."""
     found, n = code.proof.vectors, len(code.proof.vectors)
     yield "/* True values at fifty digits; the tolerances in double and single precision, in eps. */"
     for k, letter in enumerate(code.inputs):
@@ -248,7 +238,7 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: FrameCode, *frames: str) -> str:
-    """Return a program, such as "check_one.c", that checks the exported functions with the test vectors."""
+    """Return a program, such as "check_one.c", that runs the test vectors."""
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
     return fill_template("check.c", checks="".join(checks))
 

@@ -20,34 +20,28 @@ from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
 from urdfkin.system.processes import own_python
 
-#: Text in the first lines of every exported file
+#: Text in the first lines of every exported file.
 _MARK = "straight-line code for this robot and frame"
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
-#: Compiler and its options for each suffix
+#: Compiler and options for each suffix.
 _COMPILE = {
     ".c": ("cc", "-std=c99", "-x", "c", *_STRICT),
     ".hpp": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
     ".cuh": ("c++", "-std=c++11", "-x", "c++", *_STRICT),
 }
-#: Compiler and its options for a CUDA file that runs on a GPU
+#: Compiler and options for a CUDA file that runs on a GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `_MARK` and the word UNVERIFIED
+#: Number of characters at the start of a file that are searched for `_MARK` and the word UNVERIFIED.
 _HEAD = 2000
-#: Maximum time (s) of a command; the code of a robot with a thousand joints compiles in one minute
+#: Time limit (s) of a command; a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
 
 
 @dataclass(frozen=True, slots=True)
 class FileCheck:
-    """The result of a check.
-
-    Attributes:
-        lines: One line of text for each function and precision.
-        good: Whether all functions agree with their test vectors.
-        doubts: Reasons why the file is not verified; empty if it is verified.
-    """
+    """Result of a check; `doubts` are the reasons why the file is not verified."""
 
     lines: tuple[str, ...]
     good: bool
@@ -55,7 +49,6 @@ class FileCheck:
 
     @property
     def verified(self) -> bool:
-        """Whether Pinocchio confirmed the expressions and the file is unchanged."""
         return not self.doubts
 
 
@@ -100,10 +93,7 @@ def _has_gpu() -> bool:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
-    """Compile and run a file of C, C++ or CUDA, in double and in single precision, with warnings as errors.
-
-    Without a GPU, only the CPU functions of a CUDA file are checked.
-    """
+    """Run a compiled file in both precisions; without a GPU, only the CPU functions are checked."""
     name = _name_of_program(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")
     command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]
@@ -146,7 +136,7 @@ def _program(name: str, file: Path) -> str:
 
 
 def _run(command: Sequence[str], file: Path, cwd: Path | None = None) -> list[str]:
-    """Run a command; return the lines of its output that begin with "good" or "WRONG"."""
+    """Run a command, and return the output lines that begin with "good" or "WRONG"."""
     try:
         done = subprocess.run(
             command,

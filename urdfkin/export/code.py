@@ -1,4 +1,4 @@
-"""Define the functions of one frame that are exported, and how their expressions become text."""
+"""The functions of one frame that are exported, and the text of their expressions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from urdfkin.model.tree import KinematicTree
 from urdfkin.verify.quantities import Quantity, quantity, recursive_quantities
 from urdfkin.verify.verifier import Verifier
 
-#: Precedences of operators, the lowest first
+#: Precedences of operators, the lowest first.
 _SUM, _SIGN, _PRODUCT = range(3)
 _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 
@@ -30,19 +30,9 @@ _PRECEDENCE = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT}
 class FrameCode:
     """The functions of a frame. No name contains characters that end a comment in the exported file.
 
-    Attributes:
-        name: Prefix of the names of functions.
-        coordinates: Names of the entries of q.
-        rates: Names of the entries of v and a.
-        joints: Names of the path's moving joints.
-        identifiers: Identifiers in the exported code: for the entries of "q", "v" and "a", and for the path's
-            joints ("s").
-        about: Lines of the file's header with the Denavit-Hartenberg table or the screws; empty for code that
-            follows the URDF's joints.
-        maybe_proof: The comparison with Pinocchio, and the test vectors; None for code that urdfkin compiles
-            for its own use.
-        exact: Function that returns this code with fractions instead of doubles as constants. None if there
-            is no such code, or if the constants are already exact.
+    `identifiers` contains identifiers for the entries of "q", "v" and "a", and for the path's joints ("s").
+    `maybe_proof` is None for code that urdfkin compiles for its own use. `exact` returns this code with
+    fractions as constants.
     """
 
     name: str
@@ -66,7 +56,6 @@ class FrameCode:
 
     @property
     def inputs(self) -> str:
-        """Letters of the inputs of all functions: "q", "qv" or "qva"."""
         return max((function.inputs for function in self.functions), key=len)
 
     @property
@@ -82,7 +71,7 @@ class FrameCode:
 
     @property
     def head(self) -> list[str]:
-        """Lines of a file's header, without comment marks; unverified code is announced in the first line."""
+        """Lines of a file's header; the first line marks unverified code."""
         verdict, *rest = self.proof.lines
         subject = f"{self.robot}, frame {self.frame}"
         about = f"Kinematics of {subject}: straight-line code for this robot and frame."
@@ -115,17 +104,7 @@ def code_of(
     verify: bool | None,
     about: str = "",
 ) -> FrameCode:
-    """Return the code of a frame, with test vectors and the result of the comparison with Pinocchio.
-
-    `plan_of` returns the compiled tree of the joints that move given links. By default, the prefix `name` of
-    the functions consists of the names of the robot and of the frame. `about` is text for the file's header:
-    the Denavit-Hartenberg table or the screws.
-
-    Raises:
-        UnknownNameError: the frame, a quantity or the reference is unknown.
-        InputError: no quantity is given, or a quantity cannot be exported.
-        VerificationError: Pinocchio computes another result.
-    """
+    """Return the code of a frame, compared with Pinocchio, with test vectors."""
     tree, reference = verifier.tree, Reference.of(reference)
     plan = plan_of([tree.frame_link(frame)])
     rows = _exported_quantities(quantities)
@@ -193,10 +172,7 @@ def _exported_quantities(names: Collection[str]) -> list[Quantity]:
 
 
 class Writer:
-    """Writes the expressions of a function in a language in which a sum is written as a + b.
-
-    `literal` writes a constant. Without `sine`, sines and cosines are inputs of the written code.
-    """
+    """Writes expressions as code; without `sine`, sines and cosines are inputs of the code."""
 
     def __init__(
         self,
@@ -222,7 +198,6 @@ class Writer:
 
     @property
     def inputs(self) -> list[Node]:
-        """The needed numbers of q, v and a; without `sine`, also the sines and cosines."""
         leaves = (*self.code.identifiers, *self.leaves)
         return [node for node in self.function.nodes if node.op in leaves and node in self.needed]
 
@@ -248,7 +223,7 @@ class Writer:
         return [self.text(x) for x in self.function.results]
 
     def text(self, x: Number, precedence: int = _SUM) -> str:
-        """Return an expression as text, in brackets if the precedence of its operator is lower."""
+        """Return an expression as text, in brackets if its operator has a lower precedence."""
         if not isinstance(x, Node):
             return self.literal(float(x) if isinstance(x, int) else x)
         if x in self.variables or x.op in self.code.identifiers:
@@ -256,13 +231,12 @@ class Writer:
         return self.value(x, precedence)
 
     def value(self, x: Node, precedence: int = _SUM) -> str:
-        """Return the right-hand side of the assignment of an expression to a variable."""
         if x.op in ("sin", "cos", "sqrt"):
             return f"{x.op}({self.text(x.of[0])})"
         return _arithmetic(x, self.text, precedence)
 
     def expanded(self, x: Number, input_text: Callable[[Node], str], precedence: int = _SUM) -> str:
-        """Return an expression, such as an angle, as text with inputs and constants but without variables."""
+        """Return an expression as text, with inputs and constants instead of variables."""
         if not isinstance(x, Node):
             return self.literal(float(x))
         if x.op in self.code.identifiers:
@@ -271,7 +245,6 @@ class Writer:
 
 
 def _arithmetic(x: Node, text: Callable[[Number, int], str], precedence: int) -> str:
-    """Return a sum, difference, product, quotient or negation; `text` writes the operands."""
     if x.op == "neg":
         own, result = _SIGN, f"-{text(x.of[0], _PRODUCT)}"
     else:

@@ -4,9 +4,9 @@ The first call of a quantity exports C code, compiles the code with the system's
 results of the machine code with Pinocchio. Without a C compiler, the forward recursion that Numba compiles is
 used.
 
-The machine code is stored in a cache with checksums. The key in the cache consists of the C code, the
-compiler and the processor. The code is loaded from memory, because a file could be changed after its checksum
-was tested.
+A cache stores the machine code with checksums. The key in the cache consists of the C code, the compiler and
+the processor. The code is loaded from memory, because another program could change a file after the test of
+the checksum.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from urdfkin.verify.quantities import QUANTITIES, Quantity
 from urdfkin.verify.verifier import Verifier
 
 _FLAGS = ("-std=c99", "-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fPIC", "-shared")
-#: Options to use the full width of vector registers; by default, GCC uses half of it on many processors
+#: By default, GCC uses half of the width of vector registers on many processors.
 _WHOLE_REGISTERS = {"x86_64": ("-mprefer-vector-width=512",)}
 _TIME_LIMIT = 600.0
 _names = count()
@@ -56,7 +56,7 @@ class NoCompilerError(Exception):
 
 
 def library(code: FrameCode) -> ctypes.CDLL:
-    """Compile code that consists of one function, and load it as a library, or raise NoCompilerError.
+    """Compile code that consists of one function, and load it, or raise NoCompilerError.
 
     The argument of the library's entry point `task` is an array with the fields of `KernelArgs`. The result
     is 0, or 1 if an input is not finite.
@@ -130,7 +130,7 @@ def _compile(text: str, command: list[str]) -> bytes:
 
 
 def _load(data: bytes) -> ctypes.CDLL:
-    if not hasattr(os, "memfd_create"):  # macOS cannot load a library from memory
+    if not hasattr(os, "memfd_create"):  # macOS cannot load a library from memory.
         with tempfile.TemporaryDirectory() as folder:
             library = Path(folder, f"robot{next(_names)}.so")
             library.write_bytes(data)
@@ -161,7 +161,7 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results, so that eight configurations need at most half a megabyte of the stack
+#: Maximum number of results; the results of eight configurations then fit in half a megabyte of stack.
 _MOST_RESULTS = 8192
 # Plain integers are several times as fast as members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
@@ -173,7 +173,6 @@ _compiling = lock_over_forks()
 
 
 def _is_plain(x: object, shape: tuple[int, ...]) -> bool:
-    """Return whether x is an array of this shape that machine code can use without a copy."""
     return (
         type(x) is np.ndarray
         and x.shape == shape
@@ -330,11 +329,10 @@ class CompiledFrame:
         self._robot.verifier.ledger.account(name).counters.append((task, KernelArgs.COUNT))
         setattr(self, f"_{row.method}", compute)
         if (found := compute(q, *others)) is not None:
-            warn_of_degrees(self._tree, q)  # only the first call warns, so that later calls stay fast
+            warn_of_degrees(self._tree, q)  # Later calls do not warn, to stay fast.
         return found
 
     def _machine_code(self, row: Quantity) -> Any:
-        """Return the compiled C function of a quantity, or None without a C compiler."""
         with _compiling:
             if row.name not in self._batches:
                 self._batches[row.name] = self._make(row)
@@ -383,11 +381,7 @@ class CompiledFrame:
     def _are_plain(
         self, inputs: Sequence[Given], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
-        """Return whether all arguments are arrays that the machine code can use without a copy.
-
-        Such arrays need no conversion of arguments (`Call`). For 100,000 accelerations, the conversion would
-        take a tenth of the time, because each batch evicts the conversion's code from the processor's caches.
-        """
+        """Return whether the machine code can use all arguments without a copy."""
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
             out, (n, *row.own_shape(self._tree.nv))
@@ -414,7 +408,7 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             arguments = _Arguments()
             arguments[_N], arguments[_OUT] = len(part), address(part)
-            # The code may write past the last row by less than a vector register, so `stage` has extra space.
+            # The code may write past the last row by less than a vector register.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):

@@ -27,17 +27,15 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.exact.numbers import DIGITS, NumberType, enough_digits, exact, precision, read_exact
 from urdfkin.verify.verifier import Verifier
 
-#: Maximum angle (rad) that is replaced by a multiple of pi.
-#: Up to this angle, doubles are far closer to each other than multiples of pi/12.
+#: Largest angle (rad) that may become a multiple of pi/12.
+#: Up to this angle, the distance between neighbouring doubles is far smaller than pi/12.
 _LARGEST = 100.0
-#: Sine and cosine of 0, pi/2, pi and 3 pi/2
+#: Sine and cosine of 0, pi/2, pi and 3 pi/2.
 _RIGHT = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 @dataclass(frozen=True)
 class PiMultiple:
-    """The constant angle `factor` * pi."""
-
     factor: Fraction
 
     def __neg__(self) -> PiMultiple:
@@ -47,14 +45,11 @@ class PiMultiple:
         return self.factor < other
 
     def __radd__(self, other: Number) -> Number:
-        return other.graph.sum(other, self) if isinstance(other, Node) else self  # other is 0
+        return other.graph.sum(other, self) if isinstance(other, Node) else self  # The other summand is 0.
 
 
 class ExactGraph(Graph):
-    """The expressions of a function whose constants are exact numbers, not doubles.
-
-    `recognised` contains each angle of the URDF that was replaced, with its multiple of pi.
-    """
+    """Expressions with exact constants; `recognised` maps each replaced angle to its multiple of pi."""
 
     zero = 0
 
@@ -63,13 +58,12 @@ class ExactGraph(Graph):
         self.recognised: dict[Fraction, PiMultiple] = {}
 
     def made(self, op: str, *of: Any) -> Node:
-        """Return the node of an operation; raise TypeError if an operand is a double."""
         if any(isinstance(x, float) for x in of):
             raise TypeError(f"an operand of {op} is a double")
         return super().made(op, *of)
 
     def angle(self, x: Fraction) -> Fraction | PiMultiple:
-        """Return a constant angle; if it is a multiple of pi/12, return it as `PiMultiple`."""
+        """Return a constant angle, as `PiMultiple` if it is a multiple of pi/12."""
         factor = pi_fraction(float(x)) if 0 < abs(x) < _LARGEST else None
         return x if factor is None else self.recognised.setdefault(x, PiMultiple(factor))
 
@@ -94,7 +88,6 @@ class ExactGraph(Graph):
 def exact_plan(
     graph: ExactGraph, text: str, tree: KinematicTree, plan: CompiledTree, link: int
 ) -> CompiledTree:
-    """Return the compiled tree `plan` with the exact constants of the URDF text of `tree`."""
     graph.place = -1
     eq, path = graph.chapter, tree.path(link)
     joints = read_exact(text, tree, path, NumberType(Fraction, graph.sine_cosine, graph.root))
@@ -114,7 +107,7 @@ def exact_plan(
 
 
 def _aligning(axis: Vector, z: float) -> Matrix:
-    """Return the rotation of `axis_aligning`, with the unit axis as its third column."""
+    """Return the rotation matrix whose third column is the unit axis, as in `axis_aligning`."""
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
     scale = -1 / (sign + own)
@@ -133,7 +126,6 @@ def ball(x: Number) -> Number:
     return exact(x.numerator) / x.denominator if isinstance(x, Fraction) else exact(x)
 
 
-#: Operations on intervals
 _OPERATIONS: dict[str, Callable[..., Number]] = {
     "+": operator.add,
     "-": operator.sub,
@@ -147,7 +139,7 @@ _OPERATIONS: dict[str, Callable[..., Number]] = {
 
 
 def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]:
-    """Return the results of a function with exact constants, for one configuration, as intervals."""
+    """Return the results for one configuration as intervals."""
     values: dict[Any, Number] = {}
 
     def value(x: Number) -> Number:
@@ -163,12 +155,7 @@ def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """The checks of an exported file with exact constants.
-
-    Attributes:
-        angles: Number of different angles of the URDF that were replaced by multiples of pi.
-        most: Maximum change of an angle by this replacement, rad.
-    """
+    """Checks of an export with exact constants; `most` is the largest change of an angle (rad)."""
 
     angles: int = 0
     most: float = 0.0
@@ -194,12 +181,7 @@ def exact_functions(
     proof: Proof,
     verify: bool | None,
 ) -> tuple[tuple[Function, ...], ExactProof]:
-    """Return functions with exact constants, and the result of their comparison with Pinocchio.
-
-    The functions are evaluated at fifty digits. The test vectors are copied from `proof`, the export of the
-    same functions with double-precision constants. Raise VerificationError if Pinocchio computes another
-    result.
-    """
+    """Return functions with exact constants, compared with Pinocchio; `proof` has the test vectors."""
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
         for other in functions:

@@ -1,10 +1,10 @@
-"""Define symbolic numbers, whose arithmetic creates a graph of expressions for exported code.
+"""Symbolic numbers, whose arithmetic creates a graph of expressions for exported code.
 
 The functions of the textbook's equations (`urdfkin.kinematics.equations`) accept these numbers like floats.
-The graph simplifies each expression when the expression is created. Constants are Python floats, so an
-operation on constants is computed and not stored in the graph. Products with 0 and 1 and sums with 0 are
-removed. A product (-x) y becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions
-are the same node, so the sine and the cosine of each joint occur once.
+The graph simplifies each expression at its creation. Constants are Python floats, so an operation on
+constants gives a float, not a node. Products with 0 and 1 and sums with 0 are removed. A product (-x) y
+becomes -(x y), and a sum x + (-y) becomes the difference x - y. Equal expressions are the same node, so the
+sine and the cosine of each joint occur once.
 
 >>> graph = Graph()
 >>> x, y = graph.input("q", 0), graph.input("q", 1)
@@ -35,8 +35,6 @@ class Node:
         of: The operands, which are nodes and constants; for an input such as q[3], the index 3.
         index: Number of the expression in the order of creation; operands have smaller numbers.
         place: Index of the joint on the path at which the recursion created this expression.
-        equation: Numbers of the textbook's equation of this expression, for example "7.127"; "" without one.
-        name: Name of the variable in the code; "" if the variable has no name of its own.
     """
 
     __slots__ = ("equation", "graph", "index", "name", "of", "op", "place")
@@ -78,15 +76,9 @@ class Node:
 
 
 class Graph:
-    """The expressions of one function.
+    """The expressions of one function; each node stores the number of the equation that created it."""
 
-    Attributes:
-        place: Index of the current step of the recursion.
-        equation: Numbers of the current equation.
-        chapter: The textbook's equations as functions that record their equation numbers in new nodes.
-    """
-
-    #: Constant that replaces expressions such as 0 x and x - x
+    #: Constant that replaces products with 0 and differences such as x - x.
     zero: float = 0.0
 
     def __init__(self) -> None:
@@ -105,13 +97,11 @@ class Graph:
         return node
 
     def sine_cosine(self, x: Number) -> tuple[Number, Number]:
-        """Return the sine and the cosine of an angle, which may be a constant."""
         if not isinstance(x, Node):
             return math.sin(x), math.cos(x)
         return self.made("sin", x), self.made("cos", x)
 
     def root(self, x: Number) -> Number:
-        """Return the square root of x, which may be a constant."""
         return self.made("sqrt", x) if isinstance(x, Node) else math.sqrt(x)
 
     def sum(self, x: Number, y: Number) -> Number:
@@ -147,10 +137,7 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function that computes an equation, and stores the equation's number in new expressions.
-
-        If an equation calls another one, the new expressions store the number of the calling equation.
-        """
+        """Return an equation that stores its number in new nodes, unless another equation calls it."""
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
             return equation
@@ -181,13 +168,13 @@ def _without_minus(x: Number) -> Number:
 
 
 def _in_order(x: Number, y: Number) -> tuple[Number, Number]:
-    """Return operands in a fixed order (constants, then nodes), so that x + y and y + x are the same node."""
+    """Return operands in a fixed order, so that x + y and y + x are the same node."""
     first, second = sorted((x, y), key=lambda z: z.index if isinstance(z, Node) else -1)
     return first, second
 
 
 def needed(results: Sequence[Number], leaves: Collection[str] = ()) -> list[Node]:
-    """Return all expressions that the results depend on; operations in `leaves` count as inputs."""
+    """Return all nodes that the results depend on; operations in `leaves` count as inputs."""
     waiting, seen = [x for x in results if isinstance(x, Node)], set[Node]()
     while waiting:
         if (node := waiting.pop()) not in seen:

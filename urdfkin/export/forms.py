@@ -34,7 +34,6 @@ def code_of_robot(
     name: str | None = None,
     verify: bool | None = None,
 ) -> FrameCode:
-    """Return the exported code of a robot's frame; the arguments and errors are those of `Robot.export`."""
     if form not in FORMS:
         raise UnknownNameError("form", form, FORMS)
     verify = bool(robot.verifier.policy_of_call(verify))
@@ -53,17 +52,13 @@ def code_of_chain(
     name: str | None = None,
     verify: bool = True,
 ) -> FrameCode:
-    """Return the exported code of the last frame of a table or of a product of exponentials.
-
-    Results are in the axes of the chain's base. The arguments and errors are those of `Robot.export`. By
-    default, a chain without moving joints exports only the placement.
-    """
+    """Return the code of a chain's last frame; results are in the axes of the chain's base."""
     if isinstance(chain, DHTable):
         text, chain = document(chain, Units()).text(), _with_safe_names(chain)
     else:
         text = screws_document(chain).text()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UrdfWarning)  # the user did not write this URDF
+        warnings.simplefilter("ignore", UrdfWarning)  # The user did not write this URDF.
         robot = hook("a robot of a source")(chain, verify=verify)
     tip = link_names(chain)[-1] if isinstance(chain, DHTable) else chain.tip_frame
     frame = robot.tree.frame_name(robot.link_names.index(tip))

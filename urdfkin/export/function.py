@@ -1,8 +1,9 @@
-"""Define a function of the exported code, which computes one quantity of one frame.
+"""A function of the exported code, which computes one quantity of one frame.
 
-The exported code assigns an expression to a variable in three cases: it is used more than once, it is a
-number of a link's state (pose, velocity, acceleration), or it is a sine, cosine, root or quotient. A long
-expression is split into several assignments. All other expressions are written where they are used.
+The exported code assigns an expression to a variable in three cases: the code uses the expression more than
+once, the expression is a number of a link's state (pose, velocity, acceleration), or the expression is a
+sine, cosine, root or quotient. A long expression is split into several assignments. The code contains all
+other expressions at the place of their use.
 """
 
 from __future__ import annotations
@@ -23,22 +24,16 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import Quantity
 
-#: Letters of the inputs
 INPUTS = ("q", "v", "a")
-#: Operations whose result is always assigned to a variable
+#: Operations whose result is always assigned to a variable.
 _ALWAYS = ("sin", "cos", "sqrt", "/")
-#: Maximum number of operations in a statement
+#: Maximum number of operations in a statement.
 _LONGEST = 12
 
 
 @dataclass(frozen=True, eq=False)
 class Function:
-    """Straight-line code for one quantity.
-
-    Attributes:
-        plan: The compiled tree of the joints from the base to the frame.
-        results: The numbers of the result, row by row; each number is a constant or an expression.
-    """
+    """Straight-line code for one quantity; `results` are constants and expressions, row by row."""
 
     quantity: Quantity
     reference: Reference
@@ -65,7 +60,6 @@ class Function:
 
     @cached_property
     def operations(self) -> int:
-        """Number of arithmetic operations in the function; a change of sign does not count."""
         return sum(node.op not in (*INPUTS, "neg") for node in self.nodes)
 
     @cached_property
@@ -93,11 +87,10 @@ class Function:
         return found
 
     def needed_without(self, leaves: Collection[str]) -> set[Node]:
-        """Return all expressions that the results depend on; operations in `leaves` count as inputs."""
         return set(needed(self.results, leaves))
 
     def values(self, inputs: Sequence[FloatArray]) -> dict[Node, FloatArray]:
-        """Return the value (n,) of each expression for q (n, nq), v and a (n, nv), computed with NumPy."""
+        """Return the value (n,) of each expression for q (n, nq), v and a (n, nv)."""
         value: dict[Node, Any] = {}
         arrays = dict(zip(INPUTS, inputs, strict=False))
         for node in self.nodes:
@@ -129,18 +122,14 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return x for an expression -x, because no variable stores a negation; return others unchanged."""
+    """Return x for an expression -x, because no variable stores a negation."""
     return node.of[0] if node.op == "neg" else node
 
 
 def function_of(
     plan: CompiledTree, quantity: Quantity, reference: Reference, graph: Graph | None = None
 ) -> Function:
-    """Return the function that computes a quantity for the only frame of a compiled tree.
-
-    The compiled tree contains the joints from the base to the frame. If its constants are exact, `graph` is
-    the graph in which they were created.
-    """
+    """Return the function of one quantity; exact constants need the `graph` that created them."""
     graph = graph or Graph()
 
     def begin_step(place: int) -> None:

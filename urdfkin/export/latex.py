@@ -16,7 +16,7 @@ from urdfkin.export.code import FrameCode, Writer
 from urdfkin.export.expression import Node
 from urdfkin.export.function import Function
 
-#: The textbook's symbols for a link's pose, velocity and acceleration
+#: The textbook's symbols for a link's pose, velocity and acceleration.
 _LETTERS = {
     "R": "R",
     "p": "p",

@@ -11,9 +11,8 @@ from collections.abc import Iterable
 
 from urdfkin.dh.export.code import plain
 
-#: Maximum length of an identifier without a prefix; MATLAB allows 63 characters with the prefix
+#: Maximum length of an identifier without a prefix; MATLAB allows 63 characters with the prefix.
 _LONGEST = 40
-#: Maximum length of a name in a comment
 _LONGEST_IN_COMMENT = 80
 
 
@@ -28,7 +27,7 @@ def safe(name: str) -> str:
 
 
 def all_safe(names: Iterable[str]) -> list[str]:
-    """Return an identifier for each name; they differ, even for a language that ignores case.
+    """Return a different identifier for each name, even for a language that ignores case.
 
     >>> all_safe(["a b", "a/b", "A_b_2"])
     ['a_b', 'a_b_2', 'A_b_2_2']
@@ -56,16 +55,12 @@ def title(robot: str, frame: str) -> str:
 
 
 def comment_name(name: str) -> str:
-    """Return a name as text for a comment in any language, shortened to 80 characters."""
     return comment_text(name if len(name) <= _LONGEST_IN_COMMENT else f"{name[:_LONGEST_IN_COMMENT]}...")
 
 
 def comment_text(text: str) -> str:
     r"""Return a text as printable ASCII that does not end a comment in any language.
 
-    Question marks are replaced too, because C's trigraphs, such as ??/, contain them.
-
-    >>> comment_text("*/ int x; ??/")
-    '_/ int x; __/'
+    Question marks are replaced too, because C's trigraphs, such as ??/, contain question marks.
     """
     return plain(text).replace("?", "_")

@@ -1,9 +1,9 @@
 """Compare exported expressions with Pinocchio, and make the test vectors of an exported file.
 
 The test vectors check the file, and also the user's compiler, language version and libraries. A test vector
-contains inputs and true values at fifty digits, which are computed from the URDF's decimals. For each true
-value, it also contains a bound on the rounding errors of a correct computation, in eps of the file's
-precision. The inputs are single-precision numbers, so they are equal in single and in double precision.
+contains inputs and true values at fifty digits. The true values are computed from the URDF's decimals. Each
+true value has a bound on the rounding errors of a correct computation, in eps of the file's precision. The
+inputs are single-precision numbers, so they are equal in single and in double precision.
 """
 
 from __future__ import annotations
@@ -40,9 +40,8 @@ from urdfkin.verify.exact.numbers import (
 from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.verifier import Verifier
 
-#: Number of random configurations that are compared with Pinocchio, besides the neutral one and the limits
+#: Number of random configurations that are compared with Pinocchio.
 CHECKED = 100
-#: Number of test vectors
 VECTORS = 4
 
 
@@ -50,12 +49,8 @@ VECTORS = 4
 class Vector:
     """A test vector: one configuration, and the true result of each function.
 
-    Attributes:
-        inputs: q, v and a.
-        results: For each quantity, the true values as decimal numbers, row by row.
-        within: For each quantity, the error bounds in double precision, in eps = 2^-52.
-        single: For each quantity, the error bounds in single precision, in eps = 2^-23; 0.0 if a number is
-            beyond the range of single precision.
+    `within` and `single` are the error bounds in double precision (in eps = 2^-52) and in single precision
+    (in eps = 2^-23). In `single`, 0.0 means that a number is beyond the range of single precision.
     """
 
     inputs: tuple[list[float], ...]
@@ -68,12 +63,8 @@ class Vector:
 class Proof:
     """The checks of an exported file: test vectors and the comparison with Pinocchio.
 
-    Attributes:
-        sha256: SHA-256 of the URDF's text.
-        urdfkin: Version of urdfkin.
-        single: For each quantity, the largest error bound in single precision, in multiples of eps * scale;
-            inf if a number is beyond the range of single precision.
-        lock: Name and value of each locked joint.
+    `single` is the largest error bound of each quantity in single precision, in multiples of eps * scale; inf
+    if a number is beyond the range of single precision. `lock` contains the value of each locked joint.
     """
 
     sha256: str
@@ -89,7 +80,6 @@ class Proof:
 
     @property
     def constants(self) -> str:
-        """Sentence about exact constants; "" for constants in double precision."""
         return ""
 
     @property
@@ -135,7 +125,6 @@ def prove(
     functions: Sequence[Function],
     verify: bool | None,
 ) -> Proof:
-    """Compare functions with Pinocchio, and make test vectors; raise VerificationError if results differ."""
     certificate = compare(verifier, plan_of, frame, reference, functions, Function.evaluated, verify)
     vectors, single = _vectors(verifier, plan_of, frame, reference, functions)
     return Proof(
@@ -157,8 +146,8 @@ def compare(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    """Compare the results of `evaluate` with Pinocchio, or raise VerificationError."""
-    checker = copy(verifier)  # these checks are recorded only in the copy
+    """Compare the results of `evaluate` with Pinocchio; raise VerificationError for a difference."""
+    checker = copy(verifier)  # The copy keeps these checks out of the user's certificate.
     drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
@@ -217,7 +206,7 @@ def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[Floa
 
 
 def decimal(x: Number) -> str:
-    """Return fifty digits of an interval, without zeros at the end; 0.0 if the interval contains 0."""
+    """Return fifty digits of an interval, without final zeros; 0.0 if the interval contains 0."""
     ball = exact(x)
     if ball.contains(0):
         return "0.0"
@@ -227,20 +216,16 @@ def decimal(x: Number) -> str:
 
 
 def _rounded_down(x: float) -> str:
-    """Return a bound with six digits, rounded down."""
     return _rounded(x, 6, ROUND_FLOOR)
 
 
 def _rounded_up(x: float) -> str:
-    """Return a bound with seven digits, rounded up.
-
-    The error of a constant in single precision can be equal to its bound, which must not be rounded down.
-    """
+    """Round a bound up, because the error of a constant can be equal to its bound."""
     return _rounded(x, 7, ROUND_CEILING)
 
 
 def _rounded(x: float, digits: int, rounding: str) -> str:
     if not np.isfinite(x):
-        return "0.0"  # a bound of 0 accepts only equal numbers
+        return "0.0"  # A bound of 0 accepts only equal numbers.
     with localcontext(prec=digits, rounding=rounding):
         return f"{float(+Decimal(x)):.{digits}g}"

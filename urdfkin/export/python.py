@@ -25,21 +25,11 @@ class Dialect:
     """The code for one Python library.
 
     Attributes:
-        about: Description of a function's inputs and results.
-        imports: Import lines. `{}` is replaced by the names of the used functions among `cos`, `sin` and
-            `sqrt`. If none of them is used, the line is left out.
-        result: Function that yields the last lines of an exported function, which return the result.
-        values: Body of the exported file's function `_values(function, inputs)`, which returns the results
-            of an exported function for a list of configurations.
-        decorator: Decorator of each exported function; "" for no decorator.
-        first_lines: Function that returns the first lines of an exported function, such as checks of inputs.
-        helpers: Code of the functions that exported functions call.
+        imports: Import lines. `{}` is replaced by the used functions among `cos`, `sin` and `sqrt`. If none
+            of them is used, the line is left out.
+        values: Body of the exported function `_values`, which evaluates a function for some configurations.
         index: Pattern for one number of an input, such as `q[0]`.
         check_parameter: Parameter of the exported function `check`, with its default; "" for none.
-        single: Whether the functions also compute in single precision.
-        more_code: Function that returns code that follows the exported functions.
-        more_checks: Last lines of the program that runs the test vectors.
-        exact: Whether constants are exact.
     """
 
     about: str
@@ -62,7 +52,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` whose code assigns each number to an element of an array."""
+    """Return a `Dialect.result` that assigns each number to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -75,7 +65,7 @@ def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
 
 
 def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` whose code returns a matrix; a Hessian (6, nv, nv) becomes one matrix."""
+    """Return a `Dialect.result` that returns a matrix; a Hessian (6, nv, nv) becomes one matrix."""
 
     def result(writer: Writer) -> Iterator[str]:
         values, shape = writer.results(), writer.function.shape
@@ -120,11 +110,7 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
 
 
 def _lengths(text: str) -> Callable[[Writer], list[str]]:
-    """Return a `Dialect.first_lines` whose code checks the input lengths of one configuration.
-
-    `text` is a format string of the error message, with the fields `x` (name of an input) and `width` (its
-    length).
-    """
+    """Return a `Dialect.first_lines` that checks the input lengths of one configuration."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -142,7 +128,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a writer for libraries with immutable arrays; the writer stacks the entries of a result."""
+    """Return a `Dialect.result` for immutable arrays, which stacks the numbers."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -190,10 +176,8 @@ def _demand(
 ) -> str:
     """Return the code of the function `_demand`, which checks an input.
 
-    The arguments `wrong` and `is_array` are code: `wrong` is an expression that is true for a number of a
-    wrong type. `is_array` is an expression that is true for an accepted container, or "" for no test. The
-    error message describes accepted numbers as `numbers` and accepted containers as `array`. `given` are
-    further parameters of `_demand`.
+    `wrong` and `is_array` are code: expressions that are true for a wrong number type and for an accepted
+    container. `given` are further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -222,11 +206,11 @@ class Kinematics(torch.nn.Module):
 def gradients(device="cpu"):
     """Return, for each function, whether `torch.autograd.gradcheck` accepts its derivatives in float64.
 
-    A difference quotient has the rounding errors of two values, divided by twice the step, and a truncation
-    error: a sixth of the squared step times the third derivative. A coordinate rotates each vector by at most
-    r rad for each rad. A term of F vectors, at most 4, has a third derivative of at most (F r)^3 times its
-    size, and its error bound is at least 24 F eps times its size. This is not a bound for a coordinate that
-    moves a prismatic joint and also a revolute one.
+    A difference quotient has two errors. The first error is the rounding error of two values, divided by
+    twice the step. The second error is the truncation error: a sixth of the squared step times the third
+    derivative. If a coordinate changes by 1 rad, a vector rotates by at most r rad. A product of F vectors
+    (F <= 4) has a third derivative of at most (F r)^3 times its size, and an error bound of at least 24 F eps
+    times its size. The tolerance is not a bound for a coordinate that moves a prismatic and a revolute joint.
     """
     accepted, step = {{}}, 1e-6 / {rate!r}  # r
     for function in ({all}):
@@ -243,8 +227,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module(code: FrameCode) -> str:
-    """Return code for PyTorch: a `torch.nn.Module` with the functions, and a check of their derivatives."""
-    # The method `forward` computes the function with the fewest inputs, usually a function of q.
+    # The method `forward` computes the function with the fewest inputs.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,
@@ -258,10 +241,10 @@ def _torch_module(code: FrameCode) -> str:
 def _rate(plan: CompiledTree) -> float:
     """Return an upper bound on the rotation (rad) of any vector when a coordinate changes by 1 rad.
 
-    The bound is never below 1. It is the largest sum of the multipliers of all revolute joints whose values
+    The bound is at least 1. It is the largest sum of the multipliers of all revolute joints whose values
     depend on the same coordinate.
 
-    With a floating joint, the bound is never below 3. If one component of a unit quaternion changes by t, the
+    With a floating joint, the bound is at least 3. If one component of a unit quaternion changes by t, the
     body rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the
     change. The derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a
     product of F rotated vectors, the third derivative is at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
@@ -271,7 +254,6 @@ def _rate(plan: CompiledTree) -> float:
 
 
 def _all(code: FrameCode) -> str:
-    """Return Python code: the names of all functions, separated by commas."""
     return ", ".join(f.name for f in code.functions) + ("," if len(code.functions) == 1 else "")
 
 
@@ -324,7 +306,7 @@ DIALECTS = {
         "The first call of a function compiles the function.",
         imports="from math import {}\n\nimport numpy as np\nfrom numba import njit",
         decorator='@njit(error_model="numpy")',
-        first_lines=_lengths('"{x} needs {width} numbers"'),  # Numba supports only constant messages
+        first_lines=_lengths('"{x} needs {width} numbers"'),  # Numba supports only constant messages.
         result=_in_array("np.empty({0})", ""),
         values=_ONE_BY_ONE.format("function(*map(np.array, one)).ravel().tolist()"),
     ),
@@ -413,7 +395,7 @@ DIALECTS = {
 
 
 def write(code: FrameCode, to: str) -> str:
-    """Return the text of a Python module with a function for each quantity, and a check (`python FILE`)."""
+    """Return a Python module with a function for each quantity, and a check (`python FILE`)."""
     dialect = DIALECTS[to]
     about = dialect.about.format(nq=code.nq, nv=code.nv)
     lines = [
@@ -535,7 +517,6 @@ def _check(code: FrameCode, dialect: Dialect) -> Iterator[str]:
 
 
 def torch_module(text: str) -> Any:
-    """Return the `torch.nn.Module` of a text exported to "torch"; raise InputError without PyTorch."""
     need_torch()
     scope: dict[str, Any] = {"__name__": "urdfkin_torch"}
     exec(compile(text, "<urdfkin export --to torch>", "exec"), scope)

@@ -1,11 +1,11 @@
 """Compute the forward recursion of the textbook's section 7.7 for one path, for any type of number.
 
-`urdfkin.model.recursion` contains the recursion; this module applies it to a compiled tree. At each joint,
-the recursion translates along the rigid link, applies a constant rotation, and then applies the motion of the
-joint about or along z. Placements and Jacobians are computed in the axes of the world frame, as in the
-textbook. Velocities and accelerations are computed in the axes of each link's frame, where joint axes are
-(0, 0, 1) and link vectors are constant. A result in the axes of the world frame is then rotated joint by
-joint, which needs a third fewer operations than the computation of the rotation matrix R.
+At each joint, the recursion translates along the rigid link, applies a constant rotation, and then applies
+the motion of the joint about or along z. Placements and Jacobians are computed in the axes of the world
+frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame, where
+joint axes are (0, 0, 1) and link vectors are constant. A result in the axes of the world frame is then
+rotated joint by joint, which needs a third fewer operations than the computation of the
+rotation matrix R.
 """
 
 from __future__ import annotations
@@ -24,14 +24,10 @@ _Z: Vector = (0, 0, 1)
 
 @dataclass(frozen=True)
 class NumberKind:
-    """A kind of number, and callbacks of the recursion.
+    """A kind of number, and callbacks of the recursion; `chapter` contains the textbook's equations.
 
-    Attributes:
-        chapter: A module with the textbook's equations as functions that accept numbers of this kind.
-        begin_step: Function that is called before each joint, before the final frame and before the results.
-            Its argument is the number of earlier calls.
-        end_step: Function that is called after each joint and after the final frame. Its arguments are the
-            number of earlier calls and the new state.
+    `begin_step` is called before each joint, before the final frame and before the results. `end_step` is
+    called after each joint and after the final frame. Their integer argument is the number of earlier calls.
     """
 
     chapter: Any
@@ -42,16 +38,11 @@ class NumberKind:
 
 
 class TreeRecursion(Recursion):
-    """The forward recursion along one path.
+    """The forward recursion along one path; `end` is the state of the frame.
 
-    The inputs are q, v and a; an input that is not needed consists of zeros. With `own`, the motion of each
-    link is computed in the axes of the link's own frame, otherwise in the axes of the world frame.
-
-    Attributes:
-        states: The state after each joint.
-        end: The state of the frame.
-        turns: Rotation matrices from the axes of each frame to the axes of the previous frame, starting at
-            the base.
+    With `own`, the motion of each link is computed in the axes of the link's own frame, otherwise in world
+    axes. An input that is not needed consists of zeros. `turns` are rotation matrices from the axes of each
+    frame to the axes of the previous frame.
     """
 
     def __init__(
@@ -73,7 +64,6 @@ class TreeRecursion(Recursion):
         kind.begin_step(len(self.states) + 1)
 
     def turned(self, s: State, S: Matrix) -> State:
-        """Rotate the axes of a link's frame by S, and append S to `turns`."""
         self.turns.append(S)
         return super().turned(s, S)
 
@@ -126,7 +116,7 @@ def _without_rounding(x: Sequence[float]) -> Vector:
 
     For example, the cosine of the double nearest to pi/2 is 6e-17. Products with such numbers would make the
     exported code longer. The error bounds of `urdfkin.kinematics.roundings` include the error of this
-    replacement. A vector of exact constants is returned unchanged.
+    replacement.
     """
     if not all(isinstance(c, float) for c in x):
         return x[0], x[1], x[2]
@@ -139,7 +129,6 @@ def _without_rounding(x: Sequence[float]) -> Vector:
 
 
 def placement(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the numbers of the placement T_world_frame, row by row."""
     end = TreeRecursion(plan, kind, inputs, own=False).end
     rows = [[*row, x] for row, x in zip(end.R, end.p, strict=True)]
     return [*(x for row in rows for x in row), 0.0, 0.0, 0.0, 1.0]
@@ -170,7 +159,7 @@ def jacobian_rate(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: 
 
 
 def hessian(plan: CompiledTree, kind: NumberKind, inputs: Any, reference: Reference) -> list[Number]:
-    """Return the derivative of each Jacobian entry with respect to each coordinate (the terms of 7.126)."""
+    """Return the derivatives of the Jacobian (the terms of 7.126), row by row."""
     path, nv = TreeRecursion(plan, kind, inputs, own=False), plan.nv
     out: list[Number] = [0] * (6 * nv**2)
     for of, by, factor, six in path.hessian(path.end, path.columns, reference):
@@ -189,7 +178,7 @@ def _six_vector(path: TreeRecursion, reference: Reference, linear: Vector, angul
         case Reference.LOCAL_WORLD_ALIGNED:
             for S in reversed(path.turns):
                 linear, angular = path.eq.rotate(S, linear), path.eq.rotate(S, angular)
-        case Reference.LOCAL | Reference.WORLD:  # the vectors are already in these axes
+        case Reference.LOCAL | Reference.WORLD:  # The vectors are already in these axes.
             pass
         case _:
             assert_never(reference)
@@ -200,7 +189,6 @@ def _by_row(columns: Sequence[Sequence[Number]]) -> list[Number]:
     return [x for row in zip(*columns, strict=True) for x in row]
 
 
-#: Functions that compute the quantities
 QUANTITIES: dict[str, Callable[[CompiledTree, NumberKind, Any, Reference], list[Number]]] = {
     "placement": placement,
     "velocity": velocity,

@@ -10,18 +10,18 @@ import hashlib
 import re
 
 _ZEROS = "0" * 64
-#: Line of the header in which `seal` replaces the zeros by the digest
+#: Line of the header in which `seal` replaces the zeros by the digest.
 SEAL = f"Seal sha256 {_ZEROS}"
 _LINE = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 
 
 def seal(text: str) -> str:
-    """Replace the 64 zeros in the file's header by the digest, and return the new text."""
+    """Replace the 64 zeros in the file's header by the digest."""
     return _LINE.sub(lambda found: found[1] + _digest(text), text, count=1)
 
 
 def is_sealed(text: str) -> bool | None:
-    """Return whether the digest in a file's header is correct, for any line ends; None without a digest."""
+    """Return whether the file's digest is correct; None without a digest."""
     text = text.replace("\r\n", "\n")
     if (found := _LINE.search(text)) is None:
         return None

@@ -24,9 +24,9 @@ from urdfkin.kinematics.roundings import (
 )
 from urdfkin.model.tree import FloatArray
 
-#: Maximum number of results whose derivatives one backward pass computes; this number limits the memory
+#: Maximum number of results in one backward pass, to limit the memory.
 _MOST_RESULTS = 512
-#: Functions that return the derivatives of an operation's value with respect to its operands
+#: Derivatives of an operation's value with respect to its operands.
 _SLOPES: dict[str, Callable[..., tuple[FloatArray | float, ...]]] = {
     "+": lambda value, x, y: (1.0, 1.0),
     "-": lambda value, x, y: (1.0, -1.0),
@@ -58,14 +58,10 @@ def single_bounds(function: Function, inputs: Sequence[FloatArray]) -> FloatArra
 def _bounds(
     function: Function, value: dict[Node, FloatArray], results: Sequence[Number], n: int
 ) -> FloatArray:
-    """Return the bounds (n, len(results)) of some results of a function."""
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def propagate(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives of the results `columns` with respect to x.
-
-        For a constant x, add its rounding error, multiplied by `slope`, to the bounds of these results.
-        """
+        """Add `slope` to the derivatives with respect to x, or the error of a constant x to the bounds."""
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)
         elif x in slopes:
@@ -88,7 +84,7 @@ def _bounds(
 
 
 def _operation(node: Node, x: FloatArray) -> FloatArray:
-    """Return the rounding error (n,) of one operation with exact operands and results x (n,), in eps."""
+    """Return the rounding error (n,) of an operation with results x (n,), in eps."""
     size = np.abs(x)
     if node.op in INPUTS:
         error = np.zeros_like(size)

@@ -261,7 +261,7 @@ class Robot(Displayable):
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the URDF text as UTF-8; for MJCF and USD, of the file without included files.
+        """SHA-256 of the URDF text as UTF-8, or of an MJCF or USD file without its included files.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").sha256[:8]
@@ -333,7 +333,7 @@ class Robot(Displayable):
 
     @property
     def link_frames(self) -> tuple[LinkFrame, ...]:
-        """Names `link:NAME` of the frames of all links, each unique; `placement` and others accept this list.
+        """Unique names `link:NAME` of all links' frames; methods such as `placement` accept this list.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -389,7 +389,7 @@ class Robot(Displayable):
 
     @property
     def tip_frame(self) -> str:
-        """The default tip: the tip in the robot catalogue, or the leaf link after the most moving joints.
+        """The default tip: the catalogue's tip of the robot, or the leaf link after the most moving joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame
@@ -403,7 +403,6 @@ class Robot(Displayable):
         return self._tip_frame
 
     def _default_frame(self) -> str:
-        """Return the tip in the robot catalogue, or the only leaf; raise InputError for several leaves."""
         if not self._has_one_tip:
             leaves = [self.tree.frame_name(leaf) for leaf in self.tree.leaves()]
             raise InputError(
@@ -520,7 +519,8 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        q = configuration.checked(self.tree, q, "q", look=False)  # the lines already ask about degrees
+        # The returned lines mention degrees, so no warning is needed.
+        q = configuration.checked(self.tree, q, "q", look=False)
         return configuration.limit_violations(self.tree, q)
 
     def integrate(self, q: Given, v: Given) -> FloatArray:
@@ -624,8 +624,8 @@ class Robot(Displayable):
     def from_pinocchio(self, q: ArrayLike, *, mimic: bool = False) -> FloatArray:
         """Convert Pinocchio's configuration to `q` (..., nq), the inverse of `to_pinocchio`.
 
-        Angles of continuous joints are in [-pi, pi]. The doubles nearest to -pi and pi are returned
-        unchanged.
+        Angles of continuous joints are in [-pi, pi]. `from_pinocchio(to_pinocchio(q))`
+        returns the angles `-math.pi` and `math.pi` unchanged.
 
         Args:
             q: (..., model.nq), a configuration of `pinocchio_model(mimic=mimic)`.
@@ -688,8 +688,8 @@ class Robot(Displayable):
     ) -> Robot:
         """Return this robot with some joints fixed at a value; q, v and a do not contain these joints.
 
-        A mimic joint is locked together with its mimicked joint. Pinocchio checks the results of the returned
-        robot with a reduced model, which `buildReducedModel` makes from the model of the whole URDF.
+        A mimic joint is locked together with its mimicked joint. Pinocchio checks the returned robot with a
+        reduced model of the whole URDF (`pinocchio.buildReducedModel`).
 
         Args:
             lock: Value (rad or m) of each joint to lock: `{"finger": 0.04}` or `"finger=0.04, wrist=30deg"`.
@@ -699,7 +699,7 @@ class Robot(Displayable):
 
         Raises:
             UnknownNameError: there is no such joint or pose.
-            InputError: a value is outside the limits; a mimic joint, or a joint without a single value
+            InputError: a value is outside the limits, or a joint is a mimic joint or has no single value
                 (planar, floating, fixed).
 
         >>> import urdfkin
@@ -810,8 +810,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from
 
         name = as_str(relative_to, "relative_to")
-        # Error messages quote the call, so the name must be a plain str; a subclass of str may print
-        # differently.
+        # Error messages quote the name, and a subclass of str may print differently.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -890,8 +889,8 @@ class Robot(Displayable):
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
         In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes (LOCAL) or the body
         point (WORLD) change with time. The linear part of the spatial acceleration is the linear part of the
-        classical acceleration minus w x vel. J a + J-dot v does not contain the acceleration that a moving
-        base causes.
+        classical acceleration minus the cross product of the angular and the linear velocity. J a + J-dot v
+        does not contain the acceleration that a moving base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -917,10 +916,11 @@ class Robot(Displayable):
         7.126 is the sum of H[..., j] v[j] over j. v^T H v is the part of the acceleration that depends on v
         alone.
 
-        Linear part of H[..., i, j] for revolute joints in LOCAL_WORLD_ALIGNED:
+        Linear part of H[..., i, j] for revolute joints in LOCAL_WORLD_ALIGNED, where z_i is the axis of joint
+        i, and d_i is the vector from joint i to the frame:
 
-        - Joint j before joint i: z_j rotates the column, z_j x (z_i x d_i).
-        - Joint j after joint i: z_j moves the end of the lever arm, z_i x (z_j x d_j).
+        - Joint j before joint i: z_j x (z_i x d_i), because joint j rotates column i.
+        - Joint j after joint i: z_i x (z_j x d_j), because joint j moves the frame.
 
         H[..., i, j] is 0 in WORLD for a joint j after joint i, and in LOCAL for a joint j before joint i.
 
@@ -1584,7 +1584,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the compiled tree of the joints that move `links`; later calls return the same object."""
+        """Return the cached compiled tree of the joints that move `links`."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1636,7 +1636,7 @@ class Robot(Displayable):
         verify: Verify | None,
         threads: int | None,
     ) -> PreparedFrame | None:
-        """Return the fast evaluator for a call; None if the evaluator does not support the call."""
+        """Return the fast evaluator for a call, or None if it does not support the call."""
         policy = self.verifier.policy if verify is None else verify
         if base is not None or threads is not None or (policy is not True and policy is not False):
             return None
@@ -1650,7 +1650,6 @@ class Robot(Displayable):
         return self._prepare(frame, reference, verify=policy)
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
-        """Return the fast evaluator of a frame; later calls return the same object."""
         # A plain name is a fast key; the hash of an enumeration member is slow.
         # The other keys contain types, to distinguish the name "link:a" from `LinkFrame("link:a")`.
         plain = reference is _ALIGNED and type(frame) is str
@@ -1658,7 +1657,7 @@ class Robot(Displayable):
         known = self._checked if verify else self._prepared
         try:
             prepared = known.get(key)
-        except TypeError:  # an argument that is not hashable is not valid
+        except TypeError:  # A valid argument is hashable.
             self.tree.frame_link(frame)
             return self._prepare(frame, Reference.of(reference), verify=verify)
         if prepared is None:
@@ -1669,14 +1668,12 @@ class Robot(Displayable):
 
 # -- docstrings --------------------------------------------------------------------------------------
 
-#: Pattern of an item in the lists of `Robot`'s docstring.
 _SHARED_ITEM = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)", re.MULTILINE)
-#: Pattern of an item in the sections `Args` and `Raises` of a method.
 _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
-    """Return the docstring of a method of `Robot`, with the shared arguments and errors.
+    """Return a method's docstring with the shared arguments and errors.
 
     `QUANTITIES` contains the shape, the units and the equations of the result.
     """
@@ -1704,7 +1701,6 @@ def _indented(items: Sequence[str]) -> str:
 
 
 def _complete_docstrings() -> None:
-    """Add the shared arguments and errors in the docstring of `Robot` to the docstrings of its methods."""
     arguments, _, errors = cleandoc(Robot.__doc__ or "").partition("These methods share these errors:")
     shared = dict(_SHARED_ITEM.findall(arguments)), dict(_SHARED_ITEM.findall(errors))
     for method in vars(Robot).values():

@@ -1,4 +1,4 @@
-"""`load`: make a robot from a file, a text, a table or another library's object, and check the input."""
+"""The function `load`, which makes a robot from a file, a text, a table or another library's object."""
 
 from __future__ import annotations
 
@@ -270,7 +270,6 @@ def _plain(robot: Robot, text: Text, **options: Any) -> Robot:
 
 
 def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
-    """Return the bytes of an MJCF source, from which its SHA-256 digest is computed."""
     from urdfkin.urdf.mjcf import is_text
 
     if isinstance(source, bytes):
@@ -316,8 +315,7 @@ def robot_of(
     """Return the robot of a URDF text in memory; the first six options are those of `load`.
 
     `made` states whether urdfkin generated the text from another source, and `listed` contains findings about
-    this source. `table` states whether the source is a Denavit-Hartenberg table or a product of exponentials.
-    With `quiet`, no warnings are issued. Errors in the text raise UrdfError.
+    this source. `table` states whether this source is a table. With `quiet`, no warnings are issued.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle
@@ -365,7 +363,7 @@ def robot_of(
 
 
 def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
-    """Return the first finding that prevents a check by Pinocchio; None if there is no such finding."""
+    """Return why Pinocchio cannot check the robot, or None."""
     problems = {
         PinocchioReading.REFUSES: "Pinocchio refuses the file",
         PinocchioReading.DIFFERS: "Pinocchio reads another robot",

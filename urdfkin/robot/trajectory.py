@@ -10,7 +10,8 @@ to the time step. To estimate the errors, the differences are also computed from
 
 *Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
 The angle then jumps at the end of the range. The quaternion of a floating joint may change its sign without a
-change of orientation. A velocity from such a jump would be huge and wrong, so the jumps are removed first.
+change of orientation. Central differences would turn a jump into a large, wrong velocity. Therefore, the
+jumps are removed first.
 """
 
 from __future__ import annotations
@@ -52,9 +53,7 @@ Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
-    """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
-
-    Pickled objects are rejected, so no code from the file is executed.
+    """Read arrays (n, ...) of finite numbers from an .npz file; pickled objects are rejected.
 
     Raises:
         SourceError: the file cannot be read, or does not contain numbers.
@@ -115,22 +114,13 @@ def _check_names(path: Path, names: Sequence[str], shapes: Shapes, required: Seq
 _FEWEST = 3
 #: Arrays of an .npz file with the fields of `BaseMotion`.
 _BASE = "base_placement", "base_velocity", "base_acceleration"
-#: A note tells the user if the times' rounding error exceeds this fraction of the smallest time step.
+#: The user gets a note if the rounding error of times exceeds this fraction of the smallest time step.
 _TIME_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectorySamples:
-    """The n samples in a file, converted to urdfkin's convention; a missing array is None.
-
-    Attributes:
-        where: Name of the file.
-        q: (n, nq) configurations, not unwrapped.
-        t: (n,) seconds, increasing.
-        v: (n, nv) joint velocities.
-        a: (n, nv) joint accelerations; None if `v` is None.
-        base: Motion of the root link for all n samples.
-    """
+    """The n samples in a file, in urdfkin's convention, not unwrapped; a missing array is None."""
 
     where: str
     q: FloatArray
@@ -155,7 +145,7 @@ class Trajectory:
         notes: Remarks for the user about the samples, such as unwrapped angles; one line each.
         base: Motion of the root link for all n samples; None: fixed at the world origin.
         errors: Estimated largest error of v and estimated largest error of a. None if v and a were given, or
-            with too few samples.
+            if there are too few samples.
 
     >>> import urdfkin
     >>> line(urdfkin.load("ur5"), "neutral", "ready", 2.0, 101)
@@ -192,26 +182,10 @@ class Trajectory:
 
 
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
-    """Return a straight line in joint space between two configurations, with zero velocity at both ends.
+    """Return a straight line in joint space between two configurations (nq,), at rest at both ends.
 
     Planar and floating joints make a screw motion of at most half a turn. A continuous joint moves by
     `end - start`, even by more than one turn.
-
-    Args:
-        robot: The robot.
-        start: (nq,) rad, m.
-        end: (nq,) rad, m.
-        duration: Duration, s.
-        samples: Number of samples, with both ends; at least 3.
-
-    Raises:
-        InputError: a wrong length, fewer than 3 samples, or a duration that is not positive.
-
-    >>> import urdfkin
-    >>> robot = urdfkin.load("ur5")
-    >>> motion = line(robot, robot.neutral(), robot.neutral() + 1.0, 2.0, 5)
-    >>> motion.q[2].round(3).tolist(), motion.v[[0, -1]].any()
-    ([0.5, 0.5, 0.5, 0.5, 0.5, 0.5], np.False_)
     """
     duration = real_number(duration, "the duration")
     samples = whole_number(samples, "samples", 0)
@@ -230,8 +204,8 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # With the derivatives s' and s'' of s, v is `step` times s', and a is `step` times s''.
-    # This is also true for screw motions, because their velocities are expressed in the moving frame.
+    # v is `step` times the first derivative of s, and a is `step` times the second derivative.
+    # Screw motions obey this rule too, because their velocities are expressed in the moving frame.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -308,11 +282,7 @@ def read_samples(robot: Robot, path: Path, conversion: Conversion | None = None)
 
 
 def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
-    """Return samples as a trajectory, with central differences for missing arrays v and a.
-
-    Raises:
-        InputError: there are too few samples.
-    """
+    """Return a trajectory, with central differences for missing arrays v and a."""
     n = len(x.q)
     if n < _FEWEST:
         raise InputError(f"a trajectory needs at least {_FEWEST} samples", where=x.where, found=str(n))
@@ -344,10 +314,7 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of central differences from the differences of every second sample.
-
-    With every second sample, the step doubles, and the error is larger by the factor 2^`order`.
-    """
+    """Estimate the largest error of `fine`; `coarse` has twice the time step."""
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
 
@@ -383,7 +350,7 @@ def _table(robot: Robot, path: Path, conversion: Conversion | None) -> dict[str,
 
 
 def column_units(robot: Robot, letter: str, conversion: Conversion | None = None) -> dict[str, str]:
-    """Map the name of each number of q, v or a to its unit, such as "m/s"; quaternions have the unit ""."""
+    """Map the name of each number of q, v or a to its unit, such as "m/s"; "" for quaternions."""
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
     per = {"q": "", "v": "/s", "a": "/s^2"}[letter]
     return {
@@ -392,7 +359,6 @@ def column_units(robot: Robot, letter: str, conversion: Conversion | None = None
 
 
 def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
-    """Return the arrays t, q, v and a of an .npz file, and the arrays of the base's motion."""
     shapes = {"t": (), "q": (known.nq,), "v": (known.nv,), "a": (known.nv,)}
     base = dict(zip(_BASE, ((4, 4), (6,), (6,)), strict=True))
     data = read_arrays(path, shapes | base, ["q"])
@@ -449,23 +415,10 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
-    names of the columns, in any order. Without names, the columns are those in `required`, in this order.
+    Empty lines and lines that begin with # are skipped. The first other line may contain the names of the
+    columns, in any order; with `named`, it must contain them. Without names, the columns are those in
+    `required`. A heading may end with a unit, such as `elbow [deg]`; `units` contains the SI units.
 
-    Args:
-        text: The content of the file.
-        where: Name of the file, for messages.
-        what: Name of the table, for messages.
-        required: Names of the required columns.
-        optional: Names of the optional columns.
-        named: Whether the first line must contain the names.
-        units: SI unit of each column whose heading may end with a unit, such as `elbow [deg]` or `elbow_deg`.
-
-    Raises:
-        InputError: the text does not fit the columns.
-
-    >>> read_columns("b,a\n1,2\n3,4\n", "x.csv", "q", ["a", "b"])["a"].tolist()
-    [2.0, 4.0]
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
     """
@@ -494,7 +447,6 @@ def read_columns(
     }
 
 
-#: Allowed names of the time column.
 _TIMES = ("t", "time", "timestamp")
 #: Number of time units in one second, by the name of the unit.
 _PER_SECOND = {
@@ -509,7 +461,7 @@ _SUFFIXES = (
 
 
 def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column that a heading names, and the unit of the numbers in the column; "" for the SI unit.
+    """Return the column that a heading names, and the unit of its numbers; "" for the SI unit.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
@@ -539,11 +491,7 @@ def _column_name(heading: str, units: Mapping[str, str]) -> str:
 
 
 def _unit(text: str, where: str, expected: str) -> str:
-    """Return the short name of a unit in a heading; "" for the SI unit.
-
-    Raises:
-        InputError: the unit is unknown, or does not fit the column.
-    """
+    """Return the short name of a unit in a heading; "" for the SI unit."""
     if expected == "s":
         if (factor := _PER_SECOND.get(text.strip().lower())) is None:
             raise InputError("wrong unit", where=where, found=text, remedy=f"use {', '.join(_PER_SECOND)}")
@@ -560,19 +508,18 @@ def _unit(text: str, where: str, expected: str) -> str:
 
 
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
-    """Return a column in SI units; degrees are converted exactly as by `parse_quantity`."""
     if unit == "deg":
         return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
 
 def width_of(text: str, where: str) -> int:
-    """Return the number of cells in the first line that is not skipped; 0 if there is no such line."""
+    """Return the number of cells in the first line with data, or 0."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
 def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[float]:
-    """Parse one number for each name; raise InputError for a wrong number of cells or an invalid cell."""
+    """Parse one number for each name."""
     if len(cells) != len(names):
         raise wrong_count(names, len(cells), where)
     values = []
@@ -586,7 +533,7 @@ def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[floa
 
 
 def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the lines that are not skipped, each with its line number."""
+    """Yield the number and the cells of each line with data."""
     reader = csv.reader(text.splitlines(keepends=True), strict=True)
     try:
         for row in reader:
@@ -597,7 +544,7 @@ def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Return whether a line contains the names of columns; a name can also be a number, such as "1"."""
+    """Return whether a line contains column names; a name can be a number, such as "1"."""
     return sorted(cells) == sorted(names) or all(parse_float(cell) is None for cell in cells)
 
 
@@ -609,7 +556,6 @@ def _check_columns(
     required: Sequence[str],
     optional: Sequence[str],
 ) -> None:
-    """Raise InputError if a column is unknown, missing or duplicate; `headings`: names as in the file."""
     known, given = {*required, *optional}, Counter(names)
     wrong = {
         "unknown": [name for name in names if name not in known],
@@ -628,19 +574,16 @@ def _check_columns(
 
 #: Wrapped angles have at most this range (rad): one turn, with a margin for rounding to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: Above this angle (rad) between two samples, the direction of the rotation is uncertain.
-#: The rotation in the opposite direction would then be less than twice this angle.
+#: Above this angle (rad) between two samples, the direction of the rotation is uncertain: the rotation in the
+#: opposite direction is less than twice as large.
 _AMBIGUOUS = math.tau / 3.0
 
-#: If the mimicked joint makes whole turns, a motion of the mimic joint below this value (rad or m) is a
-#: rounding error.
+#: If unwrapping moves a mimic joint by less than this value (rad or m), the motion is a rounding error.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Unwrapped:
-    """Unwrapped configurations `q` (n, nq), the names of the changed joints, and remarks for the user."""
-
     q: FloatArray
     joints: tuple[str, ...]
     notes: tuple[str, ...]
@@ -650,8 +593,7 @@ def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
     """Unwrap the angles of continuous, planar and floating joints in samples (n, nq) in the order of time.
 
     Between two samples, a joint is assumed to turn in the shorter direction. If the angles of a joint span
-    more than one turn, they have not been wrapped, and stay unchanged. The angles of revolute joints, which
-    have limits, stay unchanged too.
+    more than one turn, the angles are not wrapped, so they stay unchanged.
     """
     new, changed, notes = np.array(q), [], []
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -680,7 +622,7 @@ def _turning(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
 
 
 def _without_jumps(angle: FloatArray) -> FloatArray:
-    """Add whole turns after each step of more than half a turn; leave all other numbers unchanged.
+    """Add whole turns after each step of more than half a turn.
 
     >>> _without_jumps(np.array([3.0, -3.0, -2.5])).round(4).tolist()
     [3.0, 3.2832, 3.7832]
@@ -691,7 +633,7 @@ def _without_jumps(angle: FloatArray) -> FloatArray:
 
 
 def _floating(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Choose the signs of a floating joint's quaternions so that consecutive quaternions are close."""
+    """Choose the signs of quaternions so that consecutive quaternions are close."""
     along = np.sum(own[1:, 3:] * own[:-1, 3:], axis=1)
     new = own.copy()
     new[1:, 3:] *= np.cumprod(np.where(along < 0.0, -1.0, 1.0))[:, np.newaxis]
@@ -705,7 +647,9 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     k = np.flatnonzero(np.abs(np.diff(change)) > 1.0)
     what = "quaternion changes its sign" if floating else "angle jumps by a whole turn"
     more = f" and {len(k) - 1} more samples" if len(k) > 1 else ""
-    return f"joint {joint.name}: its {what} after sample {k[0]}{more}; this is not a motion and was removed"
+    return (
+        f"joint {joint.name}: its {what} after sample {k[0]}{more}; this change is no motion and was removed"
+    )
 
 
 _UNWRAP = {JointKind.CONTINUOUS: _turning, JointKind.PLANAR: _turning, JointKind.FLOATING: _floating}
@@ -726,7 +670,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint whose pose changes because the mimicked joint was unwrapped."""
+    """Yield a note for each mimic joint that unwrapping moves to another pose."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):
@@ -737,8 +681,8 @@ def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterato
         if np.abs(moved).max() > _ROUNDING * max(1.0, abs(rule.multiplier)):
             k = int(np.flatnonzero(np.abs(moved) > _ROUNDING)[0])
             yield (
-                f"joint {joint.name} follows {rule.leader} with multiplier {rule.multiplier:g}, also"
-                f" beyond one turn: from sample {k} on it is at"
-                f" {rule.multiplier * new[k, at] + rule.offset:.4g}, not at"
-                f" {rule.multiplier * q[k, at] + rule.offset:.4g}"
+                f"joint {joint.name} mimics {rule.leader} with multiplier {rule.multiplier:g}; unwrapping"
+                f" {rule.leader} changes the value of {joint.name}, at sample {k} from"
+                f" {rule.multiplier * q[k, at] + rule.offset:.4g} to"
+                f" {rule.multiplier * new[k, at] + rule.offset:.4g}"
             )
