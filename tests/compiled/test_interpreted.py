@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import os
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -168,6 +170,43 @@ def test_without_a_kernel_cache_folder_no_compiling_process_starts(
     monkeypatch.setattr(preload, "cache_folder", lambda: None)
     assert not preload._compile_beside("jacobians", preload.RECURSIONS)
     assert preload._beside == {}
+
+
+class Started:
+    """A process that never ends by itself."""
+
+    stdin = None
+
+    def poll(self) -> int | None:
+        return None
+
+    def kill(self) -> None: ...
+
+    def wait(self) -> None: ...
+
+
+@pytest.mark.usefixtures("unspent")
+def test_threads_that_need_a_missing_kernel_start_one_compiling_process(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    started: list[Started] = []
+
+    def start(names: Sequence[str], home: str) -> Started:
+        time.sleep(0.05)  # The other threads arrive while the process starts.
+        started.append(Started())
+        return started[-1]
+
+    monkeypatch.setattr(preload, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(preload, "_compile_elsewhere", start)
+    together = threading.Barrier(4)
+
+    def ask(_: int) -> bool:
+        together.wait()
+        return preload._compile_beside("jacobians", preload.RECURSIONS)
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(ask, range(4)))
+    assert list[object](preload._beside.values()) == started
 
 
 def without_cache(folder: Path) -> dict[str, str]:

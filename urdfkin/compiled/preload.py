@@ -129,15 +129,20 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Start at most one second process for each kernel; return whether a second process runs."""
+    """Start at most one second process for each kernel; return whether the caller computes without it."""
     if cache_folder() is None:
         return False
-    if any(process.poll() is None for process in _beside.values()):
+    if not compiling.acquire(blocking=False):
+        return True  # Another thread compiles a kernel, or starts the second process.
+    try:
+        if any(process.poll() is None for process in _beside.values()):
+            return True
+        if name in _beside:
+            return False
+        _beside[name] = _compile_elsewhere((name,), home)
         return True
-    if name in _beside:
-        return False
-    _beside[name] = _compile_elsewhere((name,), home)
-    return True
+    finally:
+        compiling.release()
 
 
 def _compile_elsewhere(names: Sequence[str], home: str = RECURSIONS) -> subprocess.Popen[bytes]:
