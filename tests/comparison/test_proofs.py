@@ -309,3 +309,31 @@ def test_a_recheck_rejects_the_verdict_differs_if_another_alignment_agrees(
         found = urdfkin.same(a, copy.copy(a))
     assert found.verdict is Verdict.DIFFERS, "B is held half a metre too high"
     assert any("another alignment" in line for line in recheck(certificate(found), a, copy.copy(a)))
+
+
+def tilted_slide(axis: str) -> Robot:
+    """Return a slide that a continuous joint drives, with a tool behind a rotated frame."""
+    drive = joint("drive", "continuous", "base", "drum", "", "0 0 1")
+    frame = 'xyz="0.1 0 0" rpy="0.3 0.2 0.1"'
+    slide = joint("slide", "prismatic", "drum", "tool", frame, axis, limit(-1, 1) + mimic("drive", 0.01))
+    return loaded(urdf(drive, slide), verify=False)
+
+
+def test_the_bound_on_rounding_states_the_travel_of_a_joint_without_limits() -> None:
+    robots = tilted_slide("0.6 0 0.8"), tilted_slide("0.6 0 0.8000000000000002")
+    found = urdfkin.same(*robots)
+    assert (found.verdict, found.unlimited) == (Verdict.SAME, ("slide",))
+    assert "; this holds while joints without limits travel at most 10 m" in str(found)
+
+    def distance(travel: float) -> float:
+        ends = [robot.placement([travel / 0.01], "tool")[:3, 3] for robot in robots]
+        return float(np.linalg.norm(ends[1] - ends[0]))
+
+    assert distance(10.0) <= found.rounding[0] < distance(1e6)
+
+
+@pytest.mark.parametrize("root_joint", ["planar", "floating"])
+def test_planar_and_floating_joints_count_as_joints_without_limits(root_joint: str) -> None:
+    robot = urdfkin.load("planar_two_link", root_joint=root_joint, verify=False)
+    assert urdfkin.same(robot, robot, bounds=False).unlimited == ("root_joint",)
+    assert urdfkin.same("planar_two_link", "planar_two_link", bounds=False).unlimited == ()

@@ -106,7 +106,10 @@ class ToolEntry(TypedDict):
 
 
 class Rounding(TypedDict):
-    """Largest distance (m) and angle (rad) between matching frames that `same` treats as rounding errors."""
+    """Largest distance (m) and angle (rad) between matching frames that `same` treats as rounding errors.
+
+    The distance holds while each planar, floating or unlimited prismatic joint travels at most 10 m.
+    """
 
     metres: Size
     radians: Size

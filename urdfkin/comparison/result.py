@@ -285,6 +285,9 @@ class Sameness(Displayable):
             the poses of B relative to the second link. The two links belong to matching rigid bodies.
         rounding: (m, rad) the largest distance and angle between matching frames that rounding errors can
             cause.
+        unlimited: Joints of A without limits that translate: planar and floating joints, and prismatic joints
+            without a largest travel. All bounds on distances hold while each of these joints travels at most
+            10 m.
         single: (m, rad) bound on the distance and the angle between matching frames that single precision can
             cause. None if no file has single precision.
         unexplained: The differences of the unchanged models that rounding does not explain, joint by joint.
@@ -321,6 +324,7 @@ class Sameness(Displayable):
     base: FloatArray
     base_links: tuple[str, str]
     rounding: tuple[float, float]
+    unlimited: tuple[str, ...]
     single: tuple[float, float] | None
     unexplained: tuple[JointDifference, ...]
     frames: tuple[Interval, ...]

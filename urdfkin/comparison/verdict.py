@@ -237,6 +237,9 @@ class Comparator:
             base=alignment.X,
             base_links=(links[0][alignment.base[0]], links[1][alignment.base[1]]),
             rounding=self.rounding(alignment, variables),
+            unlimited=tuple(
+                names[0][step.a] for step, travel in _travels(alignment, variables) if math.isinf(travel)
+            ),
             single=single,
             unexplained=unexplained,
             frames=(),
@@ -317,19 +320,15 @@ class Comparator:
         """Bound the distance and the angle (m, rad) between frames that differ only by rounding.
 
         `same` ignores a small rounding difference at each joint. These differences add up along the path. A
-        planar or floating joint counts with its sampling range; an unlimited prismatic joint does not count.
+        tilt moves a frame in proportion to the travel of the joints behind the tilt, so the bound of the
+        distance holds while each joint of `unlimited` travels at most `WIDEST`.
         """
         pairs = [
             (step.kind, pair)
             for step, pair in zip(alignment.steps, variables.pairs, strict=True)
             if pair is not None
         ]
-        travels = [
-            max(map(abs, ends))
-            for kind, pair in pairs
-            if kind == "prismatic" and math.isfinite(sum(ends := variables.range(pair.a)))
-        ]
-        travels += [WIDEST for step in alignment.steps if step.kind in ("planar", "floating")]
+        travels = [WIDEST if math.isinf(travel) else travel for _, travel in _travels(alignment, variables)]
         reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(travels)
         slides = sum(pair.rounding for kind, pair in pairs if kind == "prismatic")
         turns = sum(pair.rounding for kind, pair in pairs if kind != "prismatic")
@@ -467,6 +466,15 @@ def _largest(bounds: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 def _reversed(names: Mapping[str, str]) -> dict[str, str]:
     return {theirs: ours for ours, theirs in names.items()}
+
+
+def _travels(alignment: Alignment, variables: Variables) -> Iterator[tuple[MatchedJoints, float]]:
+    """Yield each matched joint that translates, and its largest travel (m); infinite without limits."""
+    for step, pair in zip(alignment.steps, variables.pairs, strict=True):
+        if step.kind in ("planar", "floating"):
+            yield step, math.inf
+        elif step.kind == "prismatic" and pair is not None:
+            yield step, max(map(abs, variables.range(pair.a)))
 
 
 def _fixed_only_here(
