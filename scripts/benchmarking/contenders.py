@@ -37,7 +37,7 @@ class Contender:
     library: str
     module: str
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
-    #: If a library has no function for batches, the benchmark calls the library in a loop.
+    #: None if the library has no function for batches; the benchmark then calls the library in a loop.
     batches: Callable[[Subject, str], Iterator[Work]] | None = None
     program: str | None = None  # The library needs this program.
 

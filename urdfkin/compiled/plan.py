@@ -83,8 +83,8 @@ class CompiledTree:
         joints: Indices of the moving joints in the tree's list of joints.
         steps: (steps, 3) integers, columns `StepField`.
         geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2) step of the last moving joint before the frame, or -1, and the frame's output
-            index; sorted by the step.
+        frames: (frames, 2) row in `steps` of the last moving joint before the frame, or -1, and the frame's
+            index in the output; sorted by the row in `steps`.
         offsets: (frames, 12) rotation matrix and translation of each frame, relative to its last moving
             joint, in the order of `frames`.
         columns: (columns, 4) integers, columns `ColumnField`; one row for each Jacobian column.

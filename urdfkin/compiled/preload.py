@@ -40,7 +40,7 @@ _SAVED = 5e-5
 _AGAIN = 0.05
 
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: The kernels that each of two processes compiles; the compile times are about equal.
+#: Two groups of kernels with about equal compile times; each of two processes compiles one group.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 

@@ -1,6 +1,7 @@
 """Number types for the recursion of one configuration in plain Python, without compilation.
 
-Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`).
+Results are exactly the same doubles as those of compiled kernels, which use the types of
+`urdfkin.compiled.machine.numbers`.
 """
 
 from __future__ import annotations

@@ -262,7 +262,8 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read the listed blocks of eight numbers of `m` configurations into scratch memory.
 
     A whole block is read faster than a part of a block. The last block of a configuration may therefore
-    contain surplus numbers of the next configuration. Later inputs overwrite the surplus numbers.
+    contain surplus numbers of the next configuration. Later inputs overwrite the surplus numbers,
+    or no instruction uses them.
     """
     for i in range(begin, end):
         at = blocks[i]

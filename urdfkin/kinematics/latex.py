@@ -46,7 +46,7 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression; its `kind` decides whether a larger expression puts it in brackets."""
+    """A LaTeX expression; `kind` decides whether the text has brackets inside a larger expression."""
 
     text: str
     kind: int = _ATOM

@@ -262,5 +262,5 @@ def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator for a kernel with these Numba types of arguments."""
+    """Return a decorator for kernels whose arguments have these Numba types."""
     return lambda function: Kernel(function, arguments, nogil)

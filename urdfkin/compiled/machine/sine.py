@@ -65,7 +65,8 @@ def _of_small(context: Any, x: Any) -> Any:
         quarters = builder.bitcast(shifted, whole)
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
         # Let d be the double nearest to pi/2. If n is not 0, x and n d are multiples of 2^-53.
-        # The difference x - n d is then exact, because x and n d differ by less than 1. If n is 0, it is x.
+        # The difference x - n d is then exact, because x and n d differ by less than 1.
+        # If n is 0, the difference is x.
         # The variable `lost` is the rounding error of r, and `z_lost` is the rounding error of z = r^2.
         near = fused(builder, n, all_lanes(-PI_2), x)
         r = fused(builder, n, all_lanes(-PI_2_REST), near)
