@@ -1,9 +1,9 @@
 """The acceleration of a frame as a sum of contributions, one for each joint and each kind of acceleration.
 
 Consider joint k, and assume that all later joints are fixed. The frame's origin then moves relative to link
-k-1 with the velocity u_k, which is v_k z x d for a revolute joint k and v_k z for a prismatic joint k. Link
-k-1 itself rotates with the angular velocity w_{k-1}. Equation 7.125 gives the acceleration of a moving point
-in a moving frame. Equation 7.130 is the sum of its terms over all joints:
+k-1 with the velocity u_k. The velocity u_k is v_k z x d for a revolute joint, and v_k z for a prismatic
+joint. Link k-1 itself rotates with the angular velocity w_{k-1}. Equation 7.125 gives the terms of the
+acceleration of a moving point in a moving frame. Equation 7.130 is the sum of these terms over all joints:
 
 | kind | term | cause |
 |---|---|---|
@@ -13,7 +13,8 @@ in a moving frame. Equation 7.130 is the sum of its terms over all joints:
 | sliding | a_k z | acceleration of a prismatic joint |
 
 The vector d from the joint's origin to the frame's origin is the sum of the interorigin vectors after the
-joint (7.110). A difference of two positions in the world would lose digits far from the world's origin.
+joint (7.110). A difference of two positions in the world would lose digits if the robot
+is far from the world's origin or has a long link.
 
 The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
 planar or floating joint with the linear velocity s and the angular velocity o has one more Coriolis term,
@@ -100,7 +101,7 @@ class AccelerationBreakdown(Displayable):
 
 
 class _Moves(NamedTuple):
-    """Linear and angular velocity or acceleration (n, 3) of a joint, in world axes."""
+    """Velocity or acceleration (n, 3) of a joint relative to its parent link, in world axes."""
 
     slide: FloatArray
     turn: FloatArray
