@@ -216,6 +216,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
+    """Yield the differences that `same` finds if the models cannot be compared joint by joint."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}

@@ -63,9 +63,11 @@ BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 @dataclass(frozen=True, slots=True)
 class SameQuestion:
-    """The question whether two models are equivalent, or within a distance (m and rad) of each other.
+    """The question whether two models are equivalent, or whether their frames are close enough.
 
-    With `strict`, changes of B and remarks count as differences.
+    `within` is the largest allowed distance (m) and angle (rad) between matching frames of the unchanged
+    models. With None, the question is whether the models are equivalent. With `strict`, changes of B and
+    remarks count as differences.
     """
 
     within: float | None = None
@@ -102,7 +104,7 @@ class Difference:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
         detail: "alone" if the joint's axis differs, but the links after the joint agree. "converted" if the
-            limits of B are in A's coordinate. Otherwise empty.
+            limits of B were converted to A's coordinate. Otherwise empty.
     """
 
     place: str
@@ -192,8 +194,8 @@ class JointDifference:
     Attributes:
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        b: The parameter's value in B. If `a` is None, the text states the size of the difference, or why the
-            models cannot be compared here.
+        b: The parameter's value in B. If `a` is None, `b` is a text: the size of the difference, or the
+            reason why the models cannot be compared here.
         explained: The largest difference that rounding can cause; empty if no number is rounded.
     """
 
@@ -211,7 +213,10 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Matched links that `same` reports as different tools; `pose` (4, 4) is B's link in A's link frame."""
+    """Matched links that `same` reports as different tools.
+
+    `pose` (4, 4) is the pose of B's link in the frame of A's link.
+    """
 
     a: str
     b: str
@@ -246,7 +251,8 @@ class Confirmation:
 class JointMap:
     """Joints that match: value_b = sense * value_a + offset (rad, m).
 
-    `conversion` converts the pose of a planar or floating joint, if A and B define different joint frames.
+    `conversion` converts the pose of a planar or floating joint in A to the pose in B, if A and B define
+    different joint frames.
     """
 
     a: str
@@ -540,7 +546,11 @@ class Sameness(Displayable):
 
 
 def length(metres: float) -> str:
-    """Return a length as text with a unit prefix, for example "1.9 mm"."""
+    """Return a length as text with a unit prefix.
+
+    >>> length(0.0019), length(math.inf)
+    ('1.9 mm', 'without bound')
+    """
     return _with_prefix(metres, "m")
 
 
@@ -572,7 +582,11 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def size_words(metres: float, radians: float) -> str:
-    """Return text such as "1.9 mm off and turned by 0.3 mrad"."""
+    """Return the size of a difference as text; a part that is 0 is omitted.
+
+    >>> size_words(0.0019, 0.0003), size_words(0.0, 0.0003)
+    ('1.9 mm off and turned by 0.3 mrad', 'turned by 0.3 mrad')
+    """
     parts = [f"{length(metres)} off"] if metres else []
     parts += [f"turned by {angle(radians)}"] if radians else []
     return " and ".join(parts)
@@ -589,10 +603,10 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 def changes_of_b(
     alignment: Alignment, rounding: Tolerance, *, tables: bool = False
 ) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A, as (kind, text); set the tools in `alignment`.
+    """Return the changes that make B equal to A, as (kind, text).
 
-    With `tables`, every frame that differs counts as a tool. The frames of a Denavit-Hartenberg table depend
-    on its convention.
+    The function also stores the tool poses in `alignment`. With `tables`, every frame that differs
+    counts as a tool, because the frames of a Denavit-Hartenberg table depend on the table's convention.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -627,7 +641,11 @@ def changes_of_b(
 
 
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Yield the changed tools: frames without children, and frames of the robot's mounting."""
+    """Yield ("tools", text) for each tool whose pose differs.
+
+    A frame without children counts as a tool. A frame that only describes the robot's mounting also counts
+    as a tool.
+    """
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
         is_mount = (frame.a, frame.b) in mounts
@@ -709,6 +727,7 @@ def _rounded(x: float, rounding: float) -> float:
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
+    # A mimic joint with the multiplier 0 can be stored as a fixed joint, but the child link is not a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
             return False
@@ -793,7 +812,10 @@ def remarks(
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return differences without effect on motion; `single` is the relative error of single precision."""
+    """Return the differences that do not affect motion.
+
+    `single` is the relative error of a number in single precision, or 0.
+    """
     some = list[Difference]()
     for step in alignment.steps:
         if not step.unlike:
@@ -836,7 +858,8 @@ def limit_differences(
     """Yield the differences between two joints' kinds and limits.
 
     `tolerance` is relative to the larger of 1 (rad or m) and the limit's absolute value. `single` is the
-    relative error of a limit. `zero` is (sign, offset): value in B = sign * (value in A) + offset.
+    relative error of a limit in single precision, or 0. `zero` is (sign, offset), with
+    (value in B) = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

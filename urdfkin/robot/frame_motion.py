@@ -31,9 +31,9 @@ from urdfkin.verify.verifier import oracle_results_with_bound
 class MotionCheck:
     """Comparison of a quantity from urdfkin and from Pinocchio, for n samples.
 
-    `units` is the difference divided by eps * scale, where eps is the machine epsilon, and scale is the size
-    of the quantity's numbers. `bound` is the largest such value that rounding can cause, and `share` is
-    `units` / `bound`.
+    `units` (n,) is the largest difference in each sample, divided by eps * scale. Here eps is the machine
+    epsilon, and scale is the size of the quantity's numbers. `bound` (n,) is the largest value of `units`
+    that rounding can cause. `share` (n,) is `units` / `bound`; above 1, the results disagree.
     """
 
     units: FloatArray
