@@ -151,7 +151,7 @@ def _no_header(lines: list[str]) -> InputError:
     missing = next((name for name in COLUMNS if name not in names), None)
     if missing is None:
         return InputError(
-            "the line of column headings has another separator than the other lines",
+            "the line of column headings uses a different separator from the other lines",
             where="header",
             found=", ".join(best)[:200],
             remedy="separate the cells of all lines by the same character: a comma, a semicolon, a tab"

@@ -425,7 +425,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy=f"name the joint that {row.mimic.leader!r} mimics; use the product of the multipliers",
+                remedy=f"mimic the leader of {row.mimic.leader!r} directly, with the product of the two multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"
