@@ -425,7 +425,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy=f"mimic the leader of {row.mimic.leader!r} directly, with the product of the two multipliers",
+                remedy=f"mimic the leader of {row.mimic.leader!r}, with the product of the two multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"

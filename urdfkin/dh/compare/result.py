@@ -195,7 +195,9 @@ def document(found: TableComparison, units: Units) -> TextDocument:
             " unexplained."
         )
         if not found.fitted:
-            parts.append("The table may have a different base frame or tool. Omit --no-fit to fit base and tool.")
+            parts.append(
+                "The table may have a different base frame or tool. Omit --no-fit to fit base and tool."
+            )
     if found.agrees or not found.mistakes:
         parts += _fitted(found, units)
     if not found.agrees:
