@@ -11,9 +11,9 @@ joint's row. For skew axes, beta is 0, and the other six numbers are unique exce
 (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
 The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
-angles theta about coinciding axes. `steps_like` copies d or theta from a reference table in all rows except
-one. It chooses d or theta of the remaining row so that the sum is correct. In a Hayati row, d can also be
-chosen freely, because the two axes do not determine it.
+angles theta about coinciding axes. In all rows of such axes except one, `steps_like` copies d or theta from a
+reference table. It chooses d or theta of the remaining row so that the sum is correct. In a Hayati row, d can
+also be chosen freely, because the two axes do not determine it.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _along_common_normal(A: FloatArray, sine: float, reach: float, noise: PoseTo
 def _parallel(
     A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float, delta_each: bool
 ) -> AxisTransform:
-    """Return the transform between parallel axes, along the common normal through this joint's origin."""
+    """Return the transform between parallel axes, along a common normal through one joint's origin."""
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
     offset = cleaned_length(A[2, 3], reach, noise.metres)
@@ -156,7 +156,10 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """Two consecutive joint axes of a path, and the first joint's row in a reference table."""
+    """Two consecutive joint axes of a path, and the first joint's row in a reference table.
+
+    `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
+    """
 
     A: FloatArray
     row: DHRow
@@ -226,6 +229,7 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, carry: float) -> float:
+        """Return the `carry` of this joint for d = 0 if the next joint has the given `carry`."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
@@ -267,7 +271,7 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for it.
-        # If one of these rows is a Hayati row, cell a of that row in the reference determines d.
+        # If a row before that joint or tool is a Hayati row, its cell a in the reference determines d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -358,6 +362,10 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
 
     `length` is the sum of the offsets of these joints (m), and `reach` is the length of the whole path. The
     tolerance covers angles that a program rounded to fifteen digits.
+
+    >>> tolerance = pose_tolerance(1, 0.1, 1.0)
+    >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)
+    (63.7, 4.0)
     """
     computed = (AXES + CONSTANT * joints) * EPS
     return PoseTolerance(computed + WRITTEN * joints * EPS, max(SUMMED * EPS * reach, computed * length))
@@ -371,7 +379,10 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def left_out(chain: FrameChain) -> float:
-    """Return the sum (rad) of the tilts that a table sets to zero; the sum bounds the orientation error."""
+    """Return the sum (rad) of the tilts that a table sets to zero as rounding errors.
+
+    The orientation error that these tilts cause is at most this sum.
+    """
     total = 0.0
     for A, noise in zip(chain.constants, pose_tolerances(chain, 0.0), strict=True):
         total += sum(tilt for tilt in (tilt_of(A), abs(float(A[2, 0]))) if tilt <= noise.radians)

@@ -51,7 +51,7 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=wanted, rows=rows, base=base, tool=tool)
 
 
-#: URDF requires limits, so a prismatic joint without limits gets these (m, m/s and N).
+#: URDF requires limits of prismatic joints, so a joint without limits gets these (m, m/s and N).
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
@@ -75,12 +75,12 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 
 def to_urdf(table: DHTable) -> str:
-    """Return a URDF of `to_tree`, without shapes and masses."""
+    """Return a URDF of the tree from `to_tree`, without shapes and masses."""
     return write_urdf(to_tree(table))
 
 
 def free_tree(table: DHTable) -> KinematicTree:
-    """Return the tree without mimic rules: each row has its own coordinate, in row order."""
+    """Return the tree without limits and mimic rules: each row has its own coordinate, in row order."""
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
     return serial_tree(table.robot, link_names(table), joints)

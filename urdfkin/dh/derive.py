@@ -219,7 +219,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # Projection e - (e . z) z of the base's x axis e, without cancellation for z close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    # If z_0 is nearly along the base's x axis, the projection of the y axis is more accurate.
+    # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
@@ -247,7 +247,7 @@ def _steps(
     choices: Choices,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    # For parallel_offset="first", `_sum_offsets_in_first_row` adds the offsets of all rows later.
+    # For parallel_offset="first", `_sum_offsets_in_first_row` later adds the offsets along parallel axes.
     each = choices.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):

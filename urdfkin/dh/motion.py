@@ -33,7 +33,7 @@ def jacobian(
 ) -> FloatArray:
     """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (equation 7.85).
 
-    `q` is in the order of `joint_names` (rad or m). The world is the table's base frame.
+    `q` (..., coordinates) is in the order of `joint_names` (rad or m). The world is the table's base frame.
     """
     shape, (values,) = _flat(table, table.coupling.values(q))
     J = jacobians(_compiled_tree(table), values, Reference.of(reference))[:, 0] @ table.coupling.matrix
@@ -43,7 +43,10 @@ def jacobian(
 def velocity(
     table: DHTable, q: Given, v: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6) velocity of the tip, [linear; angular] (equations 7.127, 7.128)."""
+    """Return the (..., 6) velocity of the tip, [linear; angular] (equations 7.127, 7.128).
+
+    `v` is in rad/s or m/s.
+    """
     shape, (values, rates) = _flat(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
     return velocities(_compiled_tree(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
 
@@ -51,7 +54,10 @@ def velocity(
 def acceleration(
     table: DHTable, q: Given, v: Given, a: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6) classical acceleration of the tip, [linear; angular] (equations 7.129, 7.130)."""
+    """Return the (..., 6) classical acceleration of the tip, [linear; angular] (equations 7.129, 7.130).
+
+    `a` is in rad/s^2 or m/s^2.
+    """
     arrays = (table.coupling.values(q), _joint_derivatives(table, v, "v"), _joint_derivatives(table, a, "a"))
     shape, (values, velocities_, accelerations_) = _flat(table, *arrays)
     tree = _compiled_tree(table)

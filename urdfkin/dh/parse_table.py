@@ -91,7 +91,10 @@ def from_sheet(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table in text; `name` is "" for an unknown heading."""
+    """A column of a table in text; `name` is "" for an unknown heading.
+
+    `previous` is true if the heading has the index i-1, as in modified tables.
+    """
 
     name: str
     heading: str = ""
@@ -101,7 +104,10 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """The cells of a table in a text; `around` contains all lines outside the table."""
+    """The cells of a table in a text; `around` contains all lines outside the table.
+
+    If `strict` is true, an unknown column is an error.
+    """
 
     columns: tuple[_Column, ...]
     rows: list[list[str]]
@@ -204,7 +210,7 @@ def _csv_cells(line: str, mark: str) -> list[str]:
 
 
 def _aligned(lines: list[str]) -> _Grid | None:
-    """Parse cells that are separated by two blanks, or by one blank if no cell contains a blank."""
+    """Parse cells that are separated by two or more blanks, or by one blank if no cell contains blanks."""
 
     def loose(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]
@@ -284,7 +290,7 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Correct a rotation that differs from an exact rotation only by the printed digits."""
+    """Replace a rotation by the nearest exact rotation if they differ only by rounding in the text."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
@@ -355,7 +361,10 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
-    """Make a mimic rule from each variable q1, q2, ... that belongs to another row."""
+    """Make a mimic rule from each variable q1, q2, ... that belongs to another row.
+
+    `coordinates` contains the joints with the variables q1, q2, ...; [] means the joints of the rows.
+    """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
     names = coordinates or joints

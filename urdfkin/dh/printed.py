@@ -34,7 +34,7 @@ class PrintedPrecision:
 
 
 def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
-    """Return the tip error of a printed table; `pose_digits` applies to base and tool."""
+    """Return the tip error of a printed table with `pose_digits` significant digits in base and tool."""
     rows = tuple(_printed_row(row, units) for row in table.rows)
     base, tool = (_printed_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = samples_within_limits(table)

@@ -74,7 +74,10 @@ class Literal(float):
 
 
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return half a unit of the last digit of each cell (metres or radians), for each row."""
+    """Return half a unit of the last digit of each cell (metres or radians), for each row.
+
+    `data` must come from `urdfkin.dh.parse_table.mapping_from_text`, which keeps the text of the numbers.
+    """
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     rows = []
     for row in data["rows"]:
@@ -93,6 +96,9 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
     """Return half a unit of a written number's last digit; 0 if the number is exact.
 
     A whole number is exact unless `whole_is_rounded`: 425 mm is uncertain by 0.5 mm, and 90 deg is exact.
+
+    >>> half_a_digit(Literal("0.3111")), half_a_digit("90"), half_a_digit(425, True), half_a_digit("pi")
+    (5e-05, 0.0, 0.5, 0.0)
     """
     text = value.text if isinstance(value, Literal) else str(value)
     text = (parse_cell(value).text or "0") if isinstance(value, str) else text

@@ -277,9 +277,9 @@ def screws_from(
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
     `screws` has a row (w, v) for each joint. An array (6, n) with a column for each joint, as in Modern
-    Robotics, is also accepted if n is not six. `M` is the pose of the tip in the zero configuration (metres).
-    `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A screw with a pitch (w . v is
-    not 0) raises InputError, because URDF has no joint with a pitch.
+    Robotics, is also accepted if n is not six. `M` is the (4, 4) or (3, 4) pose of the tip in the zero
+    configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
+    screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a pitch.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S

@@ -36,7 +36,7 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
+#: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
 SAMPLES = 500
 #: Assumed range (rad or metres) of a mimicked joint that is not on the path.
@@ -149,7 +149,7 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    # In gimbal lock, only the sum or difference of roll and yaw is defined, so roll is 0.
+    # In gimbal lock, only the sum or difference of roll and yaw is defined, so roll is set to 0.
     if level <= tolerance:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:

@@ -1,7 +1,8 @@
 """Find the structure of an arm, and export it for closed-form inverse kinematics solvers.
 
 Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
-point (Pieper, 1968).
+point (Pieper, 1968). Distances and angles of consecutive axes are the same in every configuration, so they
+are computed in the zero configuration.
 
 An ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et al., 2014) has the standard table
 
@@ -51,7 +52,7 @@ _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class AxisPair:
-    """Angle (at most pi/2 rad) and distance (m) of two axes; 0 m if one joint is prismatic."""
+    """Angle (at most pi/2) and distance (m) of two axes; the distance is 0 if one joint is prismatic."""
 
     first: str
     second: str
@@ -141,7 +142,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the least-squares intersection of axes, and its largest distance (m) from an axis."""
+    """Return the least-squares intersection of axes, and the distance (m) of the farthest axis from it."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -187,6 +188,7 @@ def _arm_kinds(
 
 
 def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
+    """Return the known closed-form solutions; an approximate property makes a solution approximate."""
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:
@@ -204,7 +206,8 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
         ik_geo = f", ik-geo's spherical{suffix}" if "spherical wrist" in names else ""
         solutions.append(f"Pieper, three axes meet: EAIK{ik_geo}")
     if "three parallel axes" in names:
-        # ik-geo's solvers for three parallel axes require that these are axes 2, 3 and 4.
+        # ik-geo's solvers for three parallel axes require that axes 2, 3 and 4 are parallel.
+        # The solver with the suffix _two_intersecting also requires that axes 5 and 6 intersect.
         ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if intersect[4] else ''}"
         solvers = ["EAIK"] * any(intersect) + [ik_geo] * (parallel[1] and parallel[2])
         if solvers:
@@ -217,7 +220,10 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
 
 
 def _origin(screws: ProductOfExponentials) -> FloatArray:
-    """Return the point of axis 1 nearest to axis 2; `screws.points[0]` if this point is not unique."""
+    """Return the point of the first axis that is nearest to the second axis.
+
+    If one joint is prismatic, or if the axes are nearly parallel, return `screws.points[0]`.
+    """
     if not screws.joints:
         return np.zeros(3)
     if len(screws.joints) > 1 and screws.joints[0].kind.turns and screws.joints[1].kind.turns:
@@ -231,7 +237,7 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Bound the tip's distance (m) from `origin`, a point of the first axis, for all configurations.
+    """Bound the tip's distance (m) from `origin`, a point of the first axis, within the joint limits.
 
     The bound is the length of a polygonal chain from `origin` to the tip. Each vertex is the point of the
     next axis that is nearest to the previous vertex. Travel of prismatic joints is added.
@@ -249,7 +255,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the tip's positions on samples, and the Jacobian at the first sample."""
+    """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
     ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
     values = values_within(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
@@ -302,7 +308,10 @@ class Opw:
 
 
 def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
-    """Return the OPW parameters of a path, or raise InputError; `tolerance` (m, rad) is for the tip."""
+    """Return the OPW parameters of a path; raise InputError if the path is not an OPW arm.
+
+    `tolerance` is the largest allowed error of the tip on `SAMPLES` configurations (metres and radians).
+    """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
         raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
@@ -361,16 +370,21 @@ def _parameters(table: DHTable) -> Opw:
 
 
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axes H (n, 3) and the vectors P (n + 1, 3), in metres, of revolute joints.
+    """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) in metres; all joints must be revolute.
 
-    The vector between intersecting axes is exactly zero; solvers detect the intersection by this zero.
+    The first vector begins at the base, and the last vector ends at the tip. The vector between two axes with
+    a common point in `_points` is exactly zero; solvers detect an intersection by this zero.
     """
     points = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)
 
 
 def _points(screws: ProductOfExponentials) -> FloatArray:
-    """Return an (n, 3) array with a point of each axis; intersecting axes have the same point."""
+    """Return an (n, 3) array with a point of each axis; intersecting axes have the same point.
+
+    If an axis has several intersections, an intersection of three axes has priority over one of two axes.
+    Among intersections of equally many axes, the one closest to the tip has priority.
+    """
     points, assigned, n = screws.points.copy(), set[int](), len(screws.joints)
     for size in (3, 2):
         for i in reversed(range(n - size + 1)):

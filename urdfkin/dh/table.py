@@ -184,7 +184,11 @@ def between_axes(a: float, alpha: float, beta: float = 0.0) -> FloatArray:
 
 
 def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
-    """Return (a, alpha) if a pose equals Tx(a) Rx(alpha), up to rounding of the rotation; else None."""
+    """Return (a, alpha) if a pose equals Tx(a) Rx(alpha), up to rounding of the rotation; else None.
+
+    >>> as_a_and_alpha(between_axes(0.5, math.pi))
+    (0.5, 3.141592653589793)
+    """
     tilt_of_x = max(abs(T[0, 1]), abs(T[0, 2]))
     if tilt_of_x > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
@@ -201,7 +205,11 @@ def angle_difference(first: float, second: float) -> float:
 
 
 def wrapped(angle: float) -> float:
-    """Return the equivalent angle in (-pi, pi]; an angle within rounding of -pi becomes pi."""
+    """Return the equivalent angle in (-pi, pi]; an angle within rounding of -pi becomes pi.
+
+    >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
+    (True, True)
+    """
     equivalent = math.remainder(angle, 2.0 * math.pi)
     return math.pi if equivalent <= -math.pi * (1.0 - EPS) else equivalent
 
@@ -214,7 +222,13 @@ def cleaned_angle(angle: float) -> float:
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle is nearly a multiple of 15 degrees, but not 0; `twelfth` is 15 degrees in its unit."""
+    """Whether an angle is nearly a multiple of 15 degrees, but not 0.
+
+    `twelfth` is 15 degrees in the unit of the angle.
+
+    >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
+    (True, False, False, True)
+    """
     return abs(angle) > 0.5 * twelfth and abs(math.remainder(angle, twelfth)) <= _WRITTEN * twelfth
 
 
@@ -274,7 +288,7 @@ class SnapReport:
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return a guaranteed bound (m) of the tip's displacement for these values of prismatic joints."""
+        """Return a guaranteed bound (...,) in metres of the tip's displacement for prismatic joint values."""
         at_zero = sum(change.tip for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)

@@ -48,6 +48,8 @@ _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1
 class TreeRow:
     """One joint and its child link, in metres and radians; the module's equation defines the cells.
 
+    The joint's value is added to theta if sigma is 0, and to r if sigma is 1.
+
     Attributes:
         antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
@@ -78,7 +80,8 @@ class TreeParameters:
     Attributes:
         path_lengths: (joints,) sum of the URDF's offsets (metres) from the root to each joint.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        left_out: Largest sum (rad) of the tilts on a path that are set to zero as rounding errors.
+        left_out: Largest sum (rad), on a path from the root, of tilts that are set to zero as rounding
+            errors.
     """
 
     robot: str
@@ -95,12 +98,18 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error of the poses (eps * reach); not a proven bound."""
+        """Estimated rounding error of the poses, in eps * reach; not a proven bound.
+
+        The estimate does not include Pinocchio's rounding errors.
+        """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
         return of_rows(1 + longest) + self.left_out / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
-        """Return the path length (..., joints) to each link: the larger of URDF and table (m)."""
+        """Return the (..., joints) path length (metres) from the root to each link at `q`.
+
+        The result is the larger of the path lengths in the URDF and in the table.
+        """
         values = np.abs(self._values(q))
         travel = np.where([row.sigma == 1 for row in self.rows], values, 0.0)
         lengths = np.array([abs(row.b) + abs(row.d) + abs(row.r) for row in self.rows])
@@ -173,7 +182,11 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
 
 @dataclass(frozen=True, slots=True)
 class _LinkAxis:
-    """The frame of a link with z along its joint's axis; `left_out` (rad) sums the tilts set to zero."""
+    """The axis frame of a link, with z along the axis of the link's joint.
+
+    `T_antecedent_axis` is the pose in the antecedent's axis frame. `T_link_axis` is the pose in the link's
+    URDF frame. `left_out` is the sum (rad) of the tilts from the root to the link that are set to zero.
+    """
 
     antecedent: int
     T_antecedent_axis: FloatArray

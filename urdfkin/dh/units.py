@@ -69,6 +69,11 @@ class Units:
         return fraction_text(fraction, pi)
 
     def length(self, metres: float) -> str:
+        """Format a length.
+
+        >>> Units(lengths=Lengths.MILLIMETRES).length(0.0825)
+        '82.5'
+        """
         return self._number(metres if self.lengths is Lengths.METRES else metres * 1000.0)
 
     def _number(self, value: float) -> str:
@@ -169,7 +174,7 @@ _TOKEN = re.compile(
 
 
 class InvalidCellError(ValueError):
-    """The text is not a valid cell; the message names the invalid token."""
+    """The text is not a valid cell; the message states the reason."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,9 +183,10 @@ class Cell:
 
     Attributes:
         number: The constant, in `unit`; in the table's unit if `unit` is None.
+        unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
         factor: Factor of the joint's variable; None if the cell has no variable.
         variable: Number in the variable's name, for example 2 for q2.
-        text: Text of the constant if it is a single number.
+        text: Text of the constant if it is a single number, otherwise "".
     """
 
     number: float

@@ -31,7 +31,7 @@ from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, is_bounded
 
-#: This tip error (m) covers the effect of one or two cells that are rounded to 0.1 mm.
+#: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
 TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
@@ -112,7 +112,10 @@ def compare(
 
 
 def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
-    """Return the largest tip error (metres, radians) after a fast fit that stops at `enough` (metres)."""
+    """Return the largest tip error on samples (metres, radians) after a fast fit.
+
+    The fit stops at a tip error of at most `enough` (metres).
+    """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
     targets, check_targets = _target_poses(chain)
@@ -122,7 +125,7 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tup
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach (metres); angles are multiplied by it to compare them with lengths.
 
-    The path length alone is unsuitable: without Hayati rows it may be kilometres.
+    The path length may be kilometres in a URDF that was made from a table without Hayati rows.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -130,7 +133,7 @@ def _reach(chain: FrameChain, poses: FloatArray) -> float:
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Raise InputError unless table and path have the same kinds of joints, at least one."""
+    """Raise InputError if the joint kinds of table and path differ, or if both have no joints."""
     in_table, in_urdf = (
         "".join("R" if item.kind.turns else "P" for item in items) for items in (reference.rows, chain.joints)
     )
@@ -182,7 +185,7 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _reference_row(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the reference's row index of a cell in standard row i; None if the cell is in the tool."""
+    """Return the index of the reference row that contains a cell of standard row i; None if no row does."""
     at = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return at if at < len(reference.rows) else None
 
@@ -262,7 +265,11 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> 
 
 
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
-    """Bound a table's tip error (m, rad) for all joint values, without mimic rules and rounding errors."""
+    """Return an upper bound of a table's tip error (metres, radians) for all joint values.
+
+    The bound does not include rounding errors, and mimic rules are ignored. Prismatic joints are within their
+    limits, or within `_SLIDE` if they have no limits.
+    """
     mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
     variables = variables_of(pair, tolerance_of(*mechanisms))

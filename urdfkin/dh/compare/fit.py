@@ -49,7 +49,8 @@ _REWEIGHTINGS = 25
 _LEAST_WEIGHT = 1e-9
 #: Initial weights increase from 1 to this number, so that only one of two equivalent cells changes.
 _LAST_WEIGHT = 1.2
-#: With these small weights, beta changes only if a change of alpha is not enough.
+#: Initial weight of beta, and its factor at each reweighting.
+#: Both are small, so that beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT = 1e-6
 _PATIENCE = 4
@@ -57,7 +58,7 @@ _PATIENCE = 4
 _ROUNDING = 1e-13
 #: Tip error, relative to the reach, below which no other joint signs are tried.
 _TIP_ROUNDING = 1e-12
-#: A fit with other joint signs must reduce the smallest tip error so far to less than this fraction.
+#: A fit with other joint signs is used only if its tip error is below this fraction of the best so far.
 _OTHER_START_ERROR = 0.5
 #: Angles (rad) that are added to a joint offset and subtracted from the next joint offset.
 _LARGE_ANGLES = (math.pi, 0.5 * math.pi, -0.5 * math.pi)
@@ -67,7 +68,7 @@ FAST_SEARCH = (3, 16)
 
 @dataclass(frozen=True)
 class TableArrays:
-    """Numbers of a standard table; the columns of `cells` are theta, d, a, alpha and beta."""
+    """Numbers of a standard table; the columns of `cells` (n, 5) are theta, d, a, alpha and beta."""
 
     cells: FloatArray
     turns: FloatArray
@@ -109,7 +110,10 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and the angles and lengths (s, 5 n) of its motions."""
+        """Return the path from base to tip, and the angles and lengths (s, 5 n) of its motions.
+
+        `values` (s, n) contains the joint values of s samples.
+        """
         amounts = np.tile(self.cells.ravel(), (len(values), 1))
         for i, k in enumerate(self.variables):
             amounts[:, len(CELLS) * i + k] += self.senses[i] * values[:, i]
@@ -145,7 +149,8 @@ def tip_derivatives(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the tip's poses, and their derivatives (twists) by the free parameters and by the cells.
 
-    The free parameters have 6 columns for the base, 6 for the tool, and 1 for each joint offset.
+    The derivatives have the shapes (6 s, 12 + n) and (6 s, 5 n). The free parameters have 6 columns for the
+    base, 6 for the tool, and 1 for each joint offset. Angles are multiplied by the scale.
     """
     scale = targets.scale
     path, amounts = model.path_at(targets.values)
@@ -196,7 +201,7 @@ def _with_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 
 
 def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, free: bool) -> TableArrays:
-    """Fit the table with the fewest changes of cells; `mask` (n, 5) is 1 for cells that may change."""
+    """Fit the table, with changes of few cells; `mask` (n, 5) is 1 for cells that may change."""
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
         poses, by_free, by_cells = tip_derivatives(model, targets)
@@ -224,7 +229,10 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes that remove the error; as few cells as possible then differ from `start`."""
+    """Return changes that remove the error; as few cells as possible then differ from `start`.
+
+    A cell does not change if a free parameter, for example the joint offset of its row, has the same effect.
+    """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)
     earlier = ((model.cells - start.cells) * np.where(_IS_ANGLE, scale, 1.0)).ravel()
@@ -247,7 +255,7 @@ def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
 
 
 def hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of each cell whose effect on the tip equals that of free parameters."""
+    """Return (row, cell index) of each cell whose effect on the tip the free parameters can reproduce."""
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
     remaining = np.linalg.norm(by_cells - Q @ (Q.T @ by_cells), axis=0)

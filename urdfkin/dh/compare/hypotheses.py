@@ -73,8 +73,9 @@ def diagnose(
 ) -> BetterInterpretation | None:
     """Return the interpretation with which a table agrees with a URDF; None if there is none.
 
-    `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. With the returned
-    interpretation, the tip error (metres) is at most 5 % of `stated_error`, or within `tolerance`.
+    `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
+    is the tip error of the table as its file states it. With the returned interpretation, the tip error is at
+    most 5 % of `stated_error`, or within `tolerance` (metres).
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = shape(derive(chain, Choices(last="flange")), chain.reach)
@@ -110,7 +111,10 @@ def diagnose(
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> DHConvention:
-    """Find the only convention with which a table fits a path; otherwise raise InputError."""
+    """Return the convention with which a table fits a path better.
+
+    InputError is raised if both conventions fit equally well, or if neither fits, even in other units.
+    """
     comparisons = dict[DHConvention, TableComparison]()
     errors = list[InputError]()
     for convention in DHConvention:

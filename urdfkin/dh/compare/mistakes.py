@@ -58,8 +58,9 @@ class MistakeSearch:
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
         """Return the mistakes whose correction leaves the fewest parameters to fit.
 
-        A table that `agrees` after a fit may be correct and differ from the URDF only in its frames. Then
-        only corrections are reported that need no fit, or a fit of only the base or only the tool.
+        The result is empty if no correction reduces the number of these parameters. A table that `agrees`
+        after a fit may be correct and differ from the URDF only in its frames. Corrections of such a table
+        are reported only if they need no fit, or a fit of only the base or only the tool.
         """
         if self._as_written(reference) is not None:
             return ()
@@ -83,7 +84,7 @@ class MistakeSearch:
         return ()
 
     def _needs_one_parameter(self, table: DHTable) -> bool:
-        """Whether a table agrees after a fit of base, tool, one joint offset or one joint sign."""
+        """Whether a table agrees after a fit of one parameter: base, tool, a joint offset or a joint sign."""
         if self._with_one_end(table) is not None:
             return True
         model = self._with_zeros(table)

@@ -33,7 +33,8 @@ class CellDifference:
 
     Attributes:
         tip: Largest displacement (metres) of the tip on the samples if only this cell differs.
-        last_digit: Half a unit of the table value's last digit; 0 if the value is exact or its text unknown.
+        last_digit: Half a unit of the last digit of `reference`; 0 if the value is exact or its text is
+            unknown.
     """
 
     row: int
@@ -116,17 +117,18 @@ class TableComparison:
     """Result of a comparison of a table with a URDF.
 
     Attributes:
-        reference: The table with the URDF's joint names and with the fitted numbers; its method `placement`
-            accepts the coordinates of the URDF.
+        reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
+            offsets. The method `placement` of this table accepts the coordinates of the URDF.
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         metres, radians: Largest errors of the fitted table's tip on the samples.
         most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all joint
-            values. The bounds do not include rounding errors.
+            values. The bounds do not include rounding errors. A prismatic joint without limits is assumed to
+            be between -0.5 m and 0.5 m.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
         instead: The cells that would have to change without a fit; empty if this would change too many cells,
             or would not remove the tip error.
-        hidden: Row index and name of each cell for which base, tool and joint offsets can compensate.
+        hidden: Row index and name of each cell whose error base, tool and joint offsets can compensate.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
     """
 
@@ -182,7 +184,10 @@ class TableComparison:
 
 
 def resolution(share: float, radians: float) -> float:
-    """Return the power of ten to which fitted numbers are rounded: at least twice the tip error."""
+    """Return the power of ten to which fitted numbers are rounded: at least twice the tip error.
+
+    `share` is the position error of the tip in metres per metre of reach.
+    """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
 
 

@@ -80,7 +80,11 @@ class _PartialAlignment:
 
 
 def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[SignFit]:
-    """Return up to `count` alignments of a path with a standard reference table, the closest first."""
+    """Return up to `count` alignments of a path with a standard reference table, the closest first.
+
+    The table must have the same kinds of joints as the path. With prismatic joints, several combinations of
+    signs may give equal tables, and only a fit can distinguish them.
+    """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
     partials = [_PartialAlignment(costs[sense], (sense,), (), 0.0, 0.0, np.eye(4)) for sense in costs]
@@ -188,7 +192,8 @@ def _steps(
         # A prismatic joint's axis can be shifted, so x can have any direction next to a prismatic joint.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _NO_OFFSET or not both_turn:
             shifted[:2, 3] = 0.0
-        # With reach 0, a common normal that misses an origin counts as far away, so the row is a Hayati row.
+        # With reach 0, every common normal that misses a joint's origin counts as far away.
+        # Therefore, `step_between` makes a Hayati row.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = step_between(shifted, hayati_reach, phi_free, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

@@ -20,7 +20,11 @@ from urdfkin.model.tree import FloatArray, is_bounded
 
 
 def identifier(name: str) -> str:
-    """Return a valid name in C, Python and MATLAB."""
+    """Return a valid name in C, Python and MATLAB.
+
+    >>> identifier("ur5 robot"), identifier("2dof"), identifier("for")
+    ('ur5_robot', 'robot_2dof', 'for_')
+    """
     word = re.sub(r"[^A-Za-z0-9_]", "_", name) or "robot"
     if not word[0].isalpha():
         word = f"robot_{word.lstrip('_')}"
@@ -74,7 +78,7 @@ def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> lis
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Larger integers, and fractions with a larger denominator, are written as decimals.
+#: Fractions with a larger denominator are written as decimals.
 _LARGEST = 10**9
 
 

@@ -24,7 +24,7 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: With this factor, a rounding error of a bound does not increase the bound's last printed digit.
+#: With this factor, a relative rounding error below 1e-12 does not increase a bound's last printed digit.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
@@ -100,7 +100,11 @@ def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
 
 
 def at_most(value: float) -> str:
-    """Format a bound with three digits, rounded up so that it remains a bound."""
+    """Format a bound with three digits, rounded up so that it remains a bound.
+
+    >>> at_most(7.5912e-06), at_most(0.0)
+    ('7.60e-06', '0')
+    """
     if value == 0.0:
         return "0"
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
