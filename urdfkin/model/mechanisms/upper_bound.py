@@ -29,7 +29,7 @@ distances by which each L can move the frame.
 
 **Second derivatives.** `curvature` bounds the second derivatives of D = p_B - p_A joint by joint. The
 derivative of a rotated vector with respect to the angle is the cross product of the axis u with the rotated
-vector. With d and y as above, the derivatives with respect to a joint value are
+vector. The derivatives of y and d with respect to a joint value are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
@@ -67,11 +67,9 @@ _CORNERS = 64
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A grid of points on the surface of a cube; each point represents a direction.
+    """Points on a cube with `cells` cells per edge; each point represents a direction.
 
-    Attributes:
-        cells: Number of cells along an edge of a face.
-        segments: Number of sides of the polygon that replaces a full circle of directions.
+    `segments` is the number of sides of the polygon that replaces a full circle of directions.
     """
 
     cells: int
@@ -84,7 +82,6 @@ class Grid:
 
     @property
     def lengths(self) -> FloatArray:
-        """The distances (n,) of the grid points from the cube's centre."""
         return np.asarray(np.linalg.norm(self.points, axis=1))
 
 
@@ -137,7 +134,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the support function after rotations about a screw by all angles from low to high (rad)."""
+        """Return the support function after rotations by all angles from low to high (rad)."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -145,11 +142,11 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def rotated_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Rotate the set by each angle; return the support function (angles, n) at the n grid points.
+        """Return the support function at the n grid points after a rotation by each angle; shape (angles, n).
 
-        The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
-        the grid points by the opposite angle. For each angle, `factors` contains a multiplier for the grid
-        points' components perpendicular to the axis.
+        For each angle (rad), a rotation R about `axis` moves the original set. Since h'(u) is h(R^T u), the
+        method rotates the grid points by the opposite angle. `factors` contains a multiplier for each angle.
+        The method multiplies the grid points' components perpendicular to the axis by this multiplier.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -158,14 +155,13 @@ class Support:
         return self.at(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support function of the set after translations by all distances from low to high (m)."""
+        """Return the support function after translations by all distances from low to high (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
         return Support(self.grid, self.values + shifts)
 
     def transform(self, T: FloatArray) -> Support:
-        """Return the support function of the set after a rigid motion T."""
         return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
@@ -243,7 +239,7 @@ def upper_bounds(
 def from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the joint pairs and their values on the path to a frame, from the first pair that differs."""
+    """Return the joint pairs and values on the path to a frame, from the first pair that differs."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -304,7 +300,7 @@ def _product(factor: float, reach: float) -> float:
 
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return d and y of the recursion (module docstring) at the frame, where the recursion begins."""
+    """Return d and y of the recursion (module docstring) at the frame."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -353,7 +349,7 @@ def d_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support function of the difference between the translations by two matched prismatic joints.
+    """Return the support function of the difference between the translations of two matched prismatic joints.
 
     The difference is largest if each joint value is at a limit.
     """
@@ -372,7 +368,7 @@ def _prismatic_difference(
 
 
 def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return sample values (n,) of the variable that moves a revolute joint of A and its matched joint of B.
+    """Return sample values (n,) of the variable that moves a revolute joint of A and the matched joint of B.
 
     The result is None if different variables move the two joints, or if more than `MOST_VALUES` samples are
     needed. The result is also None if the variable has no limits and a slope is not 0, 1 or -1.
@@ -396,13 +392,17 @@ def _common_difference(
 
     `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
     Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
-    second derivative. If t' = t + c, the second derivative is R' P' x' - R P x, up to its sign. Here x is the
-    vector from A's axis to y, P is the projection perpendicular to A's axis, and R is the rotation about A's
-    axis. The corresponding symbols for B's axis are x', P' and R'. With the axes' directions u and u', |R' -
-    R| <= 2 |u'
-    - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes. If t and
-    t' have different slopes, the second derivative is at most the sum of two terms, one for each joint. Each
-    term is the square of the slope of t or t', times the largest distance of y from the joint's axis.
+    second derivative.
+
+    Let x be the vector from A's axis to y. Let P be the projection perpendicular to A's axis, and let R be
+    the rotation about A's axis. The symbols x', P' and R' are the same quantities for B's axis. If t' = t +
+    c, the second derivative is R' P' x' - R P x, up to its sign. With the directions u and u' of the axes,
+    the following bounds hold: |R' - R| <= 2 |u' - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part
+    of x' - x is the offset of the axes.
+
+    If t and t' have different slopes, the second derivative is at most the sum of two terms, one for each
+    joint. Each term is the square of the slope of t or t', times the largest distance of y from the joint's
+    axis.
     """
     G = y.grid.points
     axis, other = step.axis, step.other
@@ -567,7 +567,7 @@ def relevant_joints(
     first = len(steps) - len(from_first_difference(alignment, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # the result contains all joints from joint i on
+            first = i
     return steps[first:], pairs[first:]
 
 
