@@ -1,4 +1,4 @@
-"""A path between two frames as a sequence of joint axes. Denavit-Hartenberg tables are derived from it.
+"""A path between two frames as a sequence of joint axes, the basis of Denavit-Hartenberg tables.
 
 As in section 7.5 of the textbook, joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
 d_{i-1,i} leads from O_{i-1} to O_i. The path may lead from parent to child, from child to parent, or through
@@ -39,7 +39,7 @@ LEAST_SIZE = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainJoint:
-    """One moving joint on a path; `backwards` means from the joint's child link to its parent link.
+    """One moving joint on a path; `backwards` means that the path leads from child link to parent link.
 
     Attributes:
         T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this

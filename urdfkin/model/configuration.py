@@ -101,9 +101,9 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the ranges of `own_ranges`, narrowed to values that all mimic joints allow.
+    """Return the ranges of `own_ranges`, narrowed so that all mimic joints are within their limits.
 
-    If a mimic joint allows no value, the range is not narrowed.
+    If this is impossible for a joint, the joint's range is not narrowed.
     """
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.allowed for one in narrowed_ranges(tree)}
@@ -160,7 +160,7 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
 
 
 def _rounded_outwards(limit: Limit) -> tuple[float, float]:
-    """Widen the limits by one unit in the last place, because a decimal limit is rounded."""
+    """Widen the limits by one unit in the last place, because parsing rounds a decimal limit."""
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
@@ -180,9 +180,9 @@ _OF_RATES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return a name for each number of `q`, for example `base.x`, `base.y`, ...
+    """Return the names of the numbers of `q`, with suffixes for planar and floating joints (`base.x`).
 
-    If another joint has the name `base.x`, the names are `base:x`, `base:y`, ...
+    If another joint has the name `base.x`, the name is `base:x`.
     """
     return tuple(name for name, _ in _names_and_units(tree, _OF_Q))
 
@@ -248,7 +248,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return hints for the lengths of q, v and a that differ between Pinocchio and urdfkin."""
+    """Return a hint for each length that q, v or a has in Pinocchio but not in urdfkin."""
     has_mimic_joints = any(joint.mimic for joint in tree.joints)
     leave_out = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -286,8 +286,7 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    In `ready`, a joint without an own value is at 0, or in the middle of its range if 0 is outside this
-    range.
+    In `ready`, a joint without a value in the tree is at 0, or in the middle of its range if 0 is outside.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -653,7 +652,7 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
     """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
 
-    The samples cover the own range of each joint, even if a mimic joint then exceeds its limits, because the
+    The samples cover each joint's own range, even if a mimic joint then exceeds its limits, because the
     equations are valid beyond the limits too. Every eighth sample has a hundred times larger velocities and
     accelerations, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
     """

@@ -27,7 +27,7 @@ class State:
     """The position, velocity and acceleration of a link's frame.
 
     R and p are expressed in world axes. The vectors w, vel, alpha and acc are expressed in the link's own
-    axes if `Recursion.own` is True, else in world axes.
+    axes if `Recursion.own` is True, and in world axes otherwise.
     """
 
     R: Matrix = IDENTITY
@@ -60,7 +60,8 @@ class Column:
 class Recursion:
     """Steps of the recursion: each step computes a link's state from the state of the previous link.
 
-    If `own` is True, velocities and accelerations are expressed in each link's own axes; else in world axes.
+    Velocities and accelerations are expressed in each link's own axes if `own` is True, and in world axes
+    otherwise.
     """
 
     eq: Any

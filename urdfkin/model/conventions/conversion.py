@@ -63,7 +63,7 @@ class _FreeJoint:
 
 
 class Conversion:
-    """Names of one robot's coordinates in another program, and conversions between urdfkin and this program.
+    """Names of one robot's coordinates in another program, and conversions between urdfkin and the program.
 
     `joints` replaces the convention's order of the joints. A wrong order or a repeated joint name raises
     InputError. An unknown joint raises UnknownNameError.
@@ -138,7 +138,7 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _follows(self, i: int) -> bool:
-        """Return whether a joint's value determines its coordinate; a mimic multiplier of 0 prevents this."""
+        """Return whether a joint's value determines a coordinate; false for a mimic multiplier of 0."""
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
 
@@ -712,7 +712,7 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each entry of urdfkin's vector, return a number's index, if possible not a mimic joint's."""
+    """Return, for each entry of urdfkin's vector, the index of a number that determines the entry."""
     return [
         min((k for k, x in enumerate(numbers) if x.at == at and x.factor), key=lambda k: numbers[k].copy)
         for at in range(count)
@@ -736,5 +736,5 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 
 
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
-    """Insert an axis before the last two if the Jacobian contains several frames."""
+    """Insert an axis for frames into M (..., k, l) if the Jacobian contains several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

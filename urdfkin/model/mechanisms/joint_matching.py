@@ -135,7 +135,7 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Sort joints of B that the user did not match by similarity to `e`, after B moves by X (4, 4)."""
+        """Sort joints of B by similarity to `e`, after B moves by X; omit joints that the user matched."""
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
         ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []

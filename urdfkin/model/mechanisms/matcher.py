@@ -639,7 +639,7 @@ def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignme
 
 
 def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Repeat the search with larger tolerances if all axes of A and B differ slightly, so that no axes agree.
+    """Repeat the search with larger tolerances if all axes of A and B differ slightly.
 
     The new choices are then used with the normal tolerance, so that the result contains the small
     differences.

@@ -412,8 +412,10 @@ class MatchedJoints:
         other: Screw of B's joint, with the sign convention of `axis`; the same object if the screws agree.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the frames' origins of planar or floating joints.
-        unlike: "a" or "b" if only the joint of A or of B is fixed, "kind" if the kinds differ, else "".
-        conversion: Converts A's coordinates of a planar or floating joint to B's; None if equal.
+        unlike: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds differ;
+            else "".
+        conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
+            equal.
     """
 
     a: int
@@ -534,8 +536,8 @@ class Alignment:
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield two joint pairs (a, b) and (c, d) for which (a, d) and (c, b) are possible too.
 
-        The names of a and c occur neither in B nor in `given`. Each pair, or a joint or link after it,
-        differs.
+        The names of a and c occur neither in B nor in `given`. Each of the two pairs differs, or a joint or
+        link after the pair differs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -743,7 +745,8 @@ class _VariablesBuilder:
 
         The constants depend on zero offsets, which urdfkin computes from poses. In a pose, the rounding
         errors of all joints of the path add up, so the tolerance for the constants is the sum of these
-        errors. The slopes do not depend on zero offsets: their tolerance is the rounding error of one joint.
+        errors. The slopes do not depend on zero offsets, so the tolerance for the slopes is the rounding
+        error of one joint.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
@@ -753,7 +756,7 @@ class _VariablesBuilder:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
-        """Return the range of each variable: the intersection of the limits of all joints that it moves.
+        """Return the range of each variable: the intersection of the limits of the joints that depend on it.
 
         If A's limits and B's limits do not intersect, the range consists of A's limits. The limits of a mimic
         joint do not count, because a mimic joint follows its rule even beyond its limits.

@@ -195,7 +195,7 @@ def point(grid: Grid, p: FloatArray) -> Support:
 def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
     """Return the corners of a polygon that contains the arc of the unit circle from angle `low` to `high`.
 
-    Each corner is a pair: its angle (rad) and its distance from the circle's centre.
+    Each corner is a pair of an angle (rad) and a distance from the circle's centre.
     """
     if high - low >= _FULL_TURN:
         half = math.pi / segments
@@ -221,8 +221,8 @@ def upper_bounds(
     """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
     The bounds hold for all joint values within the limits. The bounds are 0 if nothing differs on the path.
-    They are inf if the difference grows without bound with the value of an unlimited joint, or if two matched
-    joints are of different kinds.
+    The bounds are inf if two matched joints are of different kinds, or if the difference grows without bound
+    with the value of an unlimited joint.
     """
     steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -256,7 +256,7 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Bound the angle (rad) between A and B by a sum: the largest angle that each difference can cause."""
+    """Bound the angle (rad) between A and B by the sum of the largest angles of all differences."""
     total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.before)[0]
@@ -506,7 +506,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
 ) -> float:
-    """Return the largest length of d at the base; `vectors` contains d and y at the last joint."""
+    """Bound the length of d at the base; `vectors` contains d and y at the last joint."""
     vectors = after_constant_motion(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -519,7 +519,7 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return the derivatives of d and y (module docstring) with respect to a joint's value, without L."""
+    """Return the derivatives of d and y (module docstring) by a joint's value, before the motion L."""
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -530,7 +530,7 @@ def _derivatives(
 def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
     """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
 
-    If u and u' differ, their difference is added to the bound on u x d.
+    The bound on u x d includes the terms (u' - u) x (Y - o') and u x (o - o') of the module docstring.
     """
     G, axis, other = d.grid.points, step.axis, step.other
     by_axes = 0.0
