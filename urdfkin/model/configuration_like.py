@@ -144,7 +144,7 @@ class CoordinateLayout:
             raise InputError(
                 f"no value for {listed(missing)}",
                 where=where,
-                remedy=f"give a value for each, or begin with a pose: {begin}",
+                remedy=f"give a value for every name, or write the name of a pose first: {begin}",
             )
         shapes = [x.shape for x in found.values()]
         try:
@@ -190,7 +190,7 @@ class CoordinateLayout:
         other = unit is not None and found.unit not in (None, unit)
         if other or found.per not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
-            per = ("", ", or these per s", ", or these per s^2")[order]
+            per = ("", ", or these units per s", ", or these units per s^2")[order]
             hint = f"use {kinds}{per}"
             raise InputError("wrong unit", where=where, found=repr(text.strip()), remedy=hint)
         return value

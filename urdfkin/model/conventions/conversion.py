@@ -646,7 +646,7 @@ class Conversion:
         if (name := next(copies, None)) is not None:
             raise InputError(
                 f"{self.convention.title or self.convention.name} has a Jacobian column for each mimic"
-                " joint, but urdfkin adds it to that of the mimicked joint",
+                " joint, but urdfkin adds this column to the mimicked joint's column",
                 where=f"joint {name}",
                 remedy="load with mimic=False (--no-mimic)",
                 question=QuestionsSection.MIMIC_JOINTS,
