@@ -101,10 +101,7 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the ranges of `own_ranges`, narrowed so that all mimic joints are within their limits.
-
-    If this is impossible for a joint, the joint's range is not narrowed.
-    """
+    """Narrow `own_ranges` so that all mimic joints are within their limits, where this is possible."""
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.allowed for one in narrowed_ranges(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
@@ -180,10 +177,7 @@ _OF_RATES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return the names of the numbers of `q`, with suffixes for planar and floating joints (`base.x`).
-
-    If another joint has the name `base.x`, the name is `base:x`.
-    """
+    """Return the names of the numbers of `q`, with suffixes such as `.x` for a floating joint."""
     return tuple(name for name, _ in _names_and_units(tree, _OF_Q))
 
 
@@ -639,7 +633,6 @@ def special(tree: KinematicTree) -> FloatArray:
 
 
 def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
-    """Return random motions of the root link, with velocities and accelerations as in `draw`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]

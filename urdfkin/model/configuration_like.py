@@ -178,7 +178,6 @@ class CoordinateLayout:
         return UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
 
     def _number(self, text: str, where: str, unit: str | None) -> float:
-        """Return one number in SI units; raise InputError for an invalid number or a wrong unit."""
         found = parse_quantity(text)
         value = parse_float(text) if found is None else found.value
         if value is None:
@@ -198,8 +197,6 @@ class CoordinateLayout:
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
     """Return text or a mapping unchanged, a table with labels as a mapping, and None for other values.
-
-    A label that occurs twice, or a list of tables with labels, raises InputError.
 
     >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
     (None, 'ready', {'elbow': 0.5})

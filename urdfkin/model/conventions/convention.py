@@ -62,7 +62,6 @@ class JointRule:
     """The rule that converts a joint's value to another program's value: `factor * value + zero`.
 
     Attributes:
-        name: The joint's name in the target program. None means the name in the URDF.
         unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
             unit.
     """
@@ -74,7 +73,6 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """Number of units in one rad or m, multiplied by `sign`; None if `unit` is None."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
@@ -278,7 +276,6 @@ def spelled(name: str, how: str) -> str:
 
 
 def spellings(name: str) -> frozenset[str]:
-    """Return a name as programs write it in USD, and the name itself."""
     return frozenset(spelled(name, how) for how in ("urdf", "usd", "identifier", "isaacsim"))
 
 

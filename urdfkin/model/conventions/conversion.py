@@ -172,10 +172,7 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
     ) -> list[int]:
-        """Return the joints in order of their depth in the tree; sort siblings by their keys.
-
-        If `merged` is True, links that are connected by fixed joints count as one link.
-        """
+        """Sort joints by depth, then by key; `merged` merges links that fixed joints connect."""
 
         def below(link: int) -> list[int]:
             found, links = list[int](), [link]
@@ -530,10 +527,7 @@ class Conversion:
         return found
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6).
-
-        If the joint's velocity v is given, return the time derivative of the block.
-        """
+        """Return a joint's block of `matrix`, (..., 3, 3) or (..., 6, 6); with v, the block's time derivative."""
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle = q[..., block.q + 2]
@@ -620,11 +614,7 @@ class Conversion:
         result: FloatArray,
         jacobian: Callable[[], FloatArray],
     ) -> FloatArray:
-        """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
-
-        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. An undefined conversion raises
-        InputError.
-        """
+        """Convert a quantity to the target program; `ours` is q, or q and v, or q, v and a."""
         if quantity == "placement":
             return result
         if quantity in ("velocity", "acceleration"):
@@ -677,11 +667,7 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that converts "q" or "v" from convention `start` to `end`; None if there is none.
-
-    There is no formula, for example, if only one convention stores the cosine and the sine of an angle, or if
-    the two conventions express a base velocity in different frames.
-    """
+    """Return the formula that converts "q" or "v" between two conventions; None if there is no formula."""
     if what == "q":
         if start.convention.continuous != end.convention.continuous and (start.has_pairs or end.has_pairs):
             return None

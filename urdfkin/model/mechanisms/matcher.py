@@ -429,7 +429,6 @@ class MechanismMatcher:
         return replace(step, offset=with_bodies[0], before=back @ K @ place.G), *with_bodies[1:]
 
     def _exact_pose(self, place: BodyPair, there: BodyPair) -> FloatArray | None:
-        """Return the pose `XC` after two joints if the subtrees match exactly, else None."""
         if self.exact is None:
             return None
         X = self.exact.pose_after(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
@@ -516,7 +515,6 @@ def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
 
 
 def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
-    """Return the body of `other` that shares most link names with the root body of `one`."""
     names = {one.labels[link] for link in one.bodies[0]}
     shared = [len(names & {other.labels[k] for k in body}) for body in other.bodies]
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None

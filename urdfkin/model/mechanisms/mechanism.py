@@ -72,10 +72,7 @@ def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 
 
 def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
-    """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
-
-    The axis of a prismatic joint has only a direction, so its shift is 0.
-    """
+    """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m)."""
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
     if turns:
@@ -312,7 +309,6 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """Yield all orders of `run` that give the same motion, beginning with `run`."""
         if not run:
             yield []
         for k, edge in enumerate(run):
@@ -588,7 +584,7 @@ class AlignmentChoices:
     """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
-        base: Links of A and B at which the search starts. None: the search chooses bodies by link names.
+        base: Links of A and B at which the search starts; None if the search chooses its first bodies.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: (`sense`, `offset`) of `MatchedJoints`, by the joint's name in A; a missing joint has (1, 0.0).
         orders: Each entry lists some consecutive joints of B in their new order.
