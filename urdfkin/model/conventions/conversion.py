@@ -527,7 +527,7 @@ class Conversion:
         return found
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return a joint's block of `matrix`, (..., 3, 3) or (..., 6, 6); with v, the block's time derivative."""
+        """Return a joint's block (..., k, k) of `matrix`; with v, return the time derivative of the block."""
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle = q[..., block.q + 2]
