@@ -110,7 +110,7 @@ MISTAKES = {
         f"velocity panda --q {NAMED}", "--q: no value for panda_joint2, panda_joint3, panda_joint5, panda",
     ),
     "a pose that lacks": (
-        f"velocity panda --q {NAMED}", "or write the name of a pose first: 'neutral, panda_joint1=...'",
+        f"velocity panda --q {NAMED}", "or begin with a configuration: 'neutral, panda_joint1=...'",
     ),
     "no such pose": ("velocity panda --q raedy", "--q: unknown pose 'raedy'; did you mean ready?"),
     "Pinocchio's numbers": (

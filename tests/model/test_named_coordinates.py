@@ -64,7 +64,7 @@ def test_each_notation_gives_the_same_bits(text: Any, arm: Robot) -> None:
         ("0,0", "q: 3 numbers are expected (lift, shoulder, elbow): found 2, none for elbow"),
         ("0,0,0,0", "q has that length: robot.from_pinocchio(q, mimic=False) converts it to urdfkin's"),
         ("0,0,0,0", "load with mimic=False"),
-        ("shoulder=1,lift=0", "q: no value for elbow; give a value for every name, or write"),
+        ("shoulder=1,lift=0", "q: no value for elbow; give a value for each joint, or begin with"),
         ("elbo=1,shoulder=1,lift=0", "unknown coordinate 'elbo'; did you mean elbow?"),
         ("echo=1,elbow=1", "'echo' is not a coordinate; it mimics elbow: give that joint's value"),
         ("elbow=1,elbow=2,shoulder=1,lift=0", "found 'elbow' twice"),

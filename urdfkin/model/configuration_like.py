@@ -71,6 +71,10 @@ class CoordinateLayout:
         >>> arm = CoordinateLayout("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
         >>> arm.read("neutral, elbow=2").tolist(), arm.read({"elbow": [1, 2], "shoulder": 0.5}).tolist()
         ([0.0, 2.0], [[0.5, 1.0], [0.5, 2.0]])
+        >>> arm.read("elbow=30deg")
+        Traceback (most recent call last):
+        urdfkin.errors.InputError: q: no value for shoulder; give a value for each joint, or begin \
+with a configuration: 'neutral, elbow=...'
         """
         where = where or self.what
         if not isinstance(value, Mapping) and self._is_in_order(cells := _cells(value)):
@@ -144,7 +148,7 @@ class CoordinateLayout:
             raise InputError(
                 f"no value for {listed(missing)}",
                 where=where,
-                remedy=f"give a value for every name, or write the name of a pose first: {begin}",
+                remedy=f"give a value for each joint, or begin with a configuration: {begin}",
             )
         shapes = [x.shape for x in found.values()]
         try:
