@@ -40,7 +40,7 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest end of a sampled range (rad or m), also for joints without limits.
+#: Largest absolute value of an end of a sampled range (rad or m); this value also replaces a missing limit.
 WIDEST = 10.0
 
 
@@ -70,6 +70,11 @@ class NarrowedRange:
 
 
 def range_words(ends: tuple[float, float]) -> str:
+    """Return the two ends of a range as text.
+
+    >>> range_words((-0.005, 0.055))
+    '-0.005 to 0.055'
+    """
     return f"{ends[0]:.6g} to {ends[1]:.6g}"
 
 
@@ -242,7 +247,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return a hint for each length that q, v or a has in Pinocchio but not in urdfkin."""
+    """Return hints for wrong lengths: the lengths in Pinocchio, and the length with all mimic joints."""
     has_mimic_joints = any(joint.mimic for joint in tree.joints)
     leave_out = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -280,7 +285,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    In `ready`, a joint without a value in the tree is at 0, or in the middle of its range if 0 is outside.
+    In `ready`, a joint without a value in the tree is at 0. If the joint's range excludes 0, the joint is in
+    the middle of the range.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -300,9 +306,10 @@ def locked_values(
 ) -> dict[str, float]:
     """Return the value (rad or m) of each joint to lock, by name, in the order of the tree.
 
-    `joints` lists the joints that stay movable. Every other joint is locked, by default at 0, or at its value
-    in the pose at the start of `lock`. An unknown name raises UnknownNameError. Any other invalid lock, for
-    example a value outside the limits, raises InputError.
+    Without `joints`, only the joints in `lock` are locked. `joints` lists the joints that stay movable. Every
+    other joint is then locked at its value in `lock`, or at 0 if `lock` has no value. If `joints` is given,
+    `lock` may begin with the name of a pose, whose values then replace 0. An unknown name raises
+    UnknownNameError. Any other invalid lock, for example a value outside the limits, raises InputError.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.named(lock, "lock")
@@ -427,7 +434,7 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a message for each joint or mimic joint that exceeds its limits anywhere in `q`."""
+    """Return a message for each joint, also a mimic joint, that exceeds its limits anywhere in `q`."""
     return [words for _, words in _violations(tree, q)]
 
 
@@ -591,8 +598,8 @@ class Samples:
 def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
     """Return random configurations (n, nq), uniform within the ranges of `coordinate_ranges`.
 
-    Planar and floating joints take any orientation, and positions within +-2 m. A missing limit, or a limit
-    beyond +-10 (rad or m), is replaced by +-10.
+    Continuous joints take any angle. Planar and floating joints take any orientation, and positions within
+    +-2 m. For other joints, a missing limit, or a limit beyond +-10 (rad or m), is replaced by +-10.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
@@ -633,6 +640,7 @@ def special(tree: KinematicTree) -> FloatArray:
 
 
 def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
+    """Return random motions of the root link, with velocities and accelerations as in `draw`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]

@@ -85,7 +85,11 @@ with a configuration: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values of a text or mapping by name, and the pose that begins the text, or None."""
+        """Return the values of a text or mapping by name, and the pose that begins the text, or None.
+
+        >>> CoordinateLayout("q", ("elbow",), ("rad",)).named("elbow=30deg", "q")
+        ({'elbow': '30deg'}, None)
+        """
         if isinstance(value, Mapping):
             return dict(value), None
         cells, pose = _cells(value), None
@@ -226,7 +230,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
 
 
 def _labels(value: object) -> list[Any]:
-    """Return the column names of a table; an empty list if the names are 0, 1, 2, ..."""
+    """Return the labels of a table, such as column names; an empty list if the labels are 0, 1, 2, ..."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []
@@ -276,4 +280,5 @@ def _pair(cell: str) -> tuple[str | None, str]:
 
 
 def _is_word(text: str) -> bool:
+    """Return whether a text can be the name of a pose, because the text does not look like a number."""
     return text[:1].isalpha() and "=" not in text and parse_quantity(text) is None and remedy(text) is None

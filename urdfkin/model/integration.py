@@ -87,7 +87,10 @@ def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _screw(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the linear part, and the angular part (vector or quaternion), of coordinates or a velocity."""
+    """Return the linear and angular part of a planar or floating joint's coordinates or velocity.
+
+    The angular part is a vector (..., 3), or the quaternion (..., 4) in a floating joint's coordinates.
+    """
     if joint.kind is JointKind.FLOATING:
         return own[..., :3], own[..., 3:]
     if joint.kind is not JointKind.PLANAR:

@@ -1,6 +1,7 @@
 """The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
-The attribute `Recursion.eq` contains the textbook's equations for one kind of number.
+The attribute `Recursion.eq` contains the textbook's equations for one kind of number
+(`urdfkin.kinematics.arithmetic.bound`).
 """
 
 from __future__ import annotations

@@ -89,7 +89,11 @@ def _place(letter: str, at: int, count: int) -> str:
 
 
 def axis_words(axis: Sequence[float]) -> str:
-    """Return a joint's axis as text: `z`, `-x`, or three numbers if it is not along a frame axis."""
+    """Return a joint's axis as text: `z`, `-x`, or three numbers if the axis is not along a frame axis.
+
+    >>> axis_words((0.0, -1.0, 0.0)), axis_words((0.0, 0.6, 0.8))
+    ('-y', '0 0.6 0.8')
+    """
     if sorted(map(abs, axis)) == [0.0, 0.0, 1.0]:
         k = next(k for k, x in enumerate(axis) if x)
         return f"{'-' if axis[k] < 0.0 else ''}{'xyz'[k]}"
@@ -97,6 +101,11 @@ def axis_words(axis: Sequence[float]) -> str:
 
 
 def rule_words(leader: str, factor: float, offset: float) -> str:
+    """Return the mimic rule of a joint as text.
+
+    >>> rule_words("thumb", 2.0, -0.1), rule_words("thumb", 1.0, 0.0)
+    ('2 * thumb -0.1', 'thumb')
+    """
     return (f"{factor:g} * " if factor != 1.0 else "") + leader + (f" {offset:+g}" if offset else "")
 
 

@@ -107,7 +107,11 @@ _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
 def far_outside(lower: float, upper: float) -> tuple[float, float]:
-    """Return the two values beyond which a joint value is far outside its limits."""
+    """Return the two values beyond which a joint value is far outside its limits.
+
+    >>> far_outside(-2.0, 2.0), far_outside(-float("inf"), 2.0)
+    ((-3.0, 3.0), (-inf, 2.0))
+    """
     far = max(_OUTSIDE, _OF_RANGE * (upper - lower)) if math.isfinite(upper - lower) else 0.0
     return lower - far, upper + far
 
@@ -191,7 +195,10 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lock:
-    """A joint of the URDF that is fixed; `q` (rad or m) is the coordinate that would move the joint."""
+    """A joint of the URDF that the user fixed at a value.
+
+    `q` (rad or m) is the joint's coordinate; for a mimic joint, the coordinate of the mimicked joint.
+    """
 
     joint: Joint
     q: float

@@ -86,7 +86,11 @@ class JointRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Convention:
-    """The layout of q, v, a, Jacobians and six-vectors in another program (see conventions.toml)."""
+    """The layout of q, v, a, Jacobians and six-vectors in another program.
+
+    The default values of the attributes are urdfkin's own convention. `conventions.toml` explains each
+    attribute.
+    """
 
     name: str
     title: str = ""
@@ -276,11 +280,20 @@ def spelled(name: str, how: str) -> str:
 
 
 def spellings(name: str) -> frozenset[str]:
+    """Return a name as programs write it in USD, and the name itself.
+
+    >>> sorted(spellings("arm-2"))
+    ['arm-2', 'arm_2', 'tn__arm2_g6']
+    """
     return frozenset(spelled(name, how) for how in ("urdf", "usd", "identifier", "isaacsim"))
 
 
 def identifier(name: str) -> str:
-    """Return a name as OpenUSD's `TfMakeValidIdentifier` does: other characters become "_"."""
+    """Return a name as OpenUSD's `TfMakeValidIdentifier` does: each byte that is not allowed becomes "_".
+
+    >>> identifier("1"), identifier("arm-2")
+    ('_', 'arm_2')
+    """
     octets = name.encode().decode("latin-1")
     return re.sub(r"^[^A-Za-z_]|[^A-Za-z0-9_]", "_", octets) or "_"
 

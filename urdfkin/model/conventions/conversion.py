@@ -65,8 +65,8 @@ class _FreeJoint:
 class Conversion:
     """Names of one robot's coordinates in another program, and conversions between urdfkin and the program.
 
-    `joints` replaces the convention's order of the joints. A wrong order or a repeated joint name raises
-    InputError. An unknown joint raises UnknownNameError.
+    `joints` replaces the convention's order of the joints, and is required if the convention has no order. A
+    wrong order or a repeated joint name raises InputError. An unknown joint raises UnknownNameError.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -172,10 +172,14 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
     ) -> list[int]:
-        """Sort joints by depth, then by key; `merged` merges links that fixed joints connect."""
+        """Return the joints breadth first; siblings are in the order of their keys.
+
+        If `merged` is true, links that fixed joints connect count as one link.
+        """
 
         def below(link: int) -> list[int]:
             found, links = list[int](), [link]
+            # The loop also visits the links that it appends to the list.
             for parent in links:
                 for i in children.get(parent, []):
                     # A locked joint is still a moving joint in the target program.
@@ -516,7 +520,10 @@ class Conversion:
         return found
 
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
-        """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool."""
+        """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
+
+        If several numbers of v_tool belong to one number of v, the columns of all but one of them are 0.
+        """
         if not self._blocks:
             found = np.zeros((self.tree.nv, self.nv))
             found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
@@ -556,7 +563,7 @@ class Conversion:
     # -- results -------------------------------------------------------------------------------------
 
     def six(self, x: ArrayLike, axis: int = -1) -> FloatArray:
-        """Exchange the linear and angular parts of six-vectors if the target program has angular first."""
+        """Exchange the linear and angular parts of six-vectors if the program has the angular part first."""
         array = np.asarray(x, dtype=np.float64)
         if array.ndim < 1 or array.shape[axis] != 6:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
@@ -569,7 +576,8 @@ class Conversion:
     def columns(self, q: Given, J: ArrayLike) -> FloatArray:
         """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
-        If the target program has a column for a mimic joint and for its mimicked joint, InputError is raised.
+        The rows must have the same meaning in both conventions, such as derivatives of Euler angles. If
+        several columns of the target program belong to one column of J, InputError is raised.
         """
         self._demand_own_columns()
         array = np.asarray(J, dtype=np.float64)
@@ -667,7 +675,15 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that converts "q" or "v" between two conventions; None if there is no formula."""
+    """Return the formula that converts "q" or "v" between two conventions; None if there is no formula.
+
+    There is no formula between an angle and its cosine and sine, or between velocities in different frames.
+
+    >>> import urdfkin
+    >>> robot = urdfkin.load("a1", verify=False)
+    >>> reordering("q", robot.convention("isaaclab"), robot.convention("mujoco")).index
+    (1, 5, 9, 0, 4, 8, 3, 7, 11, 2, 6, 10)
+    """
     if what == "q":
         if start.convention.continuous != end.convention.continuous and (start.has_pairs or end.has_pairs):
             return None
@@ -698,7 +714,10 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """Return, for each entry of urdfkin's vector, the index of a number that determines the entry."""
+    """For each entry of urdfkin's vector, return the index of the number that determines the entry.
+
+    A mimic joint's number is used only if no other number is available.
+    """
     return [
         min((k for k, x in enumerate(numbers) if x.at == at and x.factor), key=lambda k: numbers[k].copy)
         for at in range(count)

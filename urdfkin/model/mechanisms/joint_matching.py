@@ -3,9 +3,11 @@
 Joints at two matched bodies are paired by the names that the user gives, by equal names, or by geometry.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. The value of the joint before a subtree does not matter, because the joint's zero offset
-can compensate any value. Therefore, the result depends only on the two joints before the subtrees, and on the
-pose of one joint's axis relative to the other.
+the other subtree. Links with equal labels must also coincide. The multipliers of the mimic rules must
+correspond, unless `Congruence.ignore_rules` was called. The value of the joint before a subtree does not
+matter, because the joint's zero offset can compensate any value. Therefore, the result depends only on the
+two joints before the subtrees, and on the pose of one joint's axis relative to the other. `Congruence` stores
+the result of each such case, so that the search is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -123,7 +125,7 @@ class Pairing:
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each axis at A's body coincides with an axis of B, moved by X."""
+        """Return whether each axis at A's body coincides with an axis at B's body, after B moves by X."""
         return all(
             any(
                 family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
@@ -135,7 +137,10 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Sort joints of B by similarity to `e`, after B moves by X; omit joints that the user matched."""
+        """Return the joints of B, most similar to `e` first; omit joints that the user matched.
+
+        The motion X (4, 4) moves B from its zero configuration to the pose of A.
+        """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
         ranked = sorted((self._unlikeness(one[0][1], other), j) for j, other in others) if one else []
@@ -227,7 +232,10 @@ Both = tuple[_Some, _Some]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axis:
-    """A joint's axis in the zero configuration, and a reference line, usually the previous joint's axis."""
+    """A joint's axis in the zero configuration, and a reference line, usually the previous joint's axis.
+
+    For a prismatic joint, only the direction of `screw` has a meaning.
+    """
 
     screw: Screw
     turns: bool
@@ -237,7 +245,10 @@ class Axis:
         return Axis(self.screw.moved(T), self.turns, self.reference.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the coordinate (m) along u of the reference line's point nearest to the axis, or None."""
+        """Return the coordinate (m) along u of the reference line's point nearest to the axis.
+
+        The result is None for a prismatic joint, and for parallel lines.
+        """
         s, start = self.screw, self.reference
         along_s = float(start.direction @ s.direction)
         if not self.turns or 1.0 - along_s**2 < ALONG**2:
@@ -248,7 +259,7 @@ class Axis:
 
 
 def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield candidate values (rad or m) of a joint with axis u that moves `theirs` to `ours`."""
+    """Yield values (rad or m) for which a joint with the axis u may move the axis `theirs` to `ours`."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -284,6 +295,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (ours, theirs), before, after in firsts:
         lines = ours.screw, theirs.screw
+        # Without later axes, other axes of the body determine the pose, such as a drone's rotor axes.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (theirs.screw, theirs.screw.reversed()):
             K = smallest_motion(start, ours.screw, turns=True)[0]
@@ -348,6 +360,10 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
+    """Return the first pairs of revolute axes, each with the pairs of axes before and after this pair.
+
+    If only pairs of prismatic axes follow, the function returns the last pair.
+    """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
         pair, beyond = (
@@ -378,7 +394,7 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 
 
 #: Function that proposes poses of B's body after two matched joints.
-#: The arguments are the bodies after the joints, the joints, and the pose of B's body before the joint.
+#: The arguments are the bodies after the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
 #: Maximum number of joint pairs at two bodies that the search for exact matches tries.
@@ -397,6 +413,8 @@ class _Match:
 
 
 class Congruence:
+    """Find subtrees of A and B that match exactly (module docstring)."""
+
     def __init__(
         self, a: Mechanism, b: Mechanism, pairing: Pairing, tolerance: Tolerance, poses: Poses
     ) -> None:
@@ -479,7 +497,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return the coordinates that move two joints, and the ratio of their velocities."""
+        """Return the coordinates that move two joints, and the ratio of the coordinates' velocities."""
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
             return {}
@@ -510,7 +528,10 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of the joint leads from the pose X to the pose `other`."""
+        """Return whether a motion of the joint leads from the pose X to the pose `other`.
+
+        For a planar joint, the result is true only if the two poses are equal.
+        """
         kind = self.a.joint(e).kind
         if kind.nq > 1:
             return family(kind) == "floating" or self.tolerance.holds(*pose_difference(X, other))

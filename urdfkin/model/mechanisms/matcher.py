@@ -4,10 +4,10 @@
 the matcher chooses the sign (`sense`) and the zero offset for which most later links and axes of B coincide
 with those of A. `align` compares the results for several first bodies and joint orders.
 
-If no axis and no link frame follows a joint, only a mimic rule can determine its zero offset. Let v = m w + c
-be a mimic rule of A, and let v' = m' w' + c' be the corresponding rule of B. The two rules are equivalent if
-inserting v' = s v + o and w' = s' w + o' into the second rule gives the first rule. For a revolute joint, a
-multiple of a full turn may always be added to o.
+If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset. Let v =
+m w + c be a mimic rule of A, and let v' = m' w' + c' be the corresponding rule of B. The two rules are
+equivalent if inserting v' = s v + o and w' = s' w + o' into the second rule gives the first rule. For a
+revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ DEEPEST = 200
 AHEAD = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
-#: Of two scores with equally many matches, the better has less than this fraction of the other's difference.
+#: If two scores have equally many matches, their largest differences are compared.
+#: The better score has less than this fraction of the other score's difference.
 TWICE_AS_WELL = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -68,7 +69,7 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """Remaining number of joint pairs that a search may compare ahead of the current joint."""
+    """Remaining number of joint pairs that one or several matchers together may compare ahead."""
 
     left: int
 
@@ -93,7 +94,8 @@ class MechanismMatcher:
     """Match the joints of two mechanisms, from the links `base` to the ends of all branches.
 
     Without `choices`, the matcher finds the choices for which most joints and links agree. Without `base`,
-    the matcher chooses the first bodies by their link names.
+    the matcher starts at A's root body and the body of B that shares most link names with A's root body. If
+    no body of B shares a link name, the matcher tries all bodies of B.
     """
 
     def __init__(
@@ -250,7 +252,7 @@ class MechanismMatcher:
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
     def _poses_after(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """Yield possible poses of B's body after a joint, for the pose X of the body before."""
+        """Yield possible poses of B's body after a joint, for the pose X of B's body before the joint."""
         there = BodyPair(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -281,7 +283,10 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, distance))
 
     def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """If no links match, return two links of the bodies as different end-effector frames."""
+        """If no links match, return two links as different end-effector frames.
+
+        The result is None if links match, or if the other model has all link names of a body.
+        """
         ours, theirs = self._own_links(place)
         if matched or not ours or not theirs:
             return None
@@ -384,8 +389,9 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        `plane` is one possible N of a planar joint; every possible N is the product of `plane` and a planar
-        pose.
+        `at` (4, 4) is the frame of A's joint after the motion G. `home_b` (4, 4) is the frame of B's joint in
+        B's zero configuration. `plane` is one possible N of a planar joint, and None for a floating joint.
+        Every possible N of a planar joint is the product of `plane` and a planar pose.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -453,13 +459,18 @@ class MechanismMatcher:
     def _best(
         self, choices: Iterable[tuple[_Choice, BodyPair]], depth: int
     ) -> tuple[_Choice, BodyPair, Score]:
-        """Return the choice for which most links and axes agree; if equal, compare the next joints."""
+        """Return the choice for which most links and axes agree.
+
+        If several choices are equally good, the method also compares the next joints. For example, two axes
+        that intersect at right angles allow two poses of B, so a third axis must decide.
+        """
         scored = list[tuple[_Choice, BodyPair, Score]]()
         for choice, place in choices:
             if any(self.tolerance.holds(*pose_difference(known.XC, place.XC)) for _, known, _ in scored):
                 continue
             score = self._score(place)
             scored.append((choice, place, score))
+            # If all axes and links agree, no other choice can agree better.
             if not score[1] and self.pairing.links(*place.bodies):
                 return scored[-1]
         best = _best_of(scored)
@@ -507,6 +518,7 @@ class MechanismMatcher:
 
 
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
+    """For each body, return the numbers of bodies and links in its subtree, including the body itself."""
     sizes = [(1, len(links)) for links in mechanism.bodies]
     for edge in reversed(mechanism.edges):
         bodies, links = sizes[edge.outer]
@@ -554,7 +566,10 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 
 
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest motion between two planes, its tilt (rad) and its shift (m)."""
+    """Return the smallest rotation between two planes, its angle (rad), and a shift of 0 m.
+
+    The signs of the normals and the distance of the planes do not count.
+    """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
     return smallest_motion(
         start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False
@@ -637,10 +652,11 @@ def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignme
 
 
 def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Repeat the search with larger tolerances if all axes of A and B differ slightly.
+    """Return an alignment whose largest difference is less than half that of `best`, or else `best`.
 
-    The new choices are then used with the normal tolerance, so that the result contains the small
-    differences.
+    If all axes of A and B differ slightly, no axes agree, so the normal search cannot find the right choices.
+    This function repeats the search with larger tolerances. The new choices are then used with the normal
+    tolerance, so that the result contains the small differences.
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_AHEAD)
     size = size_of(a, b)

@@ -27,9 +27,10 @@ poses differ, a constant rigid motion L describes the change of G. The link pose
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
 If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree
-everywhere, the two models have the same motion. If A and B differ somewhere, their motions differ, with one
-exception. If two revolute joints have the same line as axis, only the sum of their angles matters for the
-links after them.
+everywhere, the two models have the same motion. If A and B differ somewhere, their motions differ, with few
+exceptions. If two revolute joints have the same line as axis, only the sum of their angles matters for the
+links after them. If two consecutive prismatic joints are parallel, only the sum of their displacements
+matters.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
 is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
@@ -72,7 +73,11 @@ def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 
 
 def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
-    """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m)."""
+    """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
+
+    The motion contains no rotation about the axis and no shift along the axis, because they only change the
+    joint's zero. The axis of a prismatic joint has only a direction, so the shift is 0.
+    """
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
     if turns:
@@ -94,7 +99,7 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between two poses."""
-    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # floats are faster than small arrays
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # Python floats are faster than small NumPy arrays
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
@@ -123,9 +128,10 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointTransform:
-    """The conversion of a planar or floating joint: P_b = before P_a behind, with (4, 4) matrices.
+    """The conversion of a planar or floating joint: P_b = before P_a behind.
 
-    If the joint is reversed in one model (`back`), the conversion is P_b = before P_a^-1 behind.
+    `before` and `behind` are the rigid motions M and N (4, 4) of the module docstring. If the joint is
+    reversed in one model (`back`), the conversion is P_b = before P_a^-1 behind.
     """
 
     before: FloatArray
@@ -138,7 +144,7 @@ class JointTransform:
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid, and the joint reaches M P N for two test poses P."""
+        """Return whether M and N are rigid motions, and the joint can reach M P N for two test poses P."""
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _AWAY)
@@ -225,10 +231,10 @@ class Mechanism:
     Args:
         tree: The robot.
         separating: Indices of joints that are fixed in this model and move in the other model.
-        labels: A label for each link, by default its name. Links of two models with equal labels are paired.
+        labels: A label for each link, by default the link's name. Links with equal labels are paired.
 
     Attributes:
-        homes: (4, 4) pose of each link in the zero configuration.
+        homes: (4, 4) pose of each link in the root frame, in the zero configuration.
         orders: Each entry lists consecutive joints whose order `reordered` changed, in their new order.
         lengths: Length (m) of the path from the root to each link.
     """
@@ -264,7 +270,10 @@ class Mechanism:
         return known
 
     def reordered(self, names: Sequence[str]) -> Mechanism:
-        """Return a copy with joints in another order; remove links whose pose depends on the order."""
+        """Return a copy with joints in another order; remove links whose pose depends on the order.
+
+        `names` lists consecutive joints outwards. The caller must check that the order gives the same motion.
+        """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         other = copy(self)
@@ -298,7 +307,10 @@ class Mechanism:
         return inner.outer == outer.inner and len(self.edges_of[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """For each unbranched sequence of joints, yield all orders that give the same motion."""
+        """For each unbranched sequence of joints, yield all orders that give the same motion.
+
+        The current order comes first.
+        """
         run: list[Edge] = []
         for edge in self.edges:
             if run and self._follows(run[-1], edge):
@@ -348,8 +360,8 @@ class Mechanism:
         """Rounding error of poses that are read from a file (rad, and as a fraction of `size`).
 
         The parser and the writer of the file round each joint's constant transform and axis. A program that
-        merges fixed joints rounds less often, because the program rounds only the product. The error includes
-        the small tilts of Pinocchio's axes (URDF514).
+        merges fixed joints rounds less often, because the program rounds only the product of the joints'
+        transforms. The error includes the small tilts of Pinocchio's axes (URDF514).
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT + WRITTEN + AXES) * joints) + 2.0 * sum(j.tilt for j in self.tree.joints)
@@ -378,8 +390,11 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) and distance (m) between two axes; without `placed`, the distance is 0."""
-    ux, uy, uz = s.direction.tolist()  # floats are faster than small arrays
+    """Return the angle (rad) between two axes, and the distance (m) of the point of `s` from the line `t`.
+
+    Axes with opposite directions count as parallel. If `placed` is false, the distance is 0.
+    """
+    ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
@@ -405,9 +420,9 @@ class MatchedJoints:
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) rigid motion L before B's joint (module docstring), in A's zero configuration.
         axis: Screw of A's joint in the zero configuration, for the motion of the body farther from the base.
-        other: Screw of B's joint, with the sign convention of `axis`; the same object if the screws agree.
+        other: Screw of B's joint, with the sign convention of `axis`; `axis` itself if the screws agree.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
-        shift: Distance (m) between the axes, or between the frames' origins of planar or floating joints.
+        shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
         unlike: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds differ;
             else "".
         conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
@@ -443,7 +458,8 @@ class FramePair:
         end: (4, 4) rigid motion L after the last joint (module docstring), in A's zero configuration.
         tilt: Angle (rad) between the frames of the two links.
         shift: Distance (m) between the origins of these two frames.
-        tool: (4, 4) pose of B's link in A's link if the links are different end-effector frames of a body.
+        tool: (4, 4) pose of B's link in the frame of A's link if the links are different end-effector
+            frames; else the identity.
     """
 
     a: int
@@ -506,7 +522,7 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest nonzero difference (m) of matched axes and of links with child joints."""
+        """Smallest and largest nonzero difference (m) of matched axes and matched links with child joints."""
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
         size = size_of(self.a, self.b)
@@ -623,9 +639,10 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: The value sense * b + offset, which the joint has in B's URDF.
+    #: The value of B's joint as B's URDF defines the value: sense * b + offset.
     written: LinearFunction
-    #: Amount (rad or m) by which the constants' difference exceeds the rounding error of one joint.
+    #: Amount (rad or m) by which the difference of the constants exceeds the rounding error of one joint.
+    #: The amount is 0 if the functions of A and B differ by more than rounding.
     rounding: float = 0.0
 
     @property
@@ -752,10 +769,11 @@ class _VariablesBuilder:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
-        """Return the range of each variable: the intersection of the limits of the joints that depend on it.
+        """Return the range of each variable.
 
-        If A's limits and B's limits do not intersect, the range consists of A's limits. The limits of a mimic
-        joint do not count, because a mimic joint follows its rule even beyond its limits.
+        The range is the intersection of the limits of the joints that the variable moves. If this
+        intersection is empty or a single value, the range consists of A's limits. The limits of a mimic joint
+        do not count, because a mimic joint follows its rule even beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}

@@ -67,9 +67,10 @@ _CORNERS = 64
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Points on a cube with `cells` cells per edge; each point represents a direction.
+    """Grid points on the surface of a cube, with `cells` cells along each edge of the cube.
 
-    `segments` is the number of sides of the polygon that replaces a full circle of directions.
+    Each grid point represents a direction. `segments` is the number of sides of the polygon that replaces a
+    full circle of directions.
     """
 
     cells: int
@@ -221,8 +222,8 @@ def upper_bounds(
     """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
     The bounds hold for all joint values within the limits. The bounds are 0 if nothing differs on the path.
-    The bounds are inf if two matched joints are of different kinds, or if the difference grows without bound
-    with the value of an unlimited joint.
+    The bounds are inf if two matched moving joints are of different kinds, or if the difference grows without
+    bound with the value of an unlimited joint.
     """
     steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -256,7 +257,7 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Bound the angle (rad) between A and B by the sum of the largest angles of all differences."""
+    """Bound the angle (rad) between A and B: add the largest angle that each difference can cause."""
     total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.before)[0]
@@ -519,7 +520,10 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return the derivatives of d and y (module docstring) by a joint's value, before the motion L."""
+    """Return the derivatives of d and y with respect to a joint's value, before the motion L.
+
+    The module docstring defines the symbols.
+    """
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -528,7 +532,7 @@ def _derivatives(
 
 
 def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
-    """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
+    """Return bounds on u x d and u' x (y - o'), with the symbols of the module docstring.
 
     The bound on u x d includes the terms (u' - u) x (Y - o') and u x (o - o') of the module docstring.
     """
