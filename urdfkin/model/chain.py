@@ -1,4 +1,4 @@
-"""A path between two frames as a sequence of joint axes. Denavit-Hartenberg tables are derived from it.
+"""A path between two frames as a sequence of joint axes, the basis of Denavit-Hartenberg tables.
 
 As in section 7.5 of the textbook, joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
 d_{i-1,i} leads from O_{i-1} to O_i. The path may lead from parent to child, from child to parent, or through
@@ -39,15 +39,12 @@ LEAST_SIZE = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainJoint:
-    """One moving joint on a path.
+    """One moving joint on a path; `backwards` means that the path leads from child link to parent link.
 
     Attributes:
-        backwards: Whether the path passes the joint from the joint's child link to its parent link.
         T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this
             frame is the joint's axis, reversed if `backwards`. The pose is relative to the previous joint's
             frame after that joint's motion; for the first joint, relative to the base.
-        limit: None if the joint has no limits.
-        mimic: None if the joint has its own coordinate.
     """
 
     name: str
@@ -238,10 +235,7 @@ class FrameChain(Displayable):
 
 
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
-    """Return the path from the link or joint frame `base` (by default the root) to the frame `tip`.
-
-    A planar or floating joint on the path raises InputError; an unknown name raises UnknownNameError.
-    """
+    """Return the path from `base` to `tip`; a planar or floating joint on the path raises InputError."""
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
     lengths, folded, count = list[float](), list[int](), 0
