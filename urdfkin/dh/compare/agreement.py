@@ -19,7 +19,14 @@ from urdfkin.dh.compare.fit import (
     tip_derivatives,
 )
 from urdfkin.dh.compare.mistakes import MistakeSearch
-from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, TableComparison
+from urdfkin.dh.compare.result import (
+    EXPLAINED,
+    TRAVEL,
+    AbsorbedOffset,
+    CellDifference,
+    TableComparison,
+    has_range,
+)
 from urdfkin.dh.convert import free_tree, link_names, serial_tree, to_convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference
@@ -29,7 +36,7 @@ from urdfkin.model.configuration import values_within
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, is_bounded
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
 #: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
 TOLERANCE = 2e-4
@@ -44,8 +51,6 @@ _LEAST_CHANGE = 1e-10
 _MORE_CELLS = 2
 #: If the tip moves by less than this fraction of the path length, the reach is the path length.
 _FIXED_TIP = 1e-6
-#: Range of a prismatic joint without limits (metres).
-_SLIDE = (-0.5, 0.5)
 #: Half a unit of the last digit (metres or radians) of each cell, for each row.
 Digits = Sequence[Mapping[str, float]]
 
@@ -156,17 +161,18 @@ def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
     """Return random joint values (count, n) and the tip's poses, without mimic rules."""
-    slides = _slides(chain)
-    ranges = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
+    travels = _travels(chain)
+    ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = values_within(ranges, count, seed)
     free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
     return values, free.placement(values)
 
 
-def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
+def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
+    """Return the range (m) of each prismatic joint."""
     limits = {joint.name: joint.limit for joint in chain.joints if not joint.kind.turns}
     return {
-        name: (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
+        name: (limit.lower, limit.upper) if has_range(limit) else (-TRAVEL, TRAVEL)
         for name, limit in limits.items()
     }
 
@@ -268,7 +274,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     """Return an upper bound of a table's tip error (metres, radians) for all joint values.
 
     The bound does not include rounding errors, and mimic rules are ignored. Prismatic joints are within their
-    limits, or within `_SLIDE` if they have no limits.
+    limits, or within `TRAVEL` of zero if they have no limits.
     """
     mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -280,11 +286,11 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 def _free(path: FrameChain, table: DHTable) -> KinematicTree:
     """Return a path as a tree without mimic rules, with the link names of the table."""
-    slides, z = _slides(path), np.array([0.0, 0.0, 1.0])
+    travels, z = _travels(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:
         kind = JointKind.CONTINUOUS if joint.kind.turns else JointKind.PRISMATIC
-        limit = Limit(*slides[joint.name], math.inf, math.inf) if joint.name in slides else None
+        limit = Limit(*travels[joint.name], math.inf, math.inf) if joint.name in travels else None
         joints.append(Joint(joint.name, kind, 0, joint.T_previous_joint, z, limit))
     joints.append(replace(free_tree(table).joints[-1], T_parent_joint=path.T_last_tip))
     return serial_tree(path.robot, link_names(table), joints)

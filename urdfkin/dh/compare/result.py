@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeGuard
 
 import numpy as np
 
@@ -15,12 +16,15 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import QuestionsSection
 from urdfkin.errors.display import Matrix, Table, TextDocument
 from urdfkin.kinematics.roundings import EPS, of_a_fit
+from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
 #: Tip error (rad, or metres per metre of reach) that may remain after the differing cells are corrected.
 #: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
 EXPLAINED = 1e-9
+#: Largest distance (m) from zero that is assumed for a prismatic joint without limits.
+TRAVEL = 0.5
 #: Finest resolution of printed fitted numbers (rad, or metres per metre of reach).
 _FINEST = 1e-12
 #: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
@@ -122,9 +126,9 @@ class TableComparison:
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         metres, radians: Largest errors of the fitted table's tip on the samples.
-        most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all joint
-            values. The bounds do not include rounding errors. A prismatic joint without limits is assumed to
-            be between -0.5 m and 0.5 m.
+        most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all angles,
+            and for all displacements within limits. A prismatic joint without limits is assumed to be within
+            0.5 m of zero. The bounds do not include rounding errors.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
         instead: The cells that would have to change without a fit; empty if this would change too many cells,
             or would not remove the tip error.
@@ -174,13 +178,21 @@ class TableComparison:
 
     @property
     def exact(self) -> bool:
-        """Whether the table is proven to differ from the URDF only by rounding, in every configuration."""
+        """Whether the table is proven to differ from the URDF only by rounding.
+
+        The proof covers the same joint values as `most_metres`.
+        """
         return self.most_metres <= self.rounding * self.reach and self.most_radians <= self.rounding
 
     @property
     def as_written(self) -> bool:
         """Whether the written table, with its base, tool and zeros, equals the URDF up to rounding."""
         return self.written_metres <= self.rounding * self.reach and self.written_radians <= self.rounding
+
+
+def has_range(limit: Limit | None) -> TypeGuard[Limit]:
+    """Return whether a prismatic joint's limits allow more than one value, and are finite."""
+    return is_bounded(limit) and limit.lower < limit.upper
 
 
 def resolution(share: float, radians: float) -> float:
@@ -233,7 +245,10 @@ def _verdict(found: TableComparison) -> list[str]:
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
     verdict = agrees if found.agrees else "DIFFERS"
     error = _tip_error(found.metres, found.radians)
-    proof = f"{found.samples} samples; proven bound for all joint values: {_proven(found)}"
+    values = "for all joint values within limits"
+    if free := [row.joint for row in table.rows if not row.kind.turns and not has_range(row.limit)]:
+        values += f", with {', '.join(free)} within {TRAVEL} m of zero"
+    proof = f"{found.samples} samples; proven bound {values}: {_proven(found)}"
     if found.as_written:
         return [f"The table {verdict} without a fit: {path}: {error}", f"({proof})."]
     if not found.fitted:

@@ -805,7 +805,7 @@ class _VariablesBuilder:
                 if joint.nq == 1 and (name := f"{'ab'[k]}:{joint.name}") in mimic:
                     restrict(k, name, limits(joint))
         ranges = {name: own.get(name, (-math.inf, math.inf)) for name in [*own, *sorted(mimic - set(own))]}
-        return {name: ends if ends[0] < ends[1] else first[name] for name, ends in ranges.items()}
+        return {name: ends if ends[0] < ends[1] else first.get(name, ends) for name, ends in ranges.items()}
 
 
 def limits(joint: Joint) -> tuple[float, float]:
