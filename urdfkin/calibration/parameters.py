@@ -6,13 +6,13 @@ an elementary motion is a parameter or a joint's value. A joint can have a gain 
 joint's value by (1 + g). The derivative of the tip's pose with respect to g is the derivative with respect to
 the motion's angle or length, multiplied by the joint's value.
 
-**URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
-to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the
-parameter z always shifts the origin along the joint's axis. A change of rz changes the zero position of a
-revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
-store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
-robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
-the tip's frame.
+**URDF.** Each joint of the path has six parameters of its origin. Let T be the joint's original origin, and
+let A be the rotation that maps the z axis to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z)
+Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the parameter z always shifts the origin along the joint's axis. A
+change of rz changes the zero position of a revolute joint. The other four parameters move the axis. The gain
+is a seventh parameter, which a URDF cannot store. `base` and `tool` have six parameters each. The path begins
+with the motions of `base`: the pose of the robot's base in the instrument's frame. The path ends with the
+motions of `tool`: the pose of the target in the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
 `PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
@@ -118,7 +118,7 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
-        `frames` is the result of the method `frames` for `values` and `at`, if the caller has computed it.
+        `frames` may contain the result of the method `frames` for the same arguments.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
@@ -152,7 +152,6 @@ class ParametricChain:
 #: Parallel axes of a real arm deviate by some milliradians.
 PARALLEL = math.radians(5.0)
 
-#: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
 #: For each parameter of an origin: name, whether it is a rotation, and index of the coordinate axis.
 #: The motions are multiplied in this order.
@@ -171,12 +170,8 @@ class CalibrationModel:
     """A parametric chain, with its parameters grouped by joint.
 
     Attributes:
-        chain: The chain from base to tip.
         groups: Indices of the parameters of each joint, base or tool, in order of preference.
         coupling: The map from the path's coordinates to joint values.
-        base: Name of the base frame.
-        tip: Name of the tip frame.
-        source: The tree or table of the model.
     """
 
     chain: ParametricChain
@@ -210,7 +205,6 @@ class CalibrationModel:
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:
-        """Return the table with the parameter values `at`; None if the model describes a URDF."""
         if not isinstance(self.source, DHTable):
             return None
         cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.chain.parameters) if not p.end}
@@ -290,11 +284,11 @@ class _ModelBuilder:
 
 
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
-    """Make a parametric model of a URDF's path; `fit` selects the sets of parameters.
+    """Make a parametric model of a URDF's path; `fit` names the sets of parameters.
 
     A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
-    parameters of the neighbouring moving joints have the same effect. An unknown frame or set raises
-    UnknownNameError; a planar or floating joint on the path raises InputError.
+    parameters of the neighbouring moving joints have the same effect. A planar or floating joint raises
+    InputError.
     """
     path: FrameChain = chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
@@ -329,11 +323,7 @@ def _parameters_to_fit(fit: Collection[str], joint: Joint, *, is_last: bool) -> 
 
 
 def table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
-    """Make the model of a table; an unknown set of parameters raises UnknownNameError.
-
-    The set "origins" contains all cells. The set "offsets" contains the cells to which joint values are
-    added.
-    """
+    """Make a parametric model of a table; `fit` names the sets of parameters."""
     builder = _ModelBuilder(fit)
     builder.end("base")
     builder.steps.append(table.base)

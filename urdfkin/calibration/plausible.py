@@ -33,31 +33,27 @@ from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTr
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: An rms error is not plausible if it exceeds this fraction of the reach and this fraction of the positions'
-#: spread.
+#: An rms error above these fractions of the reach and of the positions' spread is not plausible.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: An rms error above both of these fractions, of the reach and of the error before the fit, is not plausible.
+#: An rms error above these fractions of the reach and of the error before the fit is not plausible.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
-#: If an rms error exceeds its limit, the fit is repeated to find common mistakes in the data. Limits:
-#: fraction of the reach, and rad.
+#: rms errors (fraction of the reach, and rad) above which common mistakes in the data are searched for.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Difference of joint values (rad, m) below which two configurations count as one.
 _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is compared with a limit.
-#: Changes that the data determine poorly, such as the tilt of an axis near the target, then pass.
+#: Changes that the data determine poorly, such as the tilt of an axis near the target, are then accepted.
 _UNCERTAIN = 5.0
-#: Maximum ratio of the error after a correction to the error before it: for accepted fits, and for refused
-#: fits.
+#: Maximum ratio of the errors after and before a correction: for accepted fits, and for refused fits.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted; the most promising corrections are fitted first.
+#: Number of corrections that are fitted, beginning with the most promising.
 _FITTED = 4
 #: Numbers of rows by which a correction shifts q relative to the poses.
 _SHIFTS = (1, -1, 2, -2)
-#: Return at most four names of joints for a message.
 _list = partial(first_names, most=4)
 
 
@@ -82,11 +78,8 @@ class FitWithData:
     """A fit with its model and its data.
 
     Attributes:
-        model: The model with the fitted parameters.
         q: (s, c) coordinates of the path.
-        measured: The poses that were measured at `q`.
-        identification: The identifiable and the fixed parameters.
-        before: The fit of only base and tool; all other parameters are fixed.
+        before: The fit of base and tool only; all other parameters are fixed.
         fitted: The fit of all identifiable parameters.
     """
 
@@ -112,7 +105,7 @@ class FitWithData:
         return _norm(self.fitted.errors, reach) / math.sqrt(max(self.fitted.freedom, 1.0))
 
     def too_few(self) -> list[str]:
-        """Return a message if there are not more measured numbers than fitted parameters."""
+        """Return a message if the measured values have no redundancy, else an empty list."""
         steps = np.round(self.measured.values / _ONE_CONFIGURATION)
         distinct, each = len(np.unique(steps, axis=0)), self.fitted.errors.shape[1]
         rank = self.identification.rank
@@ -125,7 +118,6 @@ class FitWithData:
         ]
 
     def misfits(self) -> Iterator[str]:
-        """Yield a message if position residuals or orientation residuals are too large."""
         reach = self.reach
         (metres, radians), (metres_before, _) = self.fitted.rms(), self.before.rms()
         p = self.measured.p
@@ -142,7 +134,6 @@ class FitWithData:
             yield f"a large rms error of the orientations, {angle(radians)}"
 
     def extreme_parameters(self) -> Iterator[str]:
-        """Yield a message if fitted tilts or gains are larger than those of any real robot."""
         tilted, gained = dict[str, str](), dict[str, str]()
         for parameter, change, least in self._changes():
             if parameter.what in ("rx", "ry", "alpha", "beta") and least > _LARGEST_TILT:
@@ -155,10 +146,7 @@ class FitWithData:
             yield f"the fit scales the values of joint {_list(gained.values())}"
 
     def turned_zeros(self) -> list[str]:
-        """Return the joints whose zero changed by about half a turn.
-
-        A reversed sign of the next joint can cause such a change.
-        """
+        """Return the joints whose zero changed by about half a turn, as a reversed sign can cause."""
         return [
             f"{parameter.where!r} by {angle(abs(change))}"
             for parameter, change, least in self._changes()
@@ -170,8 +158,7 @@ class FitWithData:
     def _changes(self) -> Iterator[tuple[Parameter, float, float]]:
         """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size.
 
-        The lower bound is the absolute value of the change, minus `_UNCERTAIN` standard deviations. If only
-        positions were measured, joints with an axis near the tip of the original model are skipped.
+        If only positions were measured, joints with an axis near the tip of the original model are skipped.
         """
         model, fitted = self.model, self.fitted
         near = set[str]()
@@ -192,7 +179,7 @@ class FitWithData:
 def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     """Check whether a fit is plausible, and find the likeliest mistake if it is not.
 
-    The argument `radians` is true if large joint angles are known to be radians.
+    `radians` is True if large joint angles are known to be in radians.
     """
     few = fit.too_few()
     misfits = [*fit.misfits(), *fit.extreme_parameters()]
@@ -254,7 +241,7 @@ def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, fl
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """Configurations with one possible mistake corrected, for the poses `first` to `last`."""
+    """Configurations with one possible mistake corrected; they belong to the poses [first:last]."""
 
     reason: str
     q: FloatArray
@@ -300,7 +287,7 @@ def _with_signs(model: CalibrationModel, q: FloatArray, signs: FloatArray) -> _C
 
 
 def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
-    """Return the first correction that gives a plausible fit with an error below the limit; else None."""
+    """Return the first correction that gives a plausible fit with an error below the limit, or None."""
     trials = [_Trial(fit, correction) for correction in _corrections(fit.model, fit.q)]
     trials.sort(key=lambda trial: trial.error_before)
     for trial in trials[:_FITTED]:
@@ -311,11 +298,7 @@ def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
 
 
 def _several_signs(fit: FitWithData) -> _Trial | None:
-    """Try two or more reversed signs.
-
-    Each step reverses the joint whose reversal gives the smallest error of a fit of only base and tool. The
-    search ends when no reversal reduces the error.
-    """
+    """Reverse the signs of joints one by one while the error decreases; None for fewer than two joints."""
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
     for _ in signs:
@@ -344,7 +327,6 @@ class _Trial:
 
     @cached_property
     def fit(self) -> FitWithData:
-        """The fit of all identifiable parameters."""
         model, measured = self.original.model, self.measured
         noise = Noise(1.0, 1.0 / self.original.reach)
         ends = [k for k in self.original.identification.kept if model.chain.parameters[k].end]
@@ -364,7 +346,7 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm of residuals (s, 6) or (s, 3), metres; angles are multiplied by the reach."""
+    """Return the norm (m) of residuals (s, 6) or (s, 3); angles are multiplied by the reach."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))
 
 

@@ -51,21 +51,18 @@ ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Number of random configurations for the fit of the origins, and for its check.
 _CONFIGURATIONS = 40
-#: Seeds of these random configurations.
 _FIT_SEED, _CHECK_SEED = 2, 3
 #: Largest residual of the fit, in metres and in radians.
 #: The numbers in the file have nine digits, and rounding causes residuals of this size.
 _MOST_RESIDUAL = 1e-8
-#: Number of configurations on which two calibrations are compared.
 _COMPARED = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read the (4, 4) origin of each joint; the keys are joint names without a prefix.
+    """Read the origin (4, 4) of each joint; the keys are joint names without a prefix.
 
-    The file is the driver's YAML, or a `default_kinematics.yaml` of its robot description. A file that cannot
-    be read raises SourceError. A file that is not a calibration, or lacks a link or a number, raises
-    InputError. An order other than "driver" and "urdf" raises UnknownNameError.
+    The file is the driver's YAML, or a `default_kinematics.yaml` of its robot description. Raise SourceError
+    for an unreadable file, InputError for wrong content, and UnknownNameError for an unknown order.
     """
     if order not in ORDERS:
         raise UnknownNameError("order of rotations", order, ORDERS)
@@ -115,11 +112,10 @@ def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all six joints turn about z, as in the current ROS description, the joint origins are replaced by the
-    origins in the calibration file. In other URDFs, for example of the older ROS description, the joint
-    origins are fitted, so that the poses of `tool0` in `base` are those of the calibrated arm. A robot that
-    is not a Universal Robots arm raises InputError; a wrong file raises the same errors as in
-    `read_calibration`.
+    If all six joints turn about z, as in the current ROS description, the file's origins replace the joint
+    origins. In other URDFs, such as the older ROS description, the joint origins are fitted, so that the
+    poses of `tool0` in `base` are those of the calibrated arm. Raise InputError for another robot or a wrong
+    file.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)
@@ -194,7 +190,7 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest distance (m) and angle (rad) between two arms' `tool0` at sampled configurations."""
+    """Return the largest sampled distance (m) and angle (rad) between the `tool0` frames of two arms."""
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)
