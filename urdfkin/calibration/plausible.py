@@ -146,7 +146,7 @@ class FitWithData:
             yield f"the fit scales the values of joint {_list(gained.values())}"
 
     def turned_zeros(self) -> list[str]:
-        """Return the joints whose zero changed by about half a turn, as a reversed sign can cause."""
+        """Return the joints whose zero changed by about half a turn; a reversed sign can cause this."""
         return [
             f"{parameter.where!r} by {angle(abs(change))}"
             for parameter, change, least in self._changes()
@@ -298,7 +298,7 @@ def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
 
 
 def _several_signs(fit: FitWithData) -> _Trial | None:
-    """Reverse the signs of joints one by one while the error decreases; None for fewer than two joints."""
+    """Reverse the signs of joints one by one while the error decreases; return None for a single sign."""
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
     for _ in signs:

@@ -38,22 +38,22 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited
+#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited.
 _UNLIMITED = 100.0
-#: Change of an angle by an arrow key, in degrees or in radians
+#: Change of an angle by an arrow key, in degrees or in radians.
 _DEGREES, _RADIANS = 1.0, 0.01
-#: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten
+#: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten.
 _STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) on sliders of joints without limits
+#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) on sliders of joints without limits.
 _VELOCITY, _ACCELERATION = 3.0, 5.0
-#: Maximum number of missing meshes that a message names
+#: Maximum number of missing meshes that a message names.
 _MOST_MISSING = 5
 
 
 @dataclass(frozen=True, slots=True)
 class SliderRow:
-    """Description of one slider, which sets one number of q, v or a.
+    """One slider, which sets one number of q, v or a.
 
     Attributes:
         at: Index of the number in q, v or a.
@@ -70,8 +70,8 @@ class SliderRow:
 class Sliders:
     """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    The unit of a slider ends with `per`: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
-    `report` is called with the index and the new number. It is not called when the program sets a slider.
+    The text `per` follows the unit: "" for q, "/s" for v, "/s²" for a. When the user moves a slider, `report`
+    is called with the index and the new number. `report` is not called when the program sets a slider.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class Sliders:
             self._report(row.at, float(handle.value) / self._scale(row))
 
     def show(self, values: FloatArray) -> None:
-        """Set each slider to its number of `values`; a number beyond the range extends the range."""
+        """Set the sliders; a value beyond a slider's range extends the range."""
         self._is_setting = True
         try:
             for row, handle in zip(self.rows, self.handles, strict=True):
@@ -126,7 +126,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # An equal value is not set again, so a slider that the user moves keeps its exact value.
+                # A slider that already has this value is not set, because a conversion of units could round it.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -274,17 +274,12 @@ _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 class Viewer:
     """A robot in a browser tab.
 
-    Args:
-        server: The server from `urdfkin.view.server.new_server`.
-        robot: The robot to show.
-        q: (nq,) start configuration. None means the configuration within the limits nearest to zero.
-        trajectory: A trajectory to play; the viewer then starts at the first sample.
-        conversion: The convention of the text field of q. None means urdfkin's convention.
+    `conversion` is the convention of the text field of q; None means urdfkin's convention.
 
     Attributes:
         q: (nq,) configuration of the sliders, rad and m.
         motion: The motion of the chosen frame in the chosen reference frame, with its check.
-        player: The controls of the trajectory; None without one.
+        player: The controls of the trajectory; None without a trajectory.
     """
 
     def __init__(
@@ -313,7 +308,7 @@ class Viewer:
             self.player.show(0)
 
     def _fill(self) -> None:
-        """Set the camera to show the robot in the configuration q and along the whole trajectory."""
+        """Set the camera to show the robot at q and along the whole trajectory."""
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
@@ -335,7 +330,7 @@ class Viewer:
     def _build(self, trajectory: Trajectory | None) -> None:
         gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-        gui.main_panel.dock_right()  # the controls are beside the picture, not over it
+        gui.main_panel.dock_right()  # The controls do not cover the picture.
         gui.set_panel_label(printable(robot.name))
         if self.stage.missing:
             gui.add_markdown(missing_words(self.stage.missing))
@@ -418,7 +413,6 @@ class Viewer:
             self.update()
 
     def set_q(self, q: Given) -> None:
-        """Move the robot and all sliders to a configuration, or raise InputError."""
         with self._lock:
             self.set_state(checked(self.robot.tree, q, "q"), self.v, self.a)
 
@@ -451,7 +445,7 @@ class Viewer:
         self.wrong.content = ""
 
     def _read_q(self, event: Any) -> None:
-        """Read the configuration that the user typed; the text in the field is not changed."""
+        """Read the configuration that the user typed, without changing the text."""
         if event.client is None:
             return
         with self._lock:
@@ -475,7 +469,7 @@ class Viewer:
                 sliders.build(values, degrees=self.units.value == "degrees")
 
     def _choose_convention(self) -> None:
-        """Make the shapes transparent while a table is shown, because frames of the table are inside them."""
+        """Make shapes transparent while a table is shown, because frames of the table are inside shapes."""
         with self._lock:
             shown = self.dh.value != "none"
             if self.shapes.value == (SOLID if shown else SEE_THROUGH):
@@ -483,7 +477,7 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Apply a new frame, reference or convention; derive and check the DH table for them."""
+        """Apply the chosen frame, reference frame and table convention."""
         with self._lock:
             self._table, words = None, ""
             if self.dh.value != "none":
@@ -492,7 +486,7 @@ class Viewer:
                     words = f"{self._table.base_frame} to {self._table.tip_frame}"
                 except UrdfkinError as error:
                     words = str(error)
-            # Viser would read images even in Markdown's code, so all characters are escaped.
+            # Viser would load images even inside Markdown code, so all characters are escaped.
             self.dh_words.content = markdown_text(words)
             self.update()
             if self.player is not None:
