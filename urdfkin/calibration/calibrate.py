@@ -445,7 +445,6 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: CalibrationModel, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Compute the ratios `Calibration.weak` of the poorly observable parameters."""
     general = _values(model, robot, robot.sample(len(measured), seed=_WEAK_SEED))
     uncertainties = []
     for values in (measured.values, general):
@@ -489,7 +488,6 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
 
 
 def doubts(found: Calibration) -> list[str]:
-    """Return the warnings about a calibration."""
     return list(_warnings(found))
 
 

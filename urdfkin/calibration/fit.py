@@ -332,7 +332,6 @@ class _LeastSquares:
     noise: Noise
 
     def residuals(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the residuals (rows,) divided by the noise, and the poses along the path."""
         frames = self.model.chain.frames(self.measured.values, at)
         errors = _residuals(self.measured, frames[:, -1])
         return (errors / self.noise.of(self.measured.complete)).ravel(), frames
@@ -353,7 +352,6 @@ class _LeastSquares:
         return least_squares(at, self.residuals, self.jacobian, moved)[0]
 
     def fit(self, at: FloatArray) -> Fit:
-        """Return the fit with the parameters `at`, without a minimization."""
         r, frames = self.residuals(at)
         J = self.jacobian(at, frames)
         k = self.noise.of(self.measured.complete).size
@@ -472,7 +470,6 @@ def _from_poses(
 
 
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute the base, and the position of the measured target on the tip, from measured positions."""
     B, X = np.eye(4), np.eye(4)
     for _ in range(_REPETITIONS if base and tool else 1):
         if base:

@@ -100,7 +100,6 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
 
 
 def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
-    """Return the calibrated arm as a tree: `base` to `tool0`, six revolute joints about z."""
     z, rows, parent = np.array([0.0, 0.0, 1.0]), [], "base"
     for joint, T in origins.items():
         child = "tool0" if joint == "wrist_3_joint" else f"{joint}_link"

@@ -92,7 +92,6 @@ class Player:
             self.show(self._nearest(float(self.time.value)))
 
     def play(self) -> None:
-        """Play from the shown sample; start from the first sample if the last sample is shown."""
         if not self._playing.is_set():
             self._playing.set()
             self.button.label = "pause"

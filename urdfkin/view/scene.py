@@ -122,7 +122,6 @@ def shapes(robot: Robot) -> list[Shape]:
 
 
 def _file_of(robot: Robot) -> Path | None:
-    """Return the robot's URDF file; None if the robot has no file."""
     entry = catalogue().get(robot.source)
     path = entry.path if entry is not None else Path(robot.source)
     try:

@@ -70,7 +70,6 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 
 
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
-    """Return arrows for the parts of the frame's linear acceleration and their sum, in world axes."""
     parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
     names = tuple(name for name, used in zip((*KINDS, "sum"), keep, strict=True) if used)
@@ -313,7 +312,6 @@ class Stage:
     # -- overlays ------------------------------------------------------------------------------------
 
     def arrows(self, name: str, arrows: Arrows | None) -> None:
-        """Replace the arrows called `name`; None hides them."""
         size = 0.008 * self.reach
         visible = arrows is not None and len(arrows.points) > 0
         self._scene.add_arrows(
@@ -339,7 +337,6 @@ class Stage:
         )
 
     def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
-        """Draw the frames, offsets d and lengths a of a table; None removes the drawing."""
         for handle in self._dh:
             handle.remove()
         self._dh = []

@@ -126,7 +126,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # A slider that already has this value is not set, because a conversion of units could round it.
+                # If the slider already has this value, it is not set: a conversion of units could round it.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -170,7 +170,6 @@ def fixed_coordinates(robot: Robot) -> list[str]:
 
 
 def rate_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
-    """Describe a slider for each joint velocity, or for each joint acceleration if `second` is true."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
@@ -194,7 +193,6 @@ def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
 
 
 def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the configuration nearest to `q` within all joint limits; quaternions are unchanged."""
     out = np.array(q, dtype=np.float64)
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -308,7 +306,6 @@ class Viewer:
             self.player.show(0)
 
     def _fill(self) -> None:
-        """Set the camera to show the robot at q and along the whole trajectory."""
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
@@ -322,7 +319,6 @@ class Viewer:
 
     @property
     def file_name(self) -> str:
-        """The robot's name in characters that every system allows in a file name."""
         return re.sub(r"[^A-Za-z0-9_-]+", "-", self.robot.name).strip("-") or "robot"
 
     # -- controls ------------------------------------------------------------------------------------
@@ -445,7 +441,6 @@ class Viewer:
         self.wrong.content = ""
 
     def _read_q(self, event: Any) -> None:
-        """Read the configuration that the user typed, without changing the text."""
         if event.client is None:
             return
         with self._lock:
