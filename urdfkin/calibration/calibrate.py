@@ -166,12 +166,10 @@ class Calibration:
 
     @property
     def table(self) -> DHTable | None:
-        """The calibrated table; None for a URDF."""
         return None if self.written_fit is None else self.model.table(self.written_fit.at)
 
     @cached_property
     def written(self) -> Rewritten:
-        """The original text of the URDF with the new origins, and the effect of the changes."""
         return Rewritten(self.robot, self.origins)
 
 
@@ -458,10 +456,7 @@ def _weak(
 
 
 def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
-    """Compare the written model with Pinocchio at the measured configurations.
-
-    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison.
-    """
+    """Compare the written model with Pinocchio, without base, tool and gains, which a URDF cannot contain."""
     model, fitted = found.model, found.written_fit
     if fitted is None:
         return None

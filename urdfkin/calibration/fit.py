@@ -161,7 +161,6 @@ def _reason(model: CalibrationModel, J: FloatArray, error: FloatArray, kept: Seq
 
 
 def first_names(names: Iterable[str], most: int) -> str:
-    """Return the first `most` names for a message, and how many more names there are."""
     every = list(names)
     return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
@@ -372,7 +371,6 @@ class _LeastSquares:
 def outliers(
     model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
 ) -> tuple[tuple[int, ...], Fit]:
-    """Return the indices of a fit's outliers, and the fit without them."""
     out = list[int]()
     # Without the outliers, there must still be more measured numbers than parameters.
     most = len(measured) - 1 - -(-len(kept) // found.errors.shape[1])

@@ -167,12 +167,7 @@ _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
 
 @dataclass(frozen=True, eq=False)
 class CalibrationModel:
-    """A parametric chain, with its parameters grouped by joint.
-
-    Attributes:
-        groups: Indices of the parameters of each joint, base or tool, in order of preference.
-        coupling: The map from the path's coordinates to joint values.
-    """
+    """A parametric chain; `groups` lists the parameters of each joint and end, in order of preference."""
 
     chain: ParametricChain
     groups: tuple[tuple[int, ...], ...]
@@ -271,7 +266,6 @@ class _ModelBuilder:
         ends: tuple[str, str],
         kept: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
-        """Return the model; `kept` lists the parameters of each joint in order of preference."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
         # Base and tool come first because they are unknown; the parameters of the joints are nearly known.
         owners = sorted(dict.fromkeys((p.where, p.end) for p in self.parameters), key=lambda one: not one[1])

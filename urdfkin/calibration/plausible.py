@@ -75,13 +75,7 @@ class Plausibility:
 
 @dataclass(frozen=True, eq=False)
 class FitWithData:
-    """A fit with its model and its data.
-
-    Attributes:
-        q: (s, c) coordinates of the path.
-        before: The fit of base and tool only; all other parameters are fixed.
-        fitted: The fit of all identifiable parameters.
-    """
+    """A fit with its data; `q` (s, c) are coordinates, and `before` is the fit of base and tool only."""
 
     model: CalibrationModel
     q: FloatArray
@@ -209,7 +203,6 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
 
 
 def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], list[str]]:
-    """Return joints with values that look like degrees, and other joints with values far outside limits."""
     like_degrees, outside = list[str](), list[str]()
     for (name, is_angle, lower, upper), column in zip(_coordinates(model), q.T, strict=True):
         largest = float(np.abs(column).max(initial=0.0))

@@ -40,7 +40,6 @@ class SecondOracleModel:
     def cross_check(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> CrossCheck:
-        """Compare the results of three libraries, for the frames or joints of a block."""
         second = block.timings.timed("second", row.ask, self.oracle, block.query(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
@@ -58,10 +57,7 @@ def tallies(
     timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, Tally]:
-    """Return the error statistics of each quantity of a robot in each reference frame.
-
-    `oracle` is Pinocchio's model. The computing times are added to `timings`.
-    """
+    """Return the error statistics of each quantity of a robot in each reference frame."""
     found: dict[Key, Tally] = {}
     work = robot, oracle, x, first_sample, timings
     for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
@@ -131,7 +127,6 @@ class _Block(_ComparisonBatch):
                     yield self._compare(joint, reference, own, joint_bound, second)
 
     def joint_part(self, bound: Bound) -> Bound:
-        """Return the bounds of the block's joints, from the bounds of the block's frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
@@ -158,11 +153,7 @@ class _Block(_ComparisonBatch):
 
 
 class _Screws(_ComparisonBatch):
-    """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
-
-    Each column of `data.J` belongs to one joint, and equals a column of the Jacobian of this joint in the
-    reference frame WORLD.
-    """
+    """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians of the joints in the frame WORLD."""
 
     def tallies(self) -> Iterator[Tally]:
         robot, x = self.robot, self.x
@@ -195,10 +186,7 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations of the tree `free`, which has no mimic rules.
-
-    The values of mimic joints are computed with the mimic rules of `tree`.
-    """
+    """Return configurations of the tree `free`, without mimic rules, from configurations of `tree`."""
     expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -33,8 +33,7 @@ class OraclePair:
 
     Attributes:
         failed: Number of results outside their bound.
-        worst: The largest disagreement in multiples of eps * scale. For Pinocchio and the second oracle, the
-            scale is that of `_sum_of_bounds`.
+        worst: The largest disagreement, in eps * scale.
         share_of_bound: The largest ratio of a disagreement to its bound.
     """
 
@@ -55,8 +54,6 @@ class CrossCheck:
     """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
 
     Attributes:
-        urdfkin: urdfkin compared with the second oracle.
-        pinocchio: Pinocchio compared with the second oracle.
         alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
         undecided: Number of results without a majority: no two of the three libraries agree, or one library
             agrees with two others that disagree with each other.
@@ -91,8 +88,8 @@ def cross_check(
 ) -> CrossCheck:
     """Compare three results (n, frames, ...) with each other.
 
-    `first` is the bound on the difference between urdfkin and Pinocchio, `second` the bound on the difference
-    between urdfkin and the second oracle.
+    `first` is the bound on the difference between urdfkin and Pinocchio. `second` is the bound on the
+    difference between urdfkin and the second oracle.
     """
     if not ours.size:
         return CrossCheck(by, OraclePair(), OraclePair())
@@ -135,11 +132,9 @@ Inputs = tuple[list[float], list[float], list[float]]
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """The sample with the largest ratio of disagreement to bound, and the inputs of that sample.
+    """The sample with the largest ratio of disagreement to bound.
 
-    Attributes:
-        share: Ratio of the disagreement to the bound.
-        units: The disagreement, in eps * scale.
+    `share` is this ratio, and `units` is the disagreement in eps * scale.
     """
 
     share: float
@@ -163,9 +158,7 @@ class Tally:
         histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
             adjacent edges, and above the last edge.
         by_frame: The largest disagreement of each frame, in the robot's order.
-        case: The sample with the largest ratio.
-        bounds: The smallest and the largest bound of all results, in eps * scale. The bound for a frame grows
-            with the number of joints on the path to the frame.
+        bounds: The smallest and the largest bound of all results, in eps * scale.
     """
 
     results: int
@@ -193,19 +186,19 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return combined statistics for the frames of `self` and of `other`; the samples are the same."""
+        """Return the statistics for the frames of `self` and of `other`, which have the same samples."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements; the error is at most the width of a bin, 26 %."""
+        """Return a percentile of the disagreements, with an error of at most the width of a bin (26 %)."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram; the error is at most the width of a bin."""
+    """Return a percentile of the values in a histogram, with an error of at most the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -227,7 +220,7 @@ def tally(
 ) -> Tally:
     """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample.
 
-    The scale and k of the bound can be broadcast to the shape of the results.
+    The bound's scale and k can be broadcast to the shape of the results.
     """
     n, count = ours.shape[:2]
     if not ours.size:

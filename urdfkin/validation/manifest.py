@@ -31,8 +31,6 @@ class Manifest:
 
     Attributes:
         robots: For each robot: the origin, and the sha256 of the text (empty if the text could not be read).
-        provenance: Versions and digests of the computing code (`urdfkin.validation.results.provenance`).
-        versions: Versions in the report.
         started: Start time, ISO 8601, UTC.
     """
 
@@ -62,7 +60,6 @@ class Manifest:
 
     @cached_property
     def _keys(self) -> list[str]:
-        """Key of each robot: a sha256 of the robot's text, the settings and the versions."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
@@ -79,7 +76,6 @@ class Manifest:
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
-        """Return the differences between two campaigns, each with the values in both manifests."""
         own, theirs = (
             {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance
             for m in (self, other)
@@ -98,7 +94,6 @@ class Manifest:
 
 
 def _short(value: object) -> str:
-    """Return the first 12 characters of a digest; return other values as text."""
     text = str(value)
     return text[:12] if len(text) == 64 else text
 

@@ -67,7 +67,7 @@ _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: A multiple of 1 / 1024 has few decimals and is exactly a double.
 _GRID = 1024.0
-#: Number of digits of a printed tolerance, and number of digits to which it is rounded before.
+#: Number of digits of a printed tolerance, and number of digits of a first rounding.
 #: Results of different processors differ in the last digits; the first rounding removes these digits.
 _DIGITS, _FIRST_DIGITS = 3, 12
 
@@ -158,8 +158,7 @@ class Feature:
 
     Attributes:
         rule: The standard's rule.
-        note: A known difference between libraries in this feature; None if no difference is known.
-        data: The bytes of the URDF file: the encoded text with its XML declaration.
+        note: A known difference between libraries in this feature.
         frames: Links of the test vectors.
     """
 
@@ -272,11 +271,7 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The files of one robot: vectors as JSON and as lines of text, and the URDF if it was written.
-
-    Attributes:
-        numbers: Number of values in each file of vectors.
-    """
+    """The files of one robot, and the number of values in each file of vectors."""
 
     robot: str
     files: tuple[Path, ...]
@@ -294,7 +289,6 @@ class _Head:
 
 
 def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the test vectors and the URDF of each small robot in `features.toml`."""
     for feature in features().values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -323,7 +317,6 @@ def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> Written:
 
 
 def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the test vectors of all robots in the catalogue."""
     for name in catalogue():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -332,7 +325,6 @@ def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
 
 
 def name_of(robot: Robot) -> str:
-    """Return the robot's name in the catalogue, or else the name in the URDF."""
     return robot.source if robot.source in catalogue() else robot.name
 
 
@@ -394,7 +386,6 @@ def _result(one: Mapping[str, Any]) -> str:
 def _sample(
     robot: Robot, name: str, frames: Sequence[str], sample: int
 ) -> tuple[dict[str, list[str]], list[dict[str, Any]]]:
-    """Return the inputs and the results of a sample, with all numbers as decimals."""
     q, v, a = configuration(robot.tree, name, sample)
     inputs = {name: [repr(float(x)) for x in array] for name, array in zip("qva", (q, v, a), strict=True)}
     digits = max(DIGITS, enough_digits(len(robot.tree.joints)))

@@ -102,10 +102,7 @@ def save(figure: Figure, path: Path) -> bytes:
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
-    """Return the figure, drawn with `PAGE_COLOURS`, as an SVG element of a page.
-
-    `prefix` makes ids unique on a page with several figures.
-    """
+    """Return a figure in `PAGE_COLOURS` as an SVG element of a page; `prefix` makes ids unique."""
     stream = io.StringIO()
     no_metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with style():
@@ -126,7 +123,6 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
 
 
 def _with_ids(text: str, prefix: str) -> str:
-    """Remove unused ids from an SVG text, and add the prefix to each used id."""
     used = set(re.findall(r"url\(#([^)]+)\)", text)) | set(re.findall(r'href="#([^"]+)"', text))
     text = re.sub(
         r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", text

@@ -64,7 +64,6 @@ def _rotation(x: FrameMotion) -> FloatArray:
 
 
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the magnitudes of the linear acceleration and of each of its parts, m/s^2."""
     sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
     used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
@@ -136,7 +135,6 @@ COORDINATES = tuple(_PER)
 
 
 def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
-    """Return a panel of q, v or a over time for each unit, with the limits of the moving joints."""
     units = np.array(configuration.units(robot.tree, what))
     return [
         partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
@@ -187,10 +185,7 @@ def _coordinates(
 
 
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
-    """Return whether each sample is outside the limits by more than one unit in the last place of a double.
-
-    A limit that is written in decimal notation has a rounding error of up to one unit in the last place.
-    """
+    """Return whether a sample is outside its limits by more than the rounding error of a decimal limit."""
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
 

@@ -145,12 +145,7 @@ _NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene: link frames, shapes, and a skeleton of joints and lines.
-
-    Attributes:
-        missing: Meshes that cannot be shown.
-        reach: The robot's size in metres.
-    """
+    """A robot in viser's scene; `reach` is the robot's size (m), and `missing` lists meshes not shown."""
 
     def __init__(self, server: Any, robot: Robot) -> None:
         self._scene, self._server, self.robot = server.scene, server, robot
@@ -286,7 +281,6 @@ class Stage:
             client.camera.position, client.camera.look_at = position, middle
 
     def show(self, *, shapes: str, skeleton: bool, axes: bool, names: str) -> None:
-        """Show or hide parts; `shapes` is one of `SHAPES`, and `names` is one of `NAMES`."""
         self.skeleton_shown = skeleton
         if shapes == SEE_THROUGH and not self._transparent:
             self._transparent = self._add_transparent()

@@ -53,12 +53,7 @@ _MOST_MISSING = 5
 
 @dataclass(frozen=True, slots=True)
 class SliderRow:
-    """One slider, which sets one number of q, v or a.
-
-    Attributes:
-        at: Index of the number in q, v or a.
-        turns: Whether the number is an angle or a derivative of an angle.
-    """
+    """A slider for one number of q, v or a; `turns` is True for angles and their derivatives."""
 
     at: int
     name: str
@@ -270,15 +265,7 @@ _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 
 
 class Viewer:
-    """A robot in a browser tab.
-
-    `conversion` is the convention of the text field of q; None means urdfkin's convention.
-
-    Attributes:
-        q: (nq,) configuration of the sliders, rad and m.
-        motion: The motion of the chosen frame in the chosen reference frame, with its check.
-        player: The controls of the trajectory; None without a trajectory.
-    """
+    """A robot in a browser tab; q (nq,) is the configuration of the sliders, rad and m."""
 
     def __init__(
         self,
@@ -472,7 +459,6 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Apply the chosen frame, reference frame and table convention."""
         with self._lock:
             self._table, words = None, ""
             if self.dh.value != "none":
