@@ -68,7 +68,7 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: Smallest length of a candidate column's remainder, as a fraction of the longest remainder.
+#: A Jacobian column is a candidate if its remainder has this fraction of the longest remainder's length.
 _AS_GOOD = 0.5
 #: Maximum number of fitted parameters that a message lists for one fixed parameter.
 _NAMED = 3
@@ -165,7 +165,7 @@ def first_names(names: Iterable[str], most: int) -> str:
     return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
-#: Smallest total redundancy of a fit that can be checked; without rounding errors, it is an integer.
+#: Smallest total redundancy of a fit that can be checked; the exact total redundancy is an integer.
 _ONE_OR_MORE = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
 #: The residuals do not show pose errors along the eigenvectors of these eigenvalues.

@@ -158,8 +158,7 @@ FITTED = ("base", "tool", "offsets", "origins", "gains")
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
 #: Order in which parameters are fitted if their effects are equal, for revolute (True) and prismatic joints.
-#: The order of preference is: the joint's zero, motions that move the joint axis, motions that move only the
-#: frame.
+#: The joint's zero comes first, then motions of the joint axis, then motions of the frame only.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")

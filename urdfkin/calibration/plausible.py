@@ -39,7 +39,7 @@ _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
-#: rms errors (fraction of the reach, and rad) above which common mistakes in the data are searched for.
+#: Root mean square errors (fraction of the reach, and rad) above which common mistakes are searched for.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5

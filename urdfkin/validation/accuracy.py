@@ -47,7 +47,7 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(exact, otypes=[object])
-#: Representations of the orientation in each of the two lines for analytical Jacobians.
+#: The result has one line for each group of these representations of the orientation.
 #: Angles about fixed axes are left out: they have the same Jacobians, with the rows in reverse order.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
@@ -65,7 +65,7 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyLine:
-    """Errors for one quantity; for analytical Jacobians, `reference` names the orientation's representation."""
+    """Errors for one quantity; of analytical Jacobians, `reference` is the orientation's representation."""
 
     quantity: str
     reference: str | None

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 #: A mistake explains the results if at most this fraction of the largest difference remains.
 EXPLAINED = 1e-3
-#: Maximum number of reported mistakes.
 _MOST = 3
 #: Number of configurations in a first, fast test for two exchanged joints.
 _FEW = 4
@@ -246,7 +245,10 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return (name, index in q, index in v, is_angle) of each joint with one coordinate in the function's q."""
+        """Return (name, index in q, index in v, is_angle) for each joint with one coordinate.
+
+        The indices belong to the function's convention.
+        """
         tree = self.robot.tree
         found = []
         indices = None if self.conversion is None else self.conversion.q_and_v_indices

@@ -126,7 +126,6 @@ def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
 #: Key of error statistics: the quantity and the reference frame.
 Key = tuple[str, str]
-#: Values of q, v and a.
 Inputs = tuple[list[float], list[float], list[float]]
 
 

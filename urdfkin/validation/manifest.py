@@ -21,7 +21,6 @@ from urdfkin.verify.oracles import versions
 
 #: Name and version of the layout of a store.
 LAYOUT = "urdfkin-campaign/1"
-#: Maximum number of differences in a message.
 _SHOWN = 4
 
 

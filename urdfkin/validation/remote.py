@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Return value of a worker for a chunk: a word and a value.
 #: The value of "answer" is the pickled answer.
 #: The value of "died" is the signal or exit status of the second crash.
-#: "other code" contains the worker's package versions if they differ from the client's.
+#: The value of "other code" contains the worker's versions, which differ from the client's versions.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]

@@ -37,7 +37,6 @@ _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
 STUDY_FILE = "accuracy.json"
 #: Suffix of a file with the accuracy result of a robot.
-#: `urdfkin.validation.accuracy_store` computes the name of the file.
 STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 

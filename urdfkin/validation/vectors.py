@@ -76,8 +76,8 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The quantities of the test vectors.
-#: The classical and the spatial acceleration differ by w x vel; the scale of each includes this term.
+#: The classical and the spatial acceleration differ by the cross product of angular and linear velocity.
+#: The scale of each acceleration includes this product.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip

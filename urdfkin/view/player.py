@@ -20,7 +20,6 @@ from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-#: Maximum number of updates per second while a trajectory plays.
 _UPDATE_RATE = 20.0
 #: Frames per second, maximum number of frames, and size in pixels of a saved motion.
 _FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)

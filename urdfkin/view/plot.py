@@ -34,7 +34,6 @@ STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: Maximum number of names in a legend.
 _MOST_NAMES = 14
 _UNNAMED = "#9AA7B5"
 
