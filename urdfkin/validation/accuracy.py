@@ -65,7 +65,10 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyLine:
-    """Errors for one quantity; of analytical Jacobians, `reference` is the orientation's representation."""
+    """Errors of both libraries for one quantity.
+
+    For analytical Jacobians, `reference` is the representation of the orientation.
+    """
 
     quantity: str
     reference: str | None
