@@ -307,7 +307,11 @@ class Mistakes:
 
         listed = ", ".join(repr(joint.name) for joint in mimics[:4])
         if self.row.columns:
-            yield f"the columns of the mimic joints ({listed}) are not added", partial(result, "qva")
+            yield (
+                f"the columns of the mimic joints ({listed}) are not added to the columns of the mimicked"
+                " joints",
+                partial(result, "qva"),
+            )
         elif len(case.inputs) > 1:
             yield f"the velocities of the mimic joints ({listed}) are missing", partial(result, "q")
         yield f"the mimic joints ({listed}) do not move", partial(result, "")
