@@ -264,7 +264,7 @@ class Mistakes:
 
     @staticmethod
     def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Multiply joint values by a factor in `count` inputs; `at` contains the indices in q and in v."""
+        """Scale joint values in the first `count` inputs by a factor; `at` has the indices in q and in v."""
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
             x[:, [pair[min(k, 1)] for pair in at]] *= factor
@@ -405,7 +405,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield (0.0, sentence) for each wrong column that a mistake explains completely."""
+    """Yield the remainder 0.0 and a sentence for each wrong column that a mistake explains completely."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

@@ -344,7 +344,6 @@ class _FunctionResults:
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Return the differences between `found` and `other` in units of eps * scale; inf if not finite."""
         return disagreement(self.found, other, self.scale)
 
 

@@ -32,7 +32,7 @@ def limit(processes: int = 1) -> int | None:
 
 
 def needed_bytes(tree: KinematicTree, samples: int) -> int:
-    """Return an upper bound on the memory (bytes) for checking a robot."""
+    """Estimate the largest memory (bytes) that a check of a robot needs."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
     return _PER_CUBE * nv**3 + _PER_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
