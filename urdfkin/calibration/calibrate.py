@@ -81,21 +81,14 @@ class Calibration:
     """A calibrated model; the result of `urdfkin.calibrate`.
 
     Attributes:
-        robot: The robot before the calibration.
-        model: The model with the parameters to fit.
         identification: The parameters that are identifiable from the measured poses.
         general: The parameters that are identifiable from random poses.
-        fitted: The fit; None without poses.
         before: The fit of base and tool only; all other parameters have their original values.
         odd: Indices of the outlier poses.
-        without_odd: The fit without the outliers.
         weak: Indices of poorly observable parameters, each with a ratio of uncertainties: the uncertainty at
             the measured configurations, divided by the uncertainty at as many random configurations.
-        certificate: The result of checking the written model with Pinocchio.
-        stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the other parameters have their original values.
         significant: Indices of the parameters that `written_fit` fits.
-        plausibility: The reasons why the fit is refused; empty for a plausible fit.
     """
 
     robot: Robot
@@ -138,7 +131,6 @@ class Calibration:
 
     @cached_property
     def written_values(self) -> FloatArray:
-        """(p,) change of each parameter in the written fit, m and rad."""
         return self._change(self.written_fit)
 
     @cached_property
@@ -174,10 +166,7 @@ class Calibration:
 
 
 class ImplausibleError(InputError):
-    """Error for a fit that is not plausible: the measured data or the model contain a gross mistake.
-
-    The attribute `calibration` is the refused calibration.
-    """
+    """The measured data or the model contain a gross mistake; `calibration` is the refused calibration."""
 
     def __init__(self, calibration: Calibration, remedy: str) -> None:
         model, plausibility = calibration.model, calibration.plausibility
@@ -553,9 +542,8 @@ def read_poses(
 ) -> tuple[FloatArray, FloatArray]:
     """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
 
-    A file without the suffix .npz is read as CSV. `needed` names the coordinates that a CSV file must
-    contain. `rest` (nq,) contains the values of coordinates without a column. Raise SourceError or InputError
-    for a wrong file.
+    `needed` names the coordinates that a CSV file must contain. `rest` (nq,) contains the values of
+    coordinates without a column.
     """
     if path.suffix.lower() == ".npz":
         q, T = _archive(path, len(coordinates))

@@ -81,9 +81,9 @@ class Identification:
     """The parameters that the measurements identify, and the parameters that stay fixed.
 
     Attributes:
-        kept: Indices of the fitted parameters. The effects of these parameters are linearly independent.
+        kept: Indices of the fitted parameters, which have linearly independent effects.
         still: Indices of the fixed parameters, each with the reason.
-        numbers: Total number of measured coordinates; a position has 3 coordinates, and a full pose has 6.
+        numbers: Number of all measured coordinates; a position has 3 coordinates, and a full pose has 6.
     """
 
     kept: tuple[int, ...]
@@ -98,10 +98,7 @@ class Identification:
 def stacked(
     model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
 ) -> FloatArray:
-    """Return the dimensionless Jacobian (rows, p) of all measured coordinates.
-
-    The length `chain.size` converts angles to lengths.
-    """
+    """Return the dimensionless Jacobian (rows, p) of all measurements; `chain.size` converts angles."""
     L = model.chain.size
     _, columns = model.chain.columns(values, at)
     columns[:, 3:] *= L
@@ -113,11 +110,7 @@ def stacked(
 def identify(
     model: CalibrationModel, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
 ) -> Identification:
-    """Determine which parameters are identifiable from measurements at the joint values (s, n).
-
-    `complete` means that full poses are measured, and not only positions. The Jacobian is computed at the
-    parameters `at` (p,), by default at the model's start values.
-    """
+    """Determine which parameters are identifiable at the joint values (s, n) and the parameters `at` (p,)."""
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.chain.rounding(values))
     kept = list[int]()
@@ -246,7 +239,6 @@ class Fit:
 
     @property
     def is_judged(self) -> bool:
-        """Whether the redundancy is positive, so that the fit can be checked."""
         return self.freedom >= _ONE_OR_MORE
 
     @property
@@ -283,10 +275,7 @@ def _residuals(measured: Measured, T: FloatArray) -> FloatArray:
 def best_fit(
     model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
 ) -> Fit:
-    """Fit the parameters `kept` by least squares, from the start values `at` (p,).
-
-    If `noise` is None, the noise is estimated from the residuals.
-    """
+    """Fit the parameters `kept` by least squares, from the start values `at` (p,)."""
     problem = _LeastSquares(model, measured, list(kept), noise or Noise(1.0, 1.0 / model.chain.size))
     for _ in range(1 if noise else _ESTIMATES):
         at = problem.minimum(at)
@@ -336,7 +325,6 @@ class _LeastSquares:
         return (errors / self.noise.of(self.measured.complete)).ravel(), frames
 
     def jacobian(self, at: FloatArray, frames: FloatArray) -> FloatArray:
-        """Return the Jacobian (rows, k) of the fitted parameters, divided by the noise."""
         scale = self.noise.of(self.measured.complete)
         _, columns = self.model.chain.columns(self.measured.values, at, frames)
         J = columns[:, : len(scale), self.kept] / scale[:, np.newaxis]
@@ -416,10 +404,7 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 
 
 def quantile(share: float, freedom: int) -> float:
-    """Return the quantile of the chi^2 distribution, by the approximation of Wilson and Hilferty (1931).
-
-    The relative error is a few per cent, even for probabilities close to 1.
-    """
+    """Return the chi^2 quantile by the approximation of Wilson and Hilferty (1931), to a few per cent."""
     step = 2.0 / (9.0 * freedom)
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 

@@ -80,10 +80,7 @@ class Drive(ElementaryMotion):
 class ParametricChain:
     """The pose of a tip as a function of parameters and joint values.
 
-    Attributes:
-        path: Constant transforms and elementary motions (`Drive`), from base to tip.
-        parameters: The parameters; each occurs once in the path.
-        start: (p,) values of the parameters in the original model.
+    Each parameter occurs once in the path. `start` (p,) contains the values in the original model.
     """
 
     path: Path
@@ -116,10 +113,7 @@ class ParametricChain:
     def columns(
         self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
-
-        `frames` may contain the result of the method `frames` for the same arguments.
-        """
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first."""
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
         columns = np.zeros((len(values), 6, len(self.parameters)))
@@ -280,8 +274,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     """Make a parametric model of a URDF's path; `fit` names the sets of parameters.
 
     A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
-    parameters of the neighbouring moving joints have the same effect. A planar or floating joint raises
-    InputError.
+    parameters of the neighbouring moving joints have the same effect.
     """
     path: FrameChain = chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0

@@ -59,13 +59,9 @@ _list = partial(first_names, most=4)
 
 @dataclass(frozen=True)
 class Plausibility:
-    """The reasons why a fit is refused.
+    """The reasons why a fit is refused; `reason` is the likeliest mistake and its remedy.
 
-    Attributes:
-        objections: A message for each reason; empty for a plausible fit.
-        reason: The likeliest mistake and its remedy; None if no correction makes the fit plausible.
-        is_in_degrees: Whether joint angles look like degrees although `radians` is false. The fit is then
-            always refused.
+    If joint angles look like degrees (`is_in_degrees`), the fit is always refused.
     """
 
     objections: tuple[str, ...] = ()
@@ -150,10 +146,7 @@ class FitWithData:
         ]
 
     def _changes(self) -> Iterator[tuple[Parameter, float, float]]:
-        """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size.
-
-        If only positions were measured, joints with an axis near the tip of the original model are skipped.
-        """
+        """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size."""
         model, fitted = self.model, self.fitted
         near = set[str]()
         if not self.measured.complete:
@@ -171,10 +164,7 @@ class FitWithData:
 
 
 def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
-    """Check whether a fit is plausible, and find the likeliest mistake if it is not.
-
-    `radians` is True if large joint angles are known to be in radians.
-    """
+    """Check whether a fit is plausible, and find the likeliest mistake if it is not."""
     few = fit.too_few()
     misfits = [*fit.misfits(), *fit.extreme_parameters()]
     like_degrees, outside = _out_of_range(fit.model, fit.q)
@@ -280,7 +270,6 @@ def _with_signs(model: CalibrationModel, q: FloatArray, signs: FloatArray) -> _C
 
 
 def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
-    """Return the first correction that gives a plausible fit with an error below the limit, or None."""
     trials = [_Trial(fit, correction) for correction in _corrections(fit.model, fit.q)]
     trials.sort(key=lambda trial: trial.error_before)
     for trial in trials[:_FITTED]:

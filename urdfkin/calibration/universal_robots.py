@@ -59,11 +59,7 @@ _COMPARED = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read the origin (4, 4) of each joint; the keys are joint names without a prefix.
-
-    The file is the driver's YAML, or a `default_kinematics.yaml` of its robot description. Raise SourceError
-    for an unreadable file, InputError for wrong content, and UnknownNameError for an unknown order.
-    """
+    """Read the origin (4, 4) of each joint from the driver's YAML, or from a `default_kinematics.yaml`."""
     if order not in ORDERS:
         raise UnknownNameError("order of rotations", order, ORDERS)
     try:
@@ -113,8 +109,7 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
 
     If all six joints turn about z, as in the current ROS description, the file's origins replace the joint
     origins. In other URDFs, such as the older ROS description, the joint origins are fitted, so that the
-    poses of `tool0` in `base` are those of the calibrated arm. Raise InputError for another robot or a wrong
-    file.
+    poses of `tool0` in `base` are those of the calibrated arm.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)

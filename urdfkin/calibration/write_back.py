@@ -34,8 +34,7 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Return the URDF's bytes with new joint origins; `origins` contains them (4, 4) by joint name.
 
     A number that is unchanged up to rounding keeps its digits. A rotation has several triples of roll, pitch
-    and yaw angles; the triple nearest to the old angles is written. Raise InputError for a faulty URDF or an
-    unknown joint.
+    and yaw angles; the triple nearest to the old angles is written.
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
@@ -109,7 +108,6 @@ class Rewritten:
 
     @cached_property
     def loaded(self) -> Robot:
-        """The robot of the new text, loaded with the options of the original robot."""
         mimic = self.robot.verifier.mimic
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # The first load gave these warnings.

@@ -124,10 +124,7 @@ def decode_answer(key: str, content: bytes) -> Answer:
 
 
 def pack(key: str, body: dict[str, Any]) -> bytes:
-    """Return results as the bytes of a file, with their key and a checksum.
-
-    Doubles can be read back exactly. Infinity is written as Python's word `Infinity`.
-    """
+    """Return results as the bytes of a file, with their key and a checksum; doubles are written exactly."""
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 

@@ -191,10 +191,7 @@ def _can_be_loaded(subject: RobotInput) -> bool:
 
 
 def stored(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store; the report of an incomplete store is marked as interrupted.
-
-    Raise SourceError or InputError if the folder is not a store.
-    """
+    """Return the report of a store; the report of an incomplete store is marked as interrupted."""
     store = Store.reading(Path(folder), _warn)
     store.check_names()
     manifest, found = store.manifest, store.manifest.subjects()

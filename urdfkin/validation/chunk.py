@@ -43,10 +43,8 @@ _MAX_DRAWS = 40
 class Chunk:
     """A range of samples of one robot.
 
-    Attributes:
-        first: Index of the chunk's first draw.
-        samples: Number of random configurations.
-        memory: Number of bytes that the check of the robot may use; None: half of the machine's free memory.
+    `first` is the index of the chunk's first draw, and `samples` is the number of random configurations. The
+    check of the robot may use `memory` bytes; None means half of the machine's free memory.
     """
 
     subject: RobotInput
@@ -76,10 +74,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk; only the first chunk of a robot has the robot's summary.
-
-    The sum of the results of two adjacent chunks is the result of the combined chunk.
-    """
+    """Result of a chunk; the sum of two results is the result of the combined chunk."""
 
     name: str
     joints: tuple[str, ...]

@@ -30,7 +30,6 @@ class CampaignProgress:
         robots_done: Number of robots that are complete or failed.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_kept: Number of finished chunks from an earlier run.
-        failures: Number of robots that have a disagreement or could not be checked.
     """
 
     robots_done: int

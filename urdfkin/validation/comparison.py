@@ -110,11 +110,7 @@ class _Block(_ComparisonBatch):
         self.joint_names = robot.joint_names[joints]
 
     def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
-        """Yield the error statistics of each quantity.
-
-        urdfkin computes the results for a joint and for the joint's child link only once, because they are
-        equal. Pinocchio computes them with two different functions.
-        """
+        """Yield error statistics; urdfkin's results for a joint are those for the joint's child link."""
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]

@@ -49,7 +49,6 @@ class Diagnosis:
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         scale: For each number in `expected`, the scale in its bound k * eps * scale.
-        compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
     inputs: Inputs
@@ -81,10 +80,7 @@ class Diagnosis:
 
 
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
-    """Return at most three sentences about the mistakes that explain the results.
-
-    Two mistakes together are reported only if no single mistake explains the results.
-    """
+    """Return at most three sentences about the mistakes that explain the results."""
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves
     if swaps:

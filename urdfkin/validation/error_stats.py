@@ -29,13 +29,7 @@ CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
 
 @dataclass(frozen=True, slots=True)
 class OraclePair:
-    """Comparison of one library's results with the results of the second oracle.
-
-    Attributes:
-        failed: Number of results outside their bound.
-        worst: The largest disagreement, in eps * scale.
-        share_of_bound: The largest ratio of a disagreement to its bound.
-    """
+    """Comparison of one library's results with the second oracle's; `worst` is in eps * scale."""
 
     failed: int = 0
     worst: float = 0.0
@@ -131,10 +125,7 @@ Inputs = tuple[list[float], list[float], list[float]]
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """The sample with the largest ratio of disagreement to bound.
-
-    `share` is this ratio, and `units` is the disagreement in eps * scale.
-    """
+    """Sample with the largest ratio `share` of a disagreement to its bound; `units` is in eps * scale."""
 
     share: float
     units: float
@@ -150,8 +141,7 @@ class Tally:
     """Error statistics of one quantity in one reference frame.
 
     Attributes:
-        results: Number of compared results. A result is a matrix or a six-vector.
-        failed: Number of results outside their bound.
+        results: Number of compared matrices or six-vectors.
         worst: The largest disagreement, in eps * scale.
         share: The largest ratio of a disagreement to its bound.
         histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
@@ -217,10 +207,7 @@ def tally(
     first_sample: int,
     inputs: Sequence[Inputs],
 ) -> Tally:
-    """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample.
-
-    The bound's scale and k can be broadcast to the shape of the results.
-    """
+    """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample."""
     n, count = ours.shape[:2]
     if not ours.size:
         return Tally(n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None)

@@ -59,13 +59,7 @@ class FunctionError:
 
 @dataclass(frozen=True)
 class WorstResult:
-    """The result with the largest ratio of difference to bound.
-
-    Attributes:
-        sample: Index of the configuration.
-        bound: Largest allowed difference of each number.
-        replay: A command or a line of Python that computes the expected result.
-    """
+    """The result with the largest ratio of difference to bound; `bound` is the allowed difference."""
 
     sample: int
     inputs: tuple[FloatArray, ...]

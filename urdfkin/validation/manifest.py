@@ -26,12 +26,7 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a campaign.
-
-    Attributes:
-        robots: For each robot: the origin, and the sha256 of the text (empty if the text could not be read).
-        started: Start time, ISO 8601, UTC.
-    """
+    """Definition of a campaign; `robots` contains each robot's origin and the sha256 of its text, or ""."""
 
     robots: tuple[tuple[Origin, str], ...]
     samples: int

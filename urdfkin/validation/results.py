@@ -63,7 +63,6 @@ class RobotReport:
         reason: Reason why the robot is not verified; None if it is verified.
         joints: Names of the moving joints, mimic joints included.
         frames: Names of the compared frames: every link and every joint.
-        error: The traceback of an unexpected error, for a bug report; None otherwise.
     """
 
     origin: Origin
@@ -161,13 +160,11 @@ class ValidationReport(Displayable):
     """Report of a whole run.
 
     Attributes:
-        asked: Number of requested robots.
-        started: Start time, ISO 8601, UTC.
-        seconds: Wall time.
-        interrupted: Whether the run ended early. Finished results are included.
-        made_by: Versions of urdfkin and the oracles that computed the report; None: the installed versions.
-        studies: Results of the accuracy study, if requested: one for each compared robot; None if the study
-            of a robot failed.
+        asked: Number of requested robots. interrupted: Whether the run ended early. Finished results are
+        included. made_by: Versions of urdfkin and the oracles that computed the report; None: the installed
+        versions. studies: Results of the accuracy study, if requested: one for each compared robot; None if
+        the study of a
+            robot failed.
     """
 
     robots: tuple[RobotReport, ...]
@@ -205,10 +202,7 @@ class ValidationReport(Displayable):
 
     @property
     def command(self) -> str:
-        """The command that repeats the run: one line for all robots with the same options.
-
-        The command for a robot that was passed as text reads standard input, and has its own line.
-        """
+        """The command that repeats the run: one line for robots with the same options."""
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
             f"urdfkin validate {_source_words(origins)} {settings} {origins[0].options}".rstrip()

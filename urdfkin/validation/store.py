@@ -189,10 +189,8 @@ def open_store(
 ) -> Iterator[Store]:
     """Open or create the store of a validation, and lock the store for writing.
 
-    With `shard`, for example "2/4", only this part of the store is locked, and other processes may write
-    other parts. With `retry_failed`, stored failures are deleted, because the files of the failed robots may
-    have changed. Raise InputError if another process uses the store, or if the store contains another
-    validation.
+    With `shard`, for example "2/4", other processes may write other parts. With `retry_failed`, stored
+    failures are deleted, because the files of the failed robots may have changed.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -154,13 +154,7 @@ VECTORS = DocumentKind("urdfkin-vectors/1", Vectors, (), "urdfkin vectors write 
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A small robot with one feature of URDF.
-
-    Attributes:
-        rule: The standard's rule.
-        note: A known difference between libraries in this feature.
-        frames: Links of the test vectors.
-    """
+    """A small robot with one feature of URDF; `note` states a known difference between libraries."""
 
     name: str
     rule: str
@@ -340,7 +334,6 @@ def write_sums(folder: Path, written: Sequence[Written]) -> Path:
 
 
 def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], samples: int) -> Written:
-    """Write a JSON file, and a text file with the same numbers, separated by tabs."""
     tree = robot.tree
     found = [_sample(robot, head.robot, frames, sample) for sample in range(samples)]
     rows = [

@@ -60,13 +60,7 @@ def _projection() -> FloatArray:
 
 @dataclass
 class _Canvas:
-    """A two-dimensional drawing of points in space.
-
-    Attributes:
-        projection: (2, 3) right and up directions of the picture in the base's axes.
-        size: Size of the chain, m.
-        labels: (position, direction, text, colour) of each label.
-    """
+    """A two-dimensional drawing; `projection` (2, 3) contains right and up in the base's axes."""
 
     axes: Any
     projection: FloatArray

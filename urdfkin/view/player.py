@@ -156,7 +156,6 @@ def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
 
 
 def as_png(frame: np.ndarray) -> bytes:
-    """Return a picture (height, width, 3 or 4) as the bytes of a PNG file."""
     stream = io.BytesIO()
     _on_white(frame).save(stream, "png", optimize=True)
     return stream.getvalue()

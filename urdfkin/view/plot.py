@@ -152,10 +152,7 @@ def _coordinates(
     x: FrameMotion,
     t: FloatArray,
 ) -> None:
-    """Draw the coordinates that change, or all if none changes, and their limits (thin lines).
-
-    If a legend has no space for all names, only coordinates that leave their limits have a colour and a name.
-    """
+    """Draw the coordinates that change, or all if none changes, and their limits (thin lines)."""
     del x
     values: FloatArray = getattr(trajectory, what)
     names = robot.coordinate_names if what == "q" else robot.rate_names

@@ -90,8 +90,6 @@ class Shape:
         size: Lengths in metres: (x, y, z) for a box, (radius, length) for a cylinder, (radius,) for a sphere.
             For a mesh, the scale factors (x, y, z).
         colour: Red, green, blue and opacity, each from 0 to 1. None means the colours of the mesh file.
-        file: The mesh's file; None for other kinds, and for a file that is not found.
-        address: The mesh's address in the URDF; "" for other kinds.
     """
 
     link: str

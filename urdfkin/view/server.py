@@ -187,10 +187,7 @@ class UnguardedError(UrdfkinError, RuntimeError):
 
 
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
-    """Start viser's server with the request filter; `server.address` is the address to open.
-
-    Raise InputError without viser or for a wrong `host`, and UnguardedError if viser cannot be secured.
-    """
+    """Start viser's server with the request filter; `server.address` is the address to open."""
     try:
         import viser
     except ImportError:

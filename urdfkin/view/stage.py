@@ -57,10 +57,7 @@ class Ellipsoid:
 
 
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
-    """Return arrows for the columns of the Jacobian, in world axes, starting at the frame's origin.
-
-    The motion `x` has one sample, with reference frame LOCAL_WORLD_ALIGNED. `reach` is the robot's size (m).
-    """
+    """Return arrows for the Jacobian's columns, for a motion with one sample in LOCAL_WORLD_ALIGNED."""
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
     keep = np.linalg.norm(columns, axis=1) > 1e-9
@@ -93,8 +90,7 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length 1.
 
-    The motion `x` has one sample, with reference frame LOCAL_WORLD_ALIGNED. The ellipsoid has a small
-    thickness even in directions without motion, so that a flat ellipsoid is visible.
+    The motion `x` has one sample in LOCAL_WORLD_ALIGNED.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -102,7 +98,7 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
     U = U * np.array([1.0, 1.0, np.sign(np.linalg.det(U))])
     largest = float(s[0])
     half = _SHARE * reach * (s / largest if largest > 0.0 else np.zeros(3))
-    half = np.maximum(half, 0.002 * reach)
+    half = np.maximum(half, 0.002 * reach)  # A small thickness keeps a flat ellipsoid visible.
     return Ellipsoid(half, x.placement[0, :3, 3], scalar_first(U))
 
 
