@@ -380,7 +380,6 @@ def _fit(
 
 
 def _significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """Return the parameters to write, and their fit; base and tool are always included."""
     model, kept, found = fit.model, fit.identification.kept, fit.fitted
     is_end = [model.chain.parameters[k].end for k in kept]
     change = found.at[list(kept)] - model.chain.start[list(kept)]

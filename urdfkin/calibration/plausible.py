@@ -146,7 +146,7 @@ class FitWithData:
         ]
 
     def _changes(self) -> Iterator[tuple[Parameter, float, float]]:
-        """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size."""
+        """Yield each fitted parameter of a moving joint, its change, and a lower bound of |change|."""
         model, fitted = self.model, self.fitted
         near = set[str]()
         if not self.measured.complete:

@@ -103,8 +103,6 @@ def accuracy_study(
 
 
 class _AccuracySamples(NamedTuple):
-    """Results of both libraries, the values with fifty digits (`true`), and the scale of the errors."""
-
     urdfkin: FloatArray
     pinocchio: FloatArray
     true: NDArray[np.object_]

@@ -124,7 +124,7 @@ def decode_answer(key: str, content: bytes) -> Answer:
 
 
 def pack(key: str, body: dict[str, Any]) -> bytes:
-    """Return results as the bytes of a file, with their key and a checksum; doubles are written exactly."""
+    """Return results as the bytes of a file, with key and checksum; doubles can be read back exactly."""
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 

@@ -148,7 +148,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError for other versions; nothing may be sent to the cluster before this check."""
+    """Raise ClusterError if versions differ; nothing may be sent to the cluster before this check."""
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"

@@ -144,7 +144,6 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, tasks: RobotTasks) -> None:
-        """Put a task back into its robot's remaining tasks, so that another worker can run it."""
         tasks.put_back(task)
         self._begun.remove(tasks)
         self._waiting = chain([tasks], self._waiting)

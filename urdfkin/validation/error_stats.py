@@ -102,7 +102,6 @@ def cross_check(
 
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
-    """Return whether each result agrees (n, frames), and the worst disagreements of the pair."""
     units = worst_of_each(one, other, bound.scale, 2)
     share = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     agrees = share <= 1.0
@@ -180,7 +179,6 @@ class Tally:
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements, with an error of at most the width of a bin (26 %)."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 

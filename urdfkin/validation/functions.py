@@ -321,7 +321,6 @@ class _FunctionResults:
         expected: urdfkin's results (n, ...).
         scale: For each number in `expected`, the scale in its bound k * eps * scale.
         k: (n,) for each result, the factor k in its bound k * eps * scale.
-        theirs: The oracle's results (n, ...); None if no oracle can check the robot.
     """
 
     first: int
@@ -576,8 +575,6 @@ class _Run:
 
 @dataclass
 class _Total:
-    """Sums and maxima over all batches; `kept` is the first batch with a result of the right shape."""
-
     row_names: tuple[str, ...]
     column_names: tuple[str, ...]
     compared: int = 0

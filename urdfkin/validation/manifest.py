@@ -46,7 +46,6 @@ class Manifest:
         return Cut(self.samples)
 
     def subjects(self) -> list[RobotInput]:
-        """Return the robots without their texts, which a report does not need."""
         return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
 
     def key(self, robot: int, index: int) -> str:
@@ -65,7 +64,6 @@ class Manifest:
 
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
-        """Read a manifest; raise InputError for a file that is no manifest, or has another layout."""
         layout = DocumentKind(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
         return layout.checked(parse_json(content, where), where)
 

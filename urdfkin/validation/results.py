@@ -220,10 +220,7 @@ class ValidationReport(Displayable):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of the command `validate`.
-
-        0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified.
-        """
+        """Exit code of `urdfkin validate`; 0 means that every robot was verified."""
         return self.outcome.exit_code
 
     def as_dict(self) -> Document:
@@ -251,7 +248,6 @@ class ValidationReport(Displayable):
 
 
 def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
-    """Group the robots by options; a group has at most one robot from standard input."""
     groups: dict[tuple[str, int], list[Origin]] = {}
     texts = Counter[str]()
     for origin in origins:

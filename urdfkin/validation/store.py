@@ -249,7 +249,6 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
 
 
 def _only_failed_robots_differ(store: Store, manifest: Manifest) -> bool:
-    """Return whether the manifests are equal except for changed files of robots that have failed."""
     own, theirs = store.manifest.robots, manifest.robots
     if len(own) != len(theirs) or replace(store.manifest, robots=theirs).differences(manifest):
         return False

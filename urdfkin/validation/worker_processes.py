@@ -61,7 +61,6 @@ class WorkerProcess:
         self._process.wait()
 
     def wait_for_cause(self) -> str:
-        """Wait until the process has ended, and return the signal or exit status that ended the process."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_GRACE)
         self.end()

@@ -72,7 +72,6 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw the singular values of the Jacobian's linear or angular rows."""
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
@@ -87,7 +86,6 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
 
 
 def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw Yoshikawa's manipulability: the product of the singular values of the linear or angular rows."""
     _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
     axes.set_ylabel(f"manipulability\n[{unit}]")
     axes.set_ylim(0.0, 1.08 * float(axes.dataLim.y1) or 1.0)

@@ -109,7 +109,6 @@ class Sliders:
             self._report(row.at, float(handle.value) / self._scale(row))
 
     def show(self, values: FloatArray) -> None:
-        """Set the sliders; a value beyond a slider's range extends the range."""
         self._is_setting = True
         try:
             for row, handle in zip(self.rows, self.handles, strict=True):
