@@ -68,7 +68,7 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A Jacobian column is a candidate if its remainder has this fraction of the longest remainder's length.
+#: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
 _AS_GOOD = 0.5
 #: Maximum number of fitted parameters that a message lists for one fixed parameter.
 _NAMED = 3
@@ -98,7 +98,7 @@ class Identification:
 def stacked(
     model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
 ) -> FloatArray:
-    """Return the dimensionless Jacobian (rows, p) of all measurements; `chain.size` converts angles."""
+    """Return the dimensionless Jacobian (rows, p) of all measurements; `chain.size` turns angles to lengths."""
     L = model.chain.size
     _, columns = model.chain.columns(values, at)
     columns[:, 3:] *= L
@@ -391,7 +391,7 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # Rounding may make a small variance 0 or negative; the change is then significant.
+        # Rounding may make a small variance 0 or negative; the parameter then counts as significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:

@@ -61,7 +61,7 @@ _list = partial(first_names, most=4)
 class Plausibility:
     """The reasons why a fit is refused; `reason` is the likeliest mistake and its remedy.
 
-    If joint angles look like degrees (`is_in_degrees`), the fit is always refused.
+    If `is_in_degrees` is True, the fit is always refused.
     """
 
     objections: tuple[str, ...] = ()
@@ -71,7 +71,7 @@ class Plausibility:
 
 @dataclass(frozen=True, eq=False)
 class FitWithData:
-    """A fit with its data; `q` (s, c) are coordinates, and `before` is the fit of base and tool only."""
+    """A fit with its data; `q` (s, c) are path coordinates, and `before` is the fit of base and tool only."""
 
     model: CalibrationModel
     q: FloatArray
@@ -280,7 +280,7 @@ def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
 
 
 def _several_signs(fit: FitWithData) -> _Trial | None:
-    """Reverse the signs of joints one by one while the error decreases; return None for a single sign."""
+    """Reverse signs of joints one by one while the error decreases; return None for fewer than two."""
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
     for _ in signs:

@@ -74,7 +74,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk; the sum of two results is the result of the combined chunk."""
+    """Result of a chunk; adjacent results can be added, and only the first chunk's result has a summary."""
 
     name: str
     joints: tuple[str, ...]

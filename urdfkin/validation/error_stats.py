@@ -29,7 +29,7 @@ CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
 
 @dataclass(frozen=True, slots=True)
 class OraclePair:
-    """Comparison of one library's results with the second oracle's; `worst` is in eps * scale."""
+    """Comparison of one library's results with results of the second oracle; `worst` is in eps * scale."""
 
     failed: int = 0
     worst: float = 0.0

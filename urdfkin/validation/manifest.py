@@ -26,7 +26,7 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a campaign; `robots` contains each robot's origin and the sha256 of its text, or ""."""
+    """Definition of a campaign; `robots` contains origins, and digests (sha256) of texts that could be read."""
 
     robots: tuple[tuple[Origin, str], ...]
     samples: int
