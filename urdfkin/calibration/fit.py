@@ -98,7 +98,7 @@ class Identification:
 def stacked(
     model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
 ) -> FloatArray:
-    """Return the dimensionless Jacobian (rows, p) of all measurements; `chain.size` turns angles to lengths."""
+    """Return the dimensionless Jacobian (rows, p) of all measurements, with angles times `chain.size`."""
     L = model.chain.size
     _, columns = model.chain.columns(values, at)
     columns[:, 3:] *= L

@@ -26,7 +26,7 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a campaign; `robots` contains origins, and digests (sha256) of texts that could be read."""
+    """Definition of a campaign; `robots` contains origins, and digests of texts (empty if unreadable)."""
 
     robots: tuple[tuple[Origin, str], ...]
     samples: int
