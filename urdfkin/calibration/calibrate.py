@@ -87,6 +87,7 @@ class Calibration:
         odd: Indices of the outlier poses.
         weak: Indices of poorly observable parameters, each with a ratio of uncertainties: the uncertainty at
             the measured configurations, divided by the uncertainty at as many random configurations.
+        stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the other parameters have their original values.
         significant: Indices of the parameters that `written_fit` fits.
     """
@@ -303,7 +304,7 @@ def fitted_model(
 
 
 def _general_target(model: CalibrationModel) -> FloatArray:
-    """Return start values (p,) in which the tool's target lies on no joint axis."""
+    """Return start values (p,); a fitted position of the tool's target lies on no joint axis."""
     at = model.chain.start.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -444,7 +445,10 @@ def _weak(
 
 
 def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
-    """Compare the written model with Pinocchio, without base, tool and gains, which a URDF cannot contain."""
+    """Compare the written model with Pinocchio: a URDF at the measured configurations, a table at q = 0.
+
+    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison of a URDF.
+    """
     model, fitted = found.model, found.written_fit
     if fitted is None:
         return None

@@ -42,8 +42,9 @@ removes only the largest outlier and fits the other poses again. The steps end w
 **Start values.** Base and tool are computed from the poses before the fit. The robot's poses T_i, the
 measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i and R_X be the
 rotations of these poses. The equations R_B^T R_Mi = R_i R_X are linear in the unknown rotations R_B and R_X.
-Together, R_B and R_X form the null vector of these equations (Shah, 2013). The measured positions
-p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations: x of the tool and b of the base.
+Together, R_B and R_X form the null vector of these equations (Shah, 2013). Let p_i be the robot's positions.
+The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations: x of the tool and
+b of the base.
 
 If only positions are measured, the base and the position of the target on the tip are unknown. The equations
 for the base are linear if the target is known, and the equations for the target are linear if the base is
@@ -72,7 +73,7 @@ from urdfkin.verify.singular_values import singular_values
 _AS_GOOD = 0.5
 #: Maximum number of fitted parameters that a message lists for one fixed parameter.
 _NAMED = 3
-#: A message lists only parameters that cause more than this fraction of the fixed parameter's effect.
+#: A message lists fitted parameters whose share of the fixed parameter's effect exceeds this fraction.
 _SHARE = 1e-6
 
 
@@ -110,7 +111,10 @@ def stacked(
 def identify(
     model: CalibrationModel, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
 ) -> Identification:
-    """Determine which parameters are identifiable at the joint values (s, n) and the parameters `at` (p,)."""
+    """Determine which parameters are identifiable at the joint values (s, n) and the parameters `at` (p,).
+
+    `complete` is True if full poses are measured, and False if only positions are measured.
+    """
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.chain.rounding(values))
     kept = list[int]()
@@ -347,7 +351,7 @@ class _LeastSquares:
         Q, R = np.linalg.qr(J / units)
         half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
         blocks = Q.reshape(len(self.measured), k, len(self.kept))
-        redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)  # The diagonal blocks of I - H.
+        redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)  # These are the diagonal blocks of I - H.
         own = r.reshape(-1, k)
         inverse = np.linalg.pinv(redundancy, rcond=_UNOBSERVED, hermitian=True)
         chi_squares = np.einsum("si,sij,sj->s", own, inverse, own)
@@ -380,8 +384,10 @@ def outliers(
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
     """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
-    If the measurements determine only a combination of two parameters, one of the two remains selected. A
-    `fixed` parameter is always selected. Unknown entries of the covariance are inf.
+    Each step resets the least significant parameter to its old value. The covariance gives the resulting
+    change of the other parameters. If the measurements determine only a combination of two parameters, one of
+    the two remains selected. A `fixed` parameter is always selected. Unknown entries of the covariance are
+    inf.
 
     >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -495,7 +501,7 @@ def _translations(
 
 
 def demand_metres(model: CalibrationModel, measured: Measured) -> None:
-    """Raise InputError if measured positions spread 100 times farther than positions of the robot's tip."""
+    """Raise InputError if measured positions spread over 100 times farther than the robot's tip positions."""
     T = model.chain.poses(measured.values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)

@@ -113,7 +113,10 @@ class ParametricChain:
     def columns(
         self, values: FloatArray, at: FloatArray | None = None, frames: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first."""
+        """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
+
+        `frames`, if given, must be the result of the method `frames` for `values` and `at`.
+        """
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
         columns = np.zeros((len(values), 6, len(self.parameters)))
@@ -160,7 +163,10 @@ _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
 
 @dataclass(frozen=True, eq=False)
 class CalibrationModel:
-    """A parametric chain; `groups` lists the parameters of each joint and end, in order of preference."""
+    """A parametric chain whose parameters are grouped by joint, base and tool.
+
+    Each group contains parameter indices in order of preference.
+    """
 
     chain: ParametricChain
     groups: tuple[tuple[int, ...], ...]

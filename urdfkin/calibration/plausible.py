@@ -33,9 +33,9 @@ from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTr
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: An rms error above these fractions of the reach and of the positions' spread is not plausible.
+#: An rms error above both fractions, of the reach and of the positions' spread, is not plausible.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: An rms error above these fractions of the reach and of the error before the fit is not plausible.
+#: An rms error above both fractions, of the reach and of the error before the fit, is not plausible.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
@@ -48,7 +48,7 @@ _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is compared with a limit.
 #: Changes that the data determine poorly, such as the tilt of an axis near the target, are then accepted.
 _UNCERTAIN = 5.0
-#: Maximum ratio of the errors after and before a correction: for accepted fits, and for refused fits.
+#: Maximum error after a correction, divided by the error before: for accepted fits, and for refused fits.
 _BETTER, _NOT_WORSE = 0.25, 1.5
 #: Number of corrections that are fitted, beginning with the most promising.
 _FITTED = 4
@@ -61,7 +61,8 @@ _list = partial(first_names, most=4)
 class Plausibility:
     """The reasons why a fit is refused; `reason` is the likeliest mistake and its remedy.
 
-    If `is_in_degrees` is True, the fit is always refused.
+    `reason` is None if no correction of the data makes the fit plausible. If `is_in_degrees` is True, the fit
+    is always refused.
     """
 
     objections: tuple[str, ...] = ()
@@ -136,7 +137,10 @@ class FitWithData:
             yield f"the fit scales the values of joint {_list(gained.values())}"
 
     def turned_zeros(self) -> list[str]:
-        """Return the joints whose zero changed by about half a turn; a reversed sign can cause this."""
+        """Return the joints whose zero changed by about half a turn.
+
+        A reversed sign of the next joint can cause such a change.
+        """
         return [
             f"{parameter.where!r} by {angle(abs(change))}"
             for parameter, change, least in self._changes()

@@ -184,7 +184,10 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest sampled distance (m) and angle (rad) between the `tool0` frames of two arms."""
+    """Return the largest sampled distance (m) and angle (rad) between the `tool0` frames of two arms.
+
+    The angle is computed as 2 sin(angle / 2), which is accurate only for small angles.
+    """
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)

@@ -48,7 +48,7 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(exact, otypes=[object])
 #: The result has one line for each group of these representations of the orientation.
-#: Angles about fixed axes are left out: they have the same Jacobians, with the rows in reverse order.
+#: Angles about fixed axes are left out: their Jacobians are those of Euler angles with reversed rows.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -65,7 +65,7 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyLine:
-    """Errors of both libraries for one quantity.
+    """Errors of urdfkin and of Pinocchio for one quantity, over `numbers` compared values.
 
     For analytical Jacobians, `reference` is the representation of the orientation.
     """

@@ -32,7 +32,7 @@ class Failure:
     """The reason why a robot was not checked.
 
     `passing` means that the process or the cluster failed, and not the robot. Such a failure is not stored,
-    so a resumed run computes the chunk again.
+    so a resumed run computes the chunk again. `error` is the traceback of an unexpected error.
     """
 
     verdict: ValidationVerdict

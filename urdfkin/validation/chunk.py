@@ -74,7 +74,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk; adjacent results can be added, and only the first chunk's result has a summary."""
+    """Result of a chunk; results of adjacent chunks can be added, and only the first chunk has a summary."""
 
     name: str
     joints: tuple[str, ...]

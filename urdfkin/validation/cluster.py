@@ -148,7 +148,10 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 
 
 def _check_versions(client: Client) -> None:
-    """Raise ClusterError if versions differ; nothing may be sent to the cluster before this check."""
+    """Raise ClusterError if a worker or the scheduler has other versions than this process.
+
+    The caller must not send anything to the cluster before this check.
+    """
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
             remedy = f"install urdfkin {version('urdfkin')} on the worker's machine"
@@ -253,7 +256,7 @@ class Cluster:
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as lost:  # The scheduler transfers the results.
+            except OSError as lost:  # The scheduler, which transfers results, is lost.
                 raise self._lost() from lost
             return _answer(result, task)
         if self._client.status != "running":

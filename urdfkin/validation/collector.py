@@ -30,6 +30,7 @@ class CampaignProgress:
         robots_done: Number of robots that are complete or failed.
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_kept: Number of finished chunks from an earlier run.
+        failures: Number of robots so far that have a disagreement or could not be checked.
     """
 
     robots_done: int
@@ -149,7 +150,7 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # Results after the first failed chunk are left out; their number depends on the workers' speed.
+        # Results after a failed chunk are left out, because their number depends on the workers' speed.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._sums if run.start < last]

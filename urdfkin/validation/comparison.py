@@ -110,7 +110,10 @@ class _Block(_ComparisonBatch):
         self.joint_names = robot.joint_names[joints]
 
     def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
-        """Yield error statistics; urdfkin's results for a joint are those for the joint's child link."""
+        """Yield error statistics; urdfkin's results for a joint are those for the joint's child link.
+
+        The results for both are compared, because Pinocchio computes them with different functions.
+        """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
@@ -149,7 +152,10 @@ class _Block(_ComparisonBatch):
 
 
 class _Screws(_ComparisonBatch):
-    """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians of the joints in the frame WORLD."""
+    """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
+
+    Each column of `data.J` equals a column of one joint's Jacobian in the reference frame WORLD.
+    """
 
     def tallies(self) -> Iterator[Tally]:
         robot, x = self.robot, self.x

@@ -49,6 +49,7 @@ class Diagnosis:
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
         scale: For each number in `expected`, the scale in its bound k * eps * scale.
+        compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
     inputs: Inputs

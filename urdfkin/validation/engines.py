@@ -96,7 +96,10 @@ def _result(future: Future[Answer]) -> Answer:
 
 
 class RobotTasks:
-    """The remaining tasks of a robot; `index` is the latest chunk that was taken."""
+    """The remaining tasks of a robot.
+
+    `index` is the index of the latest chunk that was taken; a lower index means that more chunks remain.
+    """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
         self.robot = self.index = -1

@@ -124,7 +124,7 @@ Inputs = tuple[list[float], list[float], list[float]]
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """Sample with the largest ratio `share` of a disagreement to its bound; `units` is in eps * scale."""
+    """Sample with the largest `share` (disagreement / bound); `units` is the disagreement in eps * scale."""
 
     share: float
     units: float

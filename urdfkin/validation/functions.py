@@ -59,7 +59,10 @@ class FunctionError:
 
 @dataclass(frozen=True)
 class WorstResult:
-    """The result with the largest ratio of difference to bound; `bound` is the allowed difference."""
+    """The result with the largest ratio of difference to bound; `bound` is the allowed difference.
+
+    `replay` is a command or a line of Python that computes the expected result.
+    """
 
     sample: int
     inputs: tuple[FloatArray, ...]
@@ -214,7 +217,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a robot's verifier that also stores the arguments of each checked call."""
+    """A wrapper of a robot's verifier that also stores the latest checked call of each quantity."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -635,7 +638,7 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Call the function and return its result; after an error, add the error to `total` and return None."""
+    """Call the function and return a copy of its result, or add its error to `total` and return None."""
     try:
         given = np.asanyarray(function(*inputs))
         if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":

@@ -26,7 +26,10 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a campaign; `robots` contains origins, and digests of texts (empty if unreadable)."""
+    """Definition of a campaign; `started` is the start time, ISO 8601, UTC.
+
+    For each robot, `robots` contains the origin and the text's sha256, which is empty for an unreadable text.
+    """
 
     robots: tuple[tuple[Origin, str], ...]
     samples: int
@@ -46,6 +49,7 @@ class Manifest:
         return Cut(self.samples)
 
     def subjects(self) -> list[RobotInput]:
+        """Return the robots without their texts, which a report does not need."""
         return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
 
     def key(self, robot: int, index: int) -> str:

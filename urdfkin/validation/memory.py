@@ -68,7 +68,10 @@ def _free() -> Iterator[int]:
 
 
 def _group(mount: Path, group: str, limit: str, usage: str) -> Iterator[int]:
-    """Yield the free bytes of a control group and of each parent group, because all limits apply."""
+    """Yield the free bytes of a control group and of each parent group, because all limits apply.
+
+    In a container, the highest visible control group is the container's own group.
+    """
     folder = mount / group.lstrip("/")
     for place in (folder, *folder.parents):
         if place == mount.parent:

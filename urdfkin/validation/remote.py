@@ -40,7 +40,7 @@ def hold(robot: bytes) -> bytes:
 
 
 def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
-    """Run a pickled chunk in a process, if the client's versions (`by`) are those of this machine."""
+    """Run a pickled chunk in a process if the client's versions and digests (`by`) equal this machine's."""
     if by != provenance():
         return "other code", provenance()
     cause = ""

@@ -63,6 +63,7 @@ class RobotReport:
         reason: Reason why the robot is not verified; None if it is verified.
         joints: Names of the moving joints, mimic joints included.
         frames: Names of the compared frames: every link and every joint.
+        error: The traceback of an unexpected error, for a bug report; None otherwise.
     """
 
     origin: Origin
@@ -95,7 +96,7 @@ class RobotReport:
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
     def replay(self, key: Key) -> str | None:
-        """Return a command that repeats the worst result of a quantity; None if nothing was compared."""
+        """Return a command that computes the worst result again; None if nothing was compared."""
         quantity, reference = key
         if (case := self.tallies[key].case) is None:
             return None
@@ -160,11 +161,11 @@ class ValidationReport(Displayable):
     """Report of a whole run.
 
     Attributes:
-        asked: Number of requested robots. interrupted: Whether the run ended early. Finished results are
-        included. made_by: Versions of urdfkin and the oracles that computed the report; None: the installed
-        versions. studies: Results of the accuracy study, if requested: one for each compared robot; None if
-        the study of a
-            robot failed.
+        asked: Number of requested robots.
+        started: Start time, ISO 8601, UTC.
+        interrupted: Whether the run ended early; the report contains the finished results.
+        made_by: Versions of urdfkin and the oracles that computed the report; None: the installed versions.
+        studies: Results of the accuracy study, one for each compared robot; None if the robot's study failed.
     """
 
     robots: tuple[RobotReport, ...]
@@ -202,7 +203,10 @@ class ValidationReport(Displayable):
 
     @property
     def command(self) -> str:
-        """The command that repeats the run: one line for robots with the same options."""
+        """The command that repeats the run: one line for robots with the same options.
+
+        A robot that was passed as text is read from standard input, so a line has at most one such robot.
+        """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
             f"urdfkin validate {_source_words(origins)} {settings} {origins[0].options}".rstrip()

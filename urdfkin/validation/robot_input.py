@@ -37,6 +37,7 @@ class RobotInput:
     Attributes:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
         stamp: The sha256 of the robot's text; empty if the text cannot be read.
+        file: The file name in errors and warnings, if `source` is the text of the robot.
         listed: Errors and warnings about the original MJCF or USD file.
         made: Whether the text was converted to URDF from another format.
     """

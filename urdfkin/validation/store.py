@@ -232,7 +232,10 @@ def _is_ours(path: Path) -> bool:
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
-    """Return the store; write its manifest if there is none, or for a retry with changed files."""
+    """Return the store; write its manifest if there is none, or for a retry with changed files.
+
+    Otherwise the manifest is not replaced, because it contains the original start time.
+    """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
         return store
@@ -290,7 +293,7 @@ def _lock(file: IO[bytes], how: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, how):
             return
-        time.sleep(0.1)  # Another process may hold the lock for a moment to test it.
+        time.sleep(0.1)  # Another process may hold the lock for a moment, to test the lock.
     raise InputError(
         "another process uses this store",
         where=str(folder),

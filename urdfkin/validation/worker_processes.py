@@ -70,8 +70,8 @@ class WorkerProcess:
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
     """Start a Python interpreter that imports the same packages as this process.
 
-    The interpreter has its own process group. Therefore, Ctrl-C in the terminal interrupts only the parent
-    process, which then saves the finished results.
+    The interpreter does not import this process's main module, and has its own process group. Therefore,
+    Ctrl-C in the terminal interrupts only the parent process, which then saves the finished results.
     """
     command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)

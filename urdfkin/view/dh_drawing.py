@@ -60,7 +60,7 @@ def _projection() -> FloatArray:
 
 @dataclass
 class _Canvas:
-    """A two-dimensional drawing; `projection` (2, 3) contains right and up in the base's axes."""
+    """A two-dimensional drawing; the rows of `projection` (2, 3) are right and up in the base's axes."""
 
     axes: Any
     projection: FloatArray

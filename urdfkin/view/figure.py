@@ -88,7 +88,7 @@ def _matplotlib() -> Any:
 
 
 def save(figure: Figure, path: Path) -> bytes:
-    """Return the figure as bytes in the format of the suffix of `path`; equal figures give equal bytes."""
+    """Return the figure as bytes in the format that `path` ends with; equal figures give equal bytes."""
     format_ = path.suffix.removeprefix(".").lower()
     if format_ not in FORMATS:
         raise InputError(
@@ -102,7 +102,7 @@ def save(figure: Figure, path: Path) -> bytes:
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
-    """Return a figure in `PAGE_COLOURS` as an SVG element of a page; `prefix` makes ids unique."""
+    """Return a figure in `PAGE_COLOURS` as an SVG element; `prefix` makes ids unique on the page."""
     stream = io.StringIO()
     no_metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with style():

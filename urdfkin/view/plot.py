@@ -79,7 +79,8 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # The axis has too few powers of ten.
+    # If the axis has fewer than two powers of ten, three other values get a tick.
+    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylabel(f"singular values\n[{unit}] at |v| = 1")
@@ -179,7 +180,10 @@ def _coordinates(
 
 
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
-    """Return whether a sample is outside its limits by more than the rounding error of a decimal limit."""
+    """Return whether each value is outside its limits by more than one unit in the last place of a double.
+
+    This tolerance covers the rounding of a limit in decimal notation.
+    """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
 

@@ -231,7 +231,7 @@ def _require_address(host: str) -> None:
 
 
 def _process_request(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
-    """Return a websockets callback that returns a response, or None to accept a connection."""
+    """Return a callback of the library websockets: it returns a response, or None to accept a connection."""
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 

@@ -67,6 +67,7 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 
 
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
+    """Return arrows for the acceleration's parts and sum; `x` has one sample in LOCAL_WORLD_ALIGNED."""
     parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
     names = tuple(name for name, used in zip((*KINDS, "sum"), keep, strict=True) if used)
@@ -141,7 +142,10 @@ _NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene; `reach` is the robot's size (m), and `missing` lists meshes not shown."""
+    """A robot in viser's scene; `reach` is the robot's size (m).
+
+    `missing` lists the meshes that cannot be shown.
+    """
 
     def __init__(self, server: Any, robot: Robot) -> None:
         self._scene, self._server, self.robot = server.scene, server, robot

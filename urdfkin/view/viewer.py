@@ -120,7 +120,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # If the slider already has this value, it is not set: a conversion of units could round it.
+                # A slider with this value is not set, because a conversion of units could round the value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -440,6 +440,7 @@ class Viewer:
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return
+            # The text field keeps the text that the user typed.
             self.wrong.content = markdown_text("; ".join(degrees_lines(self.robot.tree, self.q)))
             self.sliders.show(self.q)
             self.update()
