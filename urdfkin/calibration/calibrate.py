@@ -4,10 +4,10 @@ A fit that is not plausible (`plausible.py`) is refused. Otherwise the parameter
 two standard deviations are fitted again and written. The other parameters keep their original values.
 
 `read_poses` reads measured poses. A CSV file has a column for each coordinate, with the coordinate's name.
-The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. Instead
-of position and orientation, the columns T00 to T23, or T00 to T33, may contain the pose matrix, as `urdfkin
-placement --format csv` writes it. An .npz file contains q (n, nq) and the poses: either T (n, 4, 4), or p (n,
-3) with an optional quat (n, 4), scalar last.
+The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. The
+columns T00 to T23, or T00 to T33, can contain the pose matrix instead of position and orientation. The
+command `urdfkin placement --format csv` writes such matrices. An .npz file contains q (n, nq) and the poses:
+either T (n, 4, 4), or p (n, 3) with an optional quat (n, 4), scalar last.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ parameters. For each singular value, `urdfkin.verify.singular_values` computes a
 rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
 lower bound, so no tolerance is needed.
 
-The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis, if the next
-frame compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
+The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis. The next frame
+can compensate this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
 joint's direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable, and 2 of the 6
 parameters of each prismatic joint. All 6 parameters of the tip are identifiable (Everett, Driels and Mooring,
 1987). If only positions are measured, 3 fewer parameters are identifiable, because the tool's orientation is
@@ -30,12 +30,12 @@ and r the weighted residuals. The covariance of the parameters is
 The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
 
 If you do not state the noise, it is estimated from the residuals, separately for positions and rotations. The
-variance of the positions is the sum of the squared position residuals, divided by the sum of the redundancies
-1 - H_ii of the measured position coordinates. The variance of the rotations is computed in the same way. The
+variance of the positions is the sum of the squared position residuals, divided by the sum of their
+redundancies 1 - H_ii. The variance of the rotations is computed in the same way. The
 estimation is repeated until the estimates are constant (Foerstner's variance components).
 
 A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a correct pose this number is chi^2
-distributed, with 3 degrees of freedom for a position and 6 for a full pose. The limit is chosen so that only
+distributed. A position has 3 degrees of freedom, and a full pose has 6. The limit is chosen so that only
 one of a hundred data sets without outliers exceeds the limit. One outlier can hide another, so each step
 removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
 
@@ -47,8 +47,8 @@ The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown tr
 b of the base.
 
 If only positions are measured, the base and the position of the target on the tip are unknown. The equations
-for the base are linear if the target is known, and the equations for the target are linear if the base is
-known. The module therefore computes base and target alternately.
+for the base are linear if the target is known. The equations for the target are linear if the base is known.
+The module therefore computes base and target alternately.
 """
 
 from __future__ import annotations

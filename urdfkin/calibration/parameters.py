@@ -3,8 +3,8 @@
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
 origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
 an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
-joint's value by (1 + g). The derivative of the tip's pose with respect to g is the derivative with respect to
-the motion's angle or length, multiplied by the joint's value.
+joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the motion's angle or
+length, multiplied by the joint's value.
 
 **URDF.** Each joint of the path has six parameters of its origin. Let T be the joint's original origin, and
 let A be the rotation that maps the z axis to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z)
@@ -16,7 +16,7 @@ motions of `tool`: the pose of the target in the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
 `PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
-parameters of other rows, and a tilt of the axis in any direction needs both alpha and beta.
+parameters of other rows. A tilt of the axis in any direction needs both alpha and beta.
 """
 
 from __future__ import annotations

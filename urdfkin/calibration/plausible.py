@@ -1,8 +1,8 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
-A fit always has some result, even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused if its residuals are a large fraction of the robot's reach, or if it
-hardly improves the original model. A fit that tilts a joint's axis by a large angle, or that has no
+Joint angles in degrees, shifted rows of q or the reversed sign of a joint do not prevent a fit. A fit is
+refused if the residuals are a large fraction of the robot's reach, or hardly smaller than the residuals of
+the original model. A fit that tilts a joint's axis by a large angle, or that has no
 redundancy, is refused too. To find the reason, the module corrects common mistakes in the data, one at a
 time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest one.
 """

@@ -9,7 +9,7 @@ joint: x, y, z, roll, pitch and yaw.
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
 Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn and another angle is small (1e-5 to 1e-4 rad), the
-two products differ by the small angle. The order "driver" agrees with the robot's controller. With the order
+products differ by the small angle. The order "driver" agrees with the robot's controller. With the order
 "urdf", the result agrees with the URDF that the ROS package generates from the file.
 """
 
@@ -108,8 +108,8 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
     If all six joints turn about z, as in the current ROS description, the file's origins replace the joint
-    origins. In other URDFs, such as the older ROS description, the joint origins are fitted, so that the
-    poses of `tool0` in `base` are those of the calibrated arm.
+    origins. In other URDFs, such as the older ROS description, the joint origins are fitted. After the fit,
+    the poses of `tool0` in `base` are those of the calibrated arm.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)

@@ -1,8 +1,8 @@
 """Chunks of a validation; a chunk is a range of samples of one robot.
 
 A sample depends only on the seed and on the index of the sample. Inputs and results of a chunk are plain
-data, so a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2 of a
-robot are the neutral configuration, the lower limits and the upper limits.
+data. Therefore, a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2
+of a robot are the neutral configuration, the lower limits and the upper limits.
 
 Random samples are drawn 25 at a time, each draw with its own seed. Therefore, the number of draws in a chunk
 does not change any result.

@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-When a result arrives, it is added to the results of adjacent chunks, so memory does not grow with the number
-of samples. The sum does not depend on the order in which the results arrive.
+Each result is added to the results of adjacent chunks when the result arrives. Therefore, memory does not
+grow with the number of samples. The sum does not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Compare every frame of a robot with Pinocchio, for a batch of samples.
 
 Frames are compared in blocks, to limit the memory. The largest arrays are the Jacobians, with
-samples * frames * 6 * nv numbers. The results of a frame do not depend on the block that contains the frame,
-so the report does not depend on the division into blocks.
+samples * frames * 6 * nv numbers. The division into blocks changes no result of a frame, and therefore does
+not change the report.
 """
 
 from __future__ import annotations

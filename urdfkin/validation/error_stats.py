@@ -1,7 +1,7 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-The addition of two tallies is commutative and associative, so the sum does not depend on the division of the
-samples into chunks. If two worst cases are equally bad, the sum of two tallies keeps the case with the
+The addition of tallies is commutative and associative. Therefore, the sum does not depend on the division of
+the samples into chunks. If two worst cases are equally bad, the sum of two tallies keeps the case with the
 smaller sample number.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own

@@ -1,8 +1,8 @@
 """Engine that runs chunks in processes of this machine; the crash of a process affects only its robot.
 
-A worker process is a new Python interpreter that imports neither the parent's main module nor modules of the
-current folder, so a script needs no `__main__` guard. A worker process has one chunk at a time, so each crash
-can be attributed to a robot. After a crash, the robot is tried once more, alone in a process, after all other
+A worker process is a new Python interpreter. A worker imports neither the parent's main module nor modules of
+the current folder, so a script needs no `__main__` guard. A worker has one chunk at a time, so each crash can
+be attributed to a robot. After a crash, the robot is tried once more, alone in a process, after all other
 robots. With `isolate`, each robot runs alone from the start, and the first crash is the robot's result.
 """
 
@@ -70,8 +70,8 @@ class WorkerProcess:
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
     """Start a Python interpreter that imports the same packages as this process.
 
-    The interpreter does not import this process's main module, and has its own process group. Therefore,
-    Ctrl-C in the terminal interrupts only the parent process, which then saves the finished results.
+    The interpreter has its own process group. Therefore, Ctrl-C in the terminal interrupts only the parent
+    process, which then saves the finished results.
     """
     command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, pass_fds=[pipe], process_group=0)

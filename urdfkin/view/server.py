@@ -12,9 +12,9 @@ Four independent measures keep them out:
 
 Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
 server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that checks
-each request. Before a robot is shown, the module tests the running server with requests that it must refuse,
-and stops a server that accepts one of them. A new version of viser can therefore make the viewer fail, but it
-cannot make it insecure.
+each request. Before a robot is shown, the module sends forbidden requests to the running server, and stops
+the server if it accepts one of these requests. A new version of viser can therefore make the viewer fail, but
+not make the viewer insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read.
 Instead the browser opens a file in a private folder. This file redirects the browser to the address.

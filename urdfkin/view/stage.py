@@ -1,8 +1,8 @@
 """Draw a robot in viser's scene, with arrows, the velocity ellipsoid and Denavit-Hartenberg frames.
 
 - A column of the Jacobian is the frame's velocity if one joint velocity is 1 and all others are 0 (7.85).
-- If the vector of joint velocities has length 1, the frame's velocity vector ends inside an ellipsoid or on
-  the ellipsoid's surface. The axes of the ellipsoid are the left singular vectors of the Jacobian, and the
+- For joint velocities of length 1, the frame's velocity vector ends inside an ellipsoid or on the ellipsoid's
+  surface. The axes of the ellipsoid are the left singular vectors of the Jacobian, and the
   half-lengths are the singular values.
 - The acceleration is the sum of transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
 """
