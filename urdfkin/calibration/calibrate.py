@@ -81,15 +81,21 @@ class Calibration:
     """A calibrated model; the result of `urdfkin.calibrate`.
 
     Attributes:
+        robot: The robot before the calibration.
+        model: The model with the parameters to fit.
         identification: The parameters that are identifiable from the measured poses.
         general: The parameters that are identifiable from random poses.
-        before: The fit of base and tool only; all other parameters have their original values.
+        fitted: The fit; None without poses.
+        before: The fit of only base and tool, with the robot's original parameters.
         odd: Indices of the outlier poses.
+        without_odd: The fit without the outliers.
         weak: Indices of poorly observable parameters, each with a ratio of uncertainties: the uncertainty at
             the measured configurations, divided by the uncertainty at as many random configurations.
+        certificate: The result of checking the written model with Pinocchio.
         stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the other parameters have their original values.
         significant: Indices of the parameters that `written_fit` fits.
+        plausibility: The reasons why the fit is refused; empty for a plausible fit.
     """
 
     robot: Robot
@@ -132,6 +138,7 @@ class Calibration:
 
     @cached_property
     def written_values(self) -> FloatArray:
+        """(p,) change of each parameter in the written fit, m and rad."""
         return self._change(self.written_fit)
 
     @cached_property
@@ -159,10 +166,12 @@ class Calibration:
 
     @property
     def table(self) -> DHTable | None:
+        """The calibrated table; None for a URDF."""
         return None if self.written_fit is None else self.model.table(self.written_fit.at)
 
     @cached_property
     def written(self) -> Rewritten:
+        """The original text of the URDF with the new origins, and the effect of the changes."""
         return Rewritten(self.robot, self.origins)
 
 

@@ -76,10 +76,20 @@ class SameQuestion:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """Bounds on the largest distance between matching frames, over all configurations within limits.
+    """An interval that contains the largest distance between a frame of A and the matching frame of B.
 
-    `lower` is the distance (m) at `q_a` and `q_b`, less the rounding error. `radians_seen` is the angle at
-    `q_a` and `q_b`. `upper` (m; inf without a bound) and `radians` are proven upper bounds.
+    The largest distance is taken over all configurations within the joint limits.
+
+    Attributes:
+        frame: The link of A.
+        frame_b: The link of B.
+        lower: Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding
+            error.
+        upper: Proven upper bound of the distance, metres; inf if there is no bound.
+        radians: Proven upper bound of the angle between the two orientations of the frame.
+        radians_seen: The angle between the two orientations at `q_a` and `q_b`.
+        q_a: Configuration of A.
+        q_b: The corresponding configuration of B.
     """
 
     frame: str
@@ -103,8 +113,12 @@ class Difference:
     Attributes:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
+        a: The parameter's value in A. None if the parameter has no value, for example a missing limit.
+        b: The parameter's value in B. None if the parameter has no value.
+        radians: Angular part of the difference, radians; 0 if the difference has no angular part.
+        metres: Linear part of the difference, metres; 0 if the difference has no linear part.
         detail: "alone" if the joint's axis differs, but the links after the joint agree. "converted" if the
-            limits of B were converted to A's coordinate. Otherwise empty.
+            limits of B were converted to the coordinate of A. Otherwise empty.
     """
 
     place: str
@@ -117,6 +131,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
+        """The parameter's values in A and in B, as numbers or words; None if a model has no value."""
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -126,6 +141,7 @@ class Difference:
 
     @property
     def words(self) -> str:  # noqa: PLR0911, PLR0912  each kind of difference has its own return
+        """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         match what:
             case "axis":
@@ -192,11 +208,13 @@ class JointDifference:
     """A difference at one joint or link that is too large to be caused by rounding.
 
     Attributes:
+        place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
+        a: The parameter's value in A; None if `b` contains no value.
         b: The parameter's value in B. If `a` is None, `b` is a text: the size of the difference, or the
             reason why the models cannot be compared here.
-        explained: The largest difference that rounding can cause; empty if no number is rounded.
+        explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
     """
 
     place: str
@@ -213,9 +231,9 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Matched links that `same` reports as different tools.
+    """Two matched links that `same` reports as different tools (end-effector frames).
 
-    `pose` (4, 4) is the pose of B's link in the frame of A's link.
+    `pose` (4, 4) is the pose of B's link `b` in the frame of A's link `a`.
     """
 
     a: str
@@ -232,7 +250,11 @@ _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified
 
 @dataclass(frozen=True, slots=True)
 class Confirmation:
-    """Pinocchio's confirmation; `metres` is the largest distance that Pinocchio computed."""
+    """Pinocchio's confirmation of the bounds, or the reason why there is none.
+
+    `metres` is the largest distance that Pinocchio computed; `configurations` is the number of
+    configurations.
+    """
 
     state: ConfirmationState
     by: str = ""
@@ -249,10 +271,10 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class JointMap:
-    """Joints that match: value_b = sense * value_a + offset (rad, m).
+    """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
 
-    `conversion` converts the pose of a planar or floating joint in A to the pose in B, if A and B define
-    different joint frames.
+    For a planar or floating joint, `sense` is 1 and `offset` is 0. If A and B define the joint's frames
+    differently, `conversion` converts the pose in A to the pose in B.
     """
 
     a: str

@@ -47,10 +47,14 @@ _MOST_SHOWN = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccelerationBreakdown(Displayable):
-    """Contributions of the joints to a frame's acceleration; six-vectors are [linear; angular].
+    """Contributions of the joints to a frame's acceleration.
 
-    `base` (..., 6) is the acceleration that the frame would have if only the base moved. `terms` (...,
-    joints, 4, 6) are the contributions of the joints, with the kinds in the order of `KINDS`.
+    Attributes:
+        joints: Names of the moving joints from the base to the frame.
+        base: (..., 6) acceleration that the frame would have if all joints were fixed and only the base
+            moved.
+        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of `KINDS`,
+            and the six numbers are [linear; angular].
     """
 
     joints: tuple[str, ...]

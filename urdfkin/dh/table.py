@@ -262,16 +262,21 @@ class SnapChange:
 
 @dataclass(frozen=True, slots=True)
 class SnapReport:
-    """All rounded angles of a table, and their effect on the tip.
+    """All snapped angles of a table, and their effect on the tip.
 
     Each change rotates the rest of the chain about a joint's origin. The tip moves by at most the angle times
-    its distance from this origin. The sum of these bounds is valid in every configuration.
+    its distance from this origin. The sum of these bounds holds for all angles.
 
     Attributes:
-        metres: Guaranteed bound of the tip's displacement (m), with prismatic joints within their limits.
-        radians: Guaranteed bound of the tip's rotation (rad).
-        per_metre: For each prismatic joint, the increase of the bound per metre of travel (m/m).
-        measured_metres, measured_radians: Largest change of the tip's pose in sampled configurations.
+        tolerance: The requested tolerance (rad).
+        changes: The snapped angles, base to tip.
+        metres: Guaranteed bound of the tip's displacement (metres), with prismatic joints within their
+            limits, or within 1 m of zero without limits.
+        radians: Guaranteed bound of the tip's rotation (radians).
+        per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
+        measured_metres: Largest displacement of the tip in sampled configurations (metres).
+        measured_radians: Largest rotation of the tip in sampled configurations (radians).
+        samples: Number of sampled configurations.
     """
 
     tolerance: float
@@ -285,10 +290,14 @@ class SnapReport:
 
     @property
     def rows(self) -> tuple[int, ...]:
+        """Sorted indices of the changed rows, as in `SnapChange`."""
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:
-        """Return a guaranteed bound (...,) in metres of the tip's displacement for prismatic joint values."""
+        """Return a guaranteed bound (...,) of the tip's displacement (metres).
+
+        `values` contains the values of the prismatic joints by name.
+        """
         at_zero = sum(change.tip for change in self.changes)
         travel = [np.abs(values[name]) * rate for name, rate in self.per_metre.items()]
         return np.asarray(at_zero + sum(travel, np.zeros(())), dtype=np.float64)

@@ -138,7 +138,10 @@ class TreeParameters:
         return values
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the poses (..., joints, 4, 4) of the URDF link frames in the root frame."""
+        """Return the poses (..., joints, 4, 4) of the URDF frames of all links in the root frame.
+
+        `q` (..., coordinates) is in the order of `coordinates`. Another length raises InputError.
+        """
         q = np.asarray(q, dtype=np.float64)
         if q.shape[-1:] != (len(self.coordinates),):
             raise InputError(f"q needs {len(self.coordinates)} numbers", found=f"shape {q.shape}")

@@ -39,12 +39,15 @@ LEAST_SIZE = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainJoint:
-    """One moving joint on a path; `backwards` means that the path leads from child link to parent link.
+    """One moving joint on a path.
 
     Attributes:
+        backwards: Whether the path passes the joint from the joint's child link to its parent link.
         T_previous_joint: (4, 4) pose of the joint's frame before the joint's own motion. The z axis of this
             frame is the joint's axis, reversed if `backwards`. The pose is relative to the previous joint's
             frame after that joint's motion; for the first joint, relative to the base.
+        limit: None if the joint has no limits.
+        mimic: None if the joint has its own coordinate.
     """
 
     name: str

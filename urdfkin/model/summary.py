@@ -38,6 +38,8 @@ def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
 
 
 class Joints(dict[str, Joint], Displayable):
+    """The joints of a robot by name: a dict that `print` and notebooks show as a table."""
+
     def __init__(self, tree: KinematicTree) -> None:
         super().__init__((joint.name, joint) for joint in tree.joints)
         self._tree = tree

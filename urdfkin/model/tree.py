@@ -232,6 +232,7 @@ class KinematicTree:
     """Links and joints of one robot, in Pinocchio's order.
 
     Attributes:
+        name: The robot's name.
         links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
         joints: Every joint, fixed ones too; the parent link of a joint always comes before its child link.
         poses: Named poses, each with values for some of the joints. Named poses do not affect the motion.
@@ -276,6 +277,7 @@ class KinematicTree:
 
     @cached_property
     def floating_joints(self) -> tuple[int, ...]:
+        """Indices of the joints that have a quaternion in `q`."""
         return tuple(i for i, joint in enumerate(self.joints) if joint.kind is JointKind.FLOATING)
 
     @cached_property
@@ -340,6 +342,7 @@ class KinematicTree:
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
+        """Names of all links and joints, root first, without duplicates, as Pinocchio names its frames."""
         names = [self.links[0]]
         for joint, child in zip(self.joints, self.links[1:], strict=True):
             names += [joint.name, child]
@@ -356,8 +359,9 @@ class KinematicTree:
     def frame_link(self, name: str) -> int:
         """Return the index of the link that carries the frame `name`.
 
-        A link or joint with exactly this name has priority over the prefixes `link:` and `joint:`. A name of
-        a link and of a joint at different places raises InputError.
+        A link or joint with exactly this name has priority. Otherwise `link:NAME` selects the link and
+        `joint:NAME` the joint. An unknown name raises UnknownNameError; a name of a link and of a joint at
+        different places raises InputError.
         """
         if not isinstance(name, str):
             raise InputError(
@@ -411,6 +415,7 @@ class KinematicTree:
     # -- paths ---------------------------------------------------------------------------------------
 
     def path(self, link: int) -> tuple[int, ...]:
+        """Return the indices of the joints between the root and a link, root first."""
         joints = []
         while link > 0:
             joints.append(link - 1)

@@ -29,11 +29,13 @@ from urdfkin.verify.verifier import oracle_results_with_bound
 
 @dataclass(frozen=True, eq=False)
 class MotionCheck:
-    """Comparison of a quantity from urdfkin and from Pinocchio, for n samples.
+    """Comparison of a quantity from urdfkin with the same quantity from Pinocchio, for each sample.
 
-    `units` (n,) is the largest difference in each sample, divided by eps * scale. Here eps is the machine
-    epsilon, and scale is the size of the quantity's numbers. `bound` (n,) is the largest value of `units`
-    that rounding can cause. `share` (n,) is `units` / `bound`; above 1, the results disagree.
+    Attributes:
+        units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale,
+            where eps is the machine epsilon, and scale is the size of the quantity's numbers.
+        share: (n,) the difference as a fraction of the bound; above 1 is a disagreement.
+        bound: (n,) largest difference that rounding can cause, divided by eps * scale.
     """
 
     units: FloatArray

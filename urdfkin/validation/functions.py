@@ -59,9 +59,13 @@ class FunctionError:
 
 @dataclass(frozen=True)
 class WorstResult:
-    """The result with the largest ratio of difference to bound; `bound` is the allowed difference.
+    """The result with the largest ratio of difference to bound.
 
-    `replay` is a command or a line of Python that computes the expected result.
+    Attributes:
+        sample: Index of the configuration.
+        inputs: The function's inputs: q, or q and v, or q, v and a.
+        bound: Largest allowed difference of each number.
+        replay: A command or a line of Python that computes the expected result.
     """
 
     sample: int

@@ -163,9 +163,11 @@ class ValidationReport(Displayable):
     Attributes:
         asked: Number of requested robots.
         started: Start time, ISO 8601, UTC.
-        interrupted: Whether the run ended early; the report contains the finished results.
+        seconds: Wall time.
+        interrupted: Whether the run ended early. Finished results are included.
         made_by: Versions of urdfkin and the oracles that computed the report; None: the installed versions.
-        studies: Results of the accuracy study, one for each compared robot; None if the robot's study failed.
+        studies: Results of the accuracy study, if requested: one for each compared robot; None if the study
+            of a robot failed.
     """
 
     robots: tuple[RobotReport, ...]
@@ -215,6 +217,7 @@ class ValidationReport(Displayable):
 
     @property
     def outcome(self) -> RunOutcome:
+        """The outcome of the run, with the reason if it has not passed."""
         return outcome((robot.verdict for robot in self.robots), self.asked, self.interrupted)
 
     @property
@@ -224,7 +227,10 @@ class ValidationReport(Displayable):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of `urdfkin validate`; 0 means that every robot was verified."""
+        """Exit code of the command `validate`.
+
+        0: verified. 1: a disagreement. 130: interrupted. 2: bad input. 3: a robot was not verified.
+        """
         return self.outcome.exit_code
 
     def as_dict(self) -> Document:

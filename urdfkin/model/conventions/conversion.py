@@ -63,10 +63,15 @@ class _FreeJoint:
 
 
 class Conversion:
-    """Names of one robot's coordinates in another program, and conversions between urdfkin and the program.
+    """Names and conversions of one robot in a convention; `robot.convention("mujoco")` returns them.
 
-    `joints` replaces the convention's order of the joints, and is required if the convention has no order. A
-    wrong order or a repeated joint name raises InputError. An unknown joint raises UnknownNameError.
+    Args:
+        tree: The robot.
+        urdf: The URDF text, from which some conventions take the order of the joints or the centres of mass.
+        convention: The convention.
+        joints: Order of the joints, instead of the convention's order; required if the convention has none.
+
+    A wrong order, or two columns with the same name, raises InputError; an unknown joint UnknownNameError.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -297,17 +302,21 @@ class Conversion:
 
     @property
     def has_pairs(self) -> bool:
+        """Whether the target program's q contains the cosine and the sine of an angle."""
         return any(column.part for column in self._columns)
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
+        """Name of each number of q in the target program."""
         return tuple(column.name for column in self._columns)
 
     @property
     def rate_names(self) -> tuple[str, ...]:
+        """Name of each number of v in the target program, and of each column of its Jacobian."""
         return tuple(rate.name for rate in self._rates)
 
     def layout(self, what: str) -> CoordinateLayout:
+        """Return names and units of the target program's "q", "v" or "a", to parse values by name."""
         if what != "q":
             rest = {"neutral": np.zeros(self.nv)}
             units = tuple(rate.unit for rate in self._rates)
@@ -326,6 +335,7 @@ class Conversion:
 
     @property
     def is_constant(self) -> bool:
+        """Whether `matrix` is the same in every configuration."""
         return not self._blocks
 
     @property
@@ -356,7 +366,8 @@ class Conversion:
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
-        If the two conventions have the same q, the same array is returned. Invalid numbers raise InputError.
+        The conversion of v may depend on q, and the conversion of a on q and v. If the target program has the
+        same q, the same array is returned. A wrong length or a number that is not finite raises InputError.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("a1", root_joint="floating", verify=False)
@@ -380,10 +391,15 @@ class Conversion:
     def from_(
         self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
-        """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's.
+        """Convert q, (q, v) or (q, v, a) from the target program's convention to urdfkin's; inverse of `to`.
 
-        A value that contradicts a mimic rule, a wrong length or a number that is not finite raises
-        InputError.
+        A wrong length, a number that is not finite, or a mimic joint's value that differs from its mimic rule
+        raises InputError.
+
+        >>> import urdfkin
+        >>> arm = urdfkin.load("planar_two_link")
+        >>> arm.convention("drake").from_([0.5, -1.0]).tolist()
+        [0.5, -1.0]
         """
         if a is not None and v is None:
             raise InputError("`a` can only be converted together with `v`")
@@ -494,7 +510,10 @@ class Conversion:
     # -- matrices ------------------------------------------------------------------------------------
 
     def matrix(self, q: Given | None = None) -> FloatArray:
-        """Return the matrix M (..., program's nv, nv) with v_tool = M v; M may depend on q."""
+        """Return the matrix M (..., program's nv, nv) with v_tool = M v.
+
+        M may depend on q; if q is then missing, InputError is raised.
+        """
         M = np.zeros((self.nv, self.tree.nv))
         M[np.arange(self.nv), self._v_index] = self._v_factor
         if not self._blocks:
@@ -563,7 +582,14 @@ class Conversion:
     # -- results -------------------------------------------------------------------------------------
 
     def six(self, x: ArrayLike, axis: int = -1) -> FloatArray:
-        """Exchange the linear and angular parts of six-vectors if the program has the angular part first."""
+        """Exchange linear and angular parts of six-vectors if the target program has the angular part first.
+
+        A second call restores the original order.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").convention("drake").six([1, 2, 3, 4, 5, 6]).tolist()
+        [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
+        """
         array = np.asarray(x, dtype=np.float64)
         if array.ndim < 1 or array.shape[axis] != 6:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
@@ -586,7 +612,10 @@ class Conversion:
         return array @ _for_frames(self.inverse_matrix(q), array.ndim)
 
     def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
-        """Convert the target program's Jacobian (..., 6, program's nv) to urdfkin's (..., 6, nv): S J M."""
+        """Convert the target program's Jacobian J (..., 6, program's nv) to urdfkin's (..., 6, nv): S J M.
+
+        The column of a mimic joint is added to the mimicked joint's column.
+        """
         array = self.six(J, -2)
         return array @ _for_frames(self.matrix(q), array.ndim)
 
@@ -622,7 +651,12 @@ class Conversion:
         result: FloatArray,
         jacobian: Callable[[], FloatArray],
     ) -> FloatArray:
-        """Convert a quantity to the target program; `ours` is q, or q and v, or q, v and a."""
+        """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
+
+        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. The function `jacobian` is called
+        only for a time derivative of the Jacobian or a Hessian. A placement is returned unchanged, and an
+        undefined conversion raises InputError.
+        """
         if quantity == "placement":
             return result
         if quantity in ("velocity", "acceleration"):
