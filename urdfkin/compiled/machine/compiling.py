@@ -203,8 +203,8 @@ class Kernel:
 
     compiled: Any
 
-    def __init__(self, function: Callable[..., int], arguments: tuple[Any, ...], nogil: bool) -> None:
-        self._function, self._arguments, self._nogil = function, arguments, nogil
+    def __init__(self, function: Callable[..., int], arguments: tuple[Any, ...]) -> None:
+        self._function, self._arguments = function, arguments
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
@@ -217,7 +217,7 @@ class Kernel:
             return self.__dict__["compiled"]
 
     def _compile(self) -> Any:
-        dispatcher = jitted(nogil=self._nogil)(self._function)
+        dispatcher = jitted(nogil=True)(self._function)
         self._compile_or_load(dispatcher, lambda: dispatcher.compile(types.int64(*self._arguments)))
         dispatcher.disable_compile()
         return dispatcher
@@ -242,7 +242,7 @@ class Core(Kernel):
     """
 
     def __init__(self, function: Callable[..., int]) -> None:
-        super().__init__(function, (types.int64,) * function.__code__.co_argcount, nogil=True)
+        super().__init__(function, (types.int64,) * function.__code__.co_argcount)
 
     def _compile(self) -> Any:
         core: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
@@ -261,6 +261,6 @@ def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return jitted(**_INLINED, **options)
 
 
-def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
+def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:
     """Return a decorator for kernels whose arguments have these Numba types."""
-    return lambda function: Kernel(function, arguments, nogil)
+    return lambda function: Kernel(function, arguments)
