@@ -36,7 +36,6 @@ QUOTED = 60
 
 
 def shortened(text: str, limit: int = QUOTED) -> str:
-    """Return at most `limit` characters of a text, safe to print."""
     return printable(text if len(text) <= limit else text[: limit - 3] + "...")
 
 
@@ -52,8 +51,6 @@ _TAB = "    "
 
 
 class Excerpts:
-    """Lines of a file with the wrong text underlined; the file's data has no byte order mark."""
-
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
@@ -96,12 +93,7 @@ ROUNDING = 2.0**-50
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """The automatic fix of a finding; the edits do not overlap.
-
-    Attributes:
-        turns: Upper bound on the angle (rad) by which the fix rotates a joint frame; 0 if the robot stays
-            equal.
-    """
+    """The automatic fix of a finding; `turns` (rad) bounds the rotation of a joint frame by the fix."""
 
     edits: tuple[Edit, ...]
     turns: float = 0.0
@@ -352,12 +344,7 @@ MARK = "urdfkin:"
 
 @dataclass(slots=True)
 class Comment:
-    """A comment with an instruction for urdfkin.
-
-    Attributes:
-        behind: Whether the line has other text before the comment.
-        element: The element that begins after the comment, or None.
-    """
+    """A comment with an instruction; `behind` is True if the comment follows text on the same line."""
 
     text: str
     line: int
@@ -428,10 +415,7 @@ WRITTEN_OUT = 10_000
 
 @dataclass(slots=True)
 class _Kind:
-    """The findings of one code and severity.
-
-    `found` has at most `WRITTEN_OUT` findings with their weights; `lines` has the lines of further findings.
-    """
+    """The findings of one code and severity; `lines` has the lines of findings beyond `WRITTEN_OUT`."""
 
     severity: Severity
     found: list[tuple[Finding, float]] = field(default_factory=list)
@@ -525,10 +509,7 @@ class Reporter:
     def findings(
         self, *, fold: bool = True, wanted: Callable[[Finding], bool] | None = None
     ) -> tuple[Finding, ...]:
-        """Return the findings by line; `fold` combines many findings with one code into one.
-
-        `wanted` is called once for each finding, in file order, and returns whether the finding is reported.
-        """
+        """Return the findings by line; call `wanted` exactly once for each finding, in file order."""
         pairs = [pair for kind in self._kinds.values() for pair in kind.found]
         if wanted is not None:
             pairs.sort(key=lambda pair: _place_in_file(pair[0]))
@@ -595,10 +576,7 @@ class Reporter:
 
 @dataclass(frozen=True, slots=True)
 class _AttributeSpan:
-    """The position of an attribute; columns are in characters, indices in bytes.
-
-    `value` contains the index of the value's first byte and the index of the closing quotation mark.
-    """
+    """The position of an attribute; `value` spans the text between the quotation marks."""
 
     line: int
     column: int

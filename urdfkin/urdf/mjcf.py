@@ -54,7 +54,7 @@ _HEAD = 65_536
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A part of the file that the tree does not represent or represents differently, or a probable mistake.
+    """A part that the tree does not represent or represents differently, or a probable mistake.
 
     Attributes:
         where: The tag and the name of the element, or the tag alone; None for the whole file.
@@ -74,8 +74,7 @@ class Mjcf:
 
     Attributes:
         model: MuJoCo's compiled model, in which all bodies remain separate.
-        fused: If `whole` is True and the file sets `fusestatic`: the model with fused static bodies.
-            Otherwise None.
+        fused: The model with fused static bodies; None unless `whole` is True and the file sets `fusestatic`.
         frames: "body" or "site", and the index in `model`, for each link.
         coordinates: Index in MuJoCo's qpos of each moving joint, including mimic joints.
         rules: Name of the mimic joint for each equality that is a mimic rule, by the equality's index.
@@ -148,8 +147,8 @@ class Mjcf:
     def reference_angles(self, q: FloatArray) -> FloatArray:
         """Return a sum of hinge angles (n, frames), in rad, for bounds on rounding errors.
 
-        Each hinge between the world and a frame adds |q| + |ref| if the hinge's reference value `ref` is not
-        0.
+        Each hinge between the world and a frame adds |q| + |ref| if the hinge's reference value `ref` is
+        nonzero.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -161,7 +160,6 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield index, kind and qpos index of each joint of a body."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         for j in _joint_indices(m, body):
@@ -250,7 +248,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
     If `whole` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files. Raise
-    InputError without MuJoCo, for an invalid file, and for a ball joint.
+    InputError if MuJoCo is missing, the file is invalid, or the robot has a ball joint.
     """
     mujoco = library()
     fused = None
@@ -436,7 +434,6 @@ class _MjcfReader:
         self._joints.append((fixed_joint(name, T), parent, child))
 
     def _body(self, i: int) -> None:
-        """Add the joints of a body one after the other, then the link of the body."""
         m, here = self.model, self._links[self.model.body_parentid[i]]
         T, link = _pose(m.body_pos[i], m.body_quat[i]), self._links[i]
         if m.body_mocapid[i] >= 0:
@@ -517,8 +514,7 @@ class _MjcfReader:
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
         """Return the mimic joint y and its rule for the equality y - y0 = c0 + c1 (x - x0).
 
-        Here x0 and y0 are the reference values of the joints. The result is None if the equality is not
-        linear, or has only one joint.
+        Here x0 and y0 are the joints' reference values. Return None if the equality is not linear.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])

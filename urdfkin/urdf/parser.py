@@ -414,17 +414,14 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers in attributes.
-
-    `bad_number` is the rule for an invalid number, `bad_vector` the rule for a wrong count of numbers.
-    """
+    """Read numbers; report invalid numbers with `bad_number`, wrong counts with `bad_vector`."""
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
     bad_vector: Rule = BAD_VECTOR
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
-        """Return a number; `default` without the attribute, None for an invalid number."""
+        """Return a number; `default` if the attribute is missing, None if the number is invalid."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
@@ -438,7 +435,7 @@ class NumberReader:
         return value
 
     def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
-        """Return `count` numbers; None without the attribute or for an invalid number."""
+        """Return `count` numbers; None if the attribute is missing or invalid."""
         written = element.attributes.get(attribute)
         if written is None:
             return None
@@ -483,7 +480,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report text that is too long: the conversion to a number takes quadratic time."""
+        """Report text that is too long for a number, because the conversion takes quadratic time."""
         if len(written) <= most:
             return False
         found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
@@ -679,7 +676,7 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute; report a missing attribute and, without `number`, an empty one."""
+        """Return a required attribute; report a missing attribute, and an empty one unless `number` is True."""
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"
@@ -787,7 +784,7 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
     def _others(self, joint: JointRecord) -> None:
-        """Check unused elements too, because urdfdom refuses a file with an invalid element."""
+        """Check unused elements too: urdfdom refuses a file if one of these elements is invalid."""
         dynamics, safety = (joint.element.first(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
             self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')

@@ -31,7 +31,6 @@ class Origin:
         table: Whether the robot was created from a Denavit-Hartenberg table.
         sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint, without mimic joints.
-        variants: Variant sets and variants that were selected in a USD stage.
     """
 
     source: str
@@ -78,16 +77,10 @@ class Origin:
 
     @property
     def words(self) -> str:
-        """The source and the options as written on a command line."""
         return " ".join(filter(None, (shlex.quote(self.again), self.options)))
 
     @property
     def lock_words(self) -> str:
-        """The locked joints in words; an empty string if there are none.
-
-        >>> Origin("panda", lock=(("finger", 0.04), ("wrist", 0.0))).lock_words
-        'finger locked at 0.04, wrist at 0'
-        """
         locks = enumerate(self.lock)
         return ", ".join(f"{name}{'' if i else ' locked'} at {value:.6g}" for i, (name, value) in locks)
 
@@ -117,8 +110,7 @@ class Text:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: The path or name from which the URDF can be read again; otherwise `<text>`, `<bytes>` or
-            `<file>`.
+        source: The path or name to read the URDF again; otherwise `<text>`, `<bytes>` or `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
     """
 
@@ -249,7 +241,7 @@ def as_word(path: Path) -> str:
 
 
 def entry_of(word: str) -> Entry | None:
-    """Return the catalogue entry of a name, or None; a name has no dot and no separator."""
+    """Return the catalogue entry of a name; None for a path, which has a dot or a separator."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

@@ -93,11 +93,7 @@ Kind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """A part of the stage that the tree does not represent, or a probable mistake.
-
-    Attributes:
-        where: The path of the prim; empty for a remark about the whole stage.
-    """
+    """A part of the stage that the tree does not represent, or a probable mistake."""
 
     kind: Kind
     where: str
@@ -140,11 +136,11 @@ class Usd:
         prims: The path of the prim for each link that represents a prim.
         rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
         rest_q: (nq,) configuration in which the stage shows the robot.
-        single: Five numbers for each joint name, which bound the effect of rounding to single precision.
-            Number 1 bounds the error (m) of the joint origins. Number 2 bounds the error (rad) of the joint
+        single: Five numbers, by joint name, that bound the effect of rounding to single precision. Number 1
+            bounds the error (m) of the joint origins. Number 2 bounds the error (rad) of the joint
             orientations. Number 3 is the sum of the lengths (m) of the vectors that these orientation errors
-            rotate. Number 4 bounds the relative error of a mimic joint's value; it is 0 for other joints.
-            Number 5 is the distance (m) between the joint frame and the child frame.
+            rotate. Number 4 bounds the relative error of a mimic joint's value; number 4 is 0 for other
+            joints. Number 5 is the distance (m) between the joint frame and the child frame.
         joints: The numbers of each joint prim in the tree, by the path of the prim.
         unit: The stage's metersPerUnit.
     """
@@ -178,10 +174,7 @@ def library() -> Any:
 
 
 def files_of(pxr: Any, path: str) -> tuple[str, ...]:
-    """Return the files of a stage; read each layer before its references are followed.
-
-    Raise InputError for a forbidden reference or too many layers, and SourceError for an unreadable file.
-    """
+    """Return the files of a stage; check each layer before OpenUSD follows its references."""
     ground = Ground.around(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
     files: dict[str, None] = {}
@@ -288,7 +281,7 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
     """Select variants in the session layer, which is not saved; return the paths of expanded instances.
 
     OpenUSD cannot select a variant inside an instance. An instance with the variant set is therefore made
-    non-instanceable. Raise UnknownNameError for an unknown variant set or variant.
+    non-instanceable.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     opened = set[str]()
@@ -334,7 +327,7 @@ class _Edge:
 
     Attributes:
         name: At first the name of the prim; later the unique name of the joint in the tree.
-        frames: The poses of the joint frame in the two bodies; a body is None for the world.
+        frames: The poses of the joint frame in the two bodies; in `ends`, None is the world.
         rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
@@ -560,7 +553,6 @@ class _StageReader:
     # -- joints --------------------------------------------------------------------------------------
 
     def _edge(self, prim: Any) -> _Edge | None:
-        """Return a joint between two bodies, or a body and the world; report any other joint."""
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
             self._report("left-out-of-usd", path, "this joint is disabled")
@@ -824,7 +816,7 @@ class _StageReader:
         return _Articulation(path, bodies, [edge for group in groups for edge in group.edges])
 
     def _root(self, group: _Articulation) -> str | None:
-        """Return the root body of a group, or None if the world is the root."""
+        """Return the root body of a group, or None if the root is the world."""
         if any(None in edge.ends for edge in group.edges):
             return None
         if group.path in group.bodies:
@@ -1041,7 +1033,6 @@ class _StageReader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _compare_units(self, edge: _Edge, leader: str) -> None:
-        """Report a mimic rule between an angle and a length."""
         kind = next((one.kind for one in self._edges if one.path == leader), edge.kind)
         if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
             what = "a mimic rule between an angle and a length has no unit in the schema; m and rad are used"
@@ -1125,10 +1116,7 @@ class _StageReader:
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim or an ancestor has a transform operation with the suffix `unitsResolve`.
-
-        By convention, such an operation converts a layer to the unit and up axis of the stage.
-        """
+        """Return whether a prim is below a `unitsResolve` operation, which converts unit and up axis."""
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
                 return True

@@ -52,10 +52,9 @@ class Mended:
 def mend(
     text: Text, look: Callable[[Text], Examined], choose: Callable[[], Callable[[Finding], bool]]
 ) -> Mended:
-    """Apply the automatic fixes of a file, one code after another; do not change a file with errors.
+    """Apply the automatic fixes, one code after another; do not change a file with errors.
 
-    `choose` is called for each pass over the file, and returns a function that decides whether a finding is
-    fixed.
+    `choose` returns a new filter of findings for each pass over the file.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -103,10 +102,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots, except in unused values.
-
-    `turns` contains upper bounds on the allowed rotation (rad) of each joint's frame, by joint name.
-    """
+    """Yield the differences between two robots; `turns` has the allowed rotation (rad) of each joint's frame."""
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return
@@ -163,10 +159,7 @@ _COUNTS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
-    """Return the patch of one file; an empty string if the file does not change.
-
-    `before` and `after` are UTF-8. `shown` escapes the control characters of a text.
-    """
+    """Return the patch of one file, or an empty string; `shown` escapes control characters."""
     if before == after:
         return ""
     name = _relative(file)

@@ -54,7 +54,6 @@ class Page:
             that begins with a joint or a comment is completed with the links `base` and `tip`.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
-        question: The section about the problem in docs/questions.md, or None.
     """
 
     title: str

@@ -55,7 +55,6 @@ class Baseline:
 
     Attributes:
         counts: For each key, the number of baseline findings that this run has not yet encountered.
-        root: The folder to which the file names in the keys are relative.
         met: Number of baseline findings that this run has encountered.
     """
 
@@ -263,10 +262,7 @@ class Choice:
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings in an older version of a file; None if no finding can be new.
-
-    The finding about a missing mesh is new if the mesh file was deleted after the older version.
-    """
+    """Return the findings in an older version of a file; None if no finding can be new."""
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
@@ -289,11 +285,7 @@ LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def collected(word: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the sorted files that `word` names; raise SourceError if there is none.
-
-    `word` is a file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[` or `**`. A file that
-    the user names is never excluded.
-    """
+    """Return the sorted files that `word` names; raise SourceError if there is none."""
     path = Path(word)
     if word == "-" or word in catalogue():
         return [word]

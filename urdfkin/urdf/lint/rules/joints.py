@@ -113,10 +113,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent; report all further links without a parent.
-
-    No link is reported if a joint has no valid child, because the joint may be the parent joint of any link.
-    """
+    """Return whether exactly one link has no parent; report all further links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.failed:
@@ -124,7 +121,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # Another finding reports the joint without a valid child.
+        return False  # A joint without a valid child may be the parent joint of these links.
     parents = {joint.parent for joint in robot.joints}
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
@@ -437,10 +434,7 @@ class _MimicChecker:
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a chain of mimic joints, and the joint at the end of the chain.
-
-        The joint is None if the chain is a circle or ends at a missing joint.
-        """
+        """Return the combined rule of a mimic chain, and the joint at the end of the chain or None."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
@@ -585,7 +579,7 @@ def _replace_words(raw: str | None, words: list[str]) -> str:
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi, and its value, to which a decimal number is close, or None.
+    """Return the multiple and its value (rad) if a decimal is a rounded multiple of pi, else None.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)

@@ -91,7 +91,7 @@ def _finding(
 
 
 def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
-    """Return the position of each element; for equal names, the position of the first element."""
+    """Return the position of each element, or of the first element if elements have the same name."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_SEARCHED]):
         found.setdefault((element, name), (first, last))
