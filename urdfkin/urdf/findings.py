@@ -366,8 +366,7 @@ class Silence:
 @dataclass(slots=True)
 class Silences:
     all: list[Silence] = field(default_factory=list)
-    #: First comment that silences a code. A key is ("line", number, code), ("element", id, code) or
-    #: ("file", 0, code).
+    #: First comment for each ("line", number, code), ("element", id, code) and ("file", 0, code).
     _first: dict[tuple[str, int, str], Silence] = field(default_factory=dict)
 
     def add(self, silence: Silence) -> None:
@@ -399,7 +398,7 @@ class Silences:
 
 #: Maximum number of misspelt names in a file for which similar names are suggested.
 SEARCHES = 20
-#: Limits of one search for similar names: number of compared names, and the argument `work` of `nearest`.
+#: Limits of one search for similar names: number of compared names, and `work` of `nearest`.
 CANDIDATES, WORK = 5_000, 250_000
 
 #: At least this number of warnings or notes with one code are combined into one finding.

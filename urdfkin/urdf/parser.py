@@ -594,7 +594,6 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     return robot
 
 
-#: Remedies for files of other formats, by the tag of the root element.
 _FORMATS = {
     "sdf": "this is an SDF file; convert the file to a URDF first",
     "mujoco": "this is an MJCF file; `load` and all other commands read files with the suffix .xml or .mjcf",
@@ -676,7 +675,7 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute; report a missing attribute, and an empty one unless `number` is True."""
+        """Return a required attribute; report a missing attribute, or an empty one without `number`."""
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"

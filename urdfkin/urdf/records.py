@@ -39,7 +39,7 @@ class Limits:
 DEFAULT_LIMITS = Limits()
 
 
-#: Regular expression for a start tag. A quoted attribute value may contain '>'.
+#: A quoted attribute value in a start tag may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 
@@ -96,7 +96,6 @@ Vector = tuple[float, ...]
 #: Attributes of `<limit>` that URDF 1.2 introduced.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
-#: Joint types with an axis.
 AXIAL = ("revolute", "continuous", "prismatic")
 
 

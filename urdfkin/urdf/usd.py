@@ -84,7 +84,7 @@ _SHAPES = ("visual", "visuals", "collision", "collisions")
 #: Rotation matrix that rotates the y axis onto the z axis.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: Kinds of remarks. The module `left_out` of the rules defines a rule for each kind.
+#: Kinds of remarks. The module `lint.rules.left_out` defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",

@@ -33,7 +33,7 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Maximum number of passes of `--fix` over a file. One pass applies the fixes of one code without overlap.
+#: Maximum number of passes of `--fix` over a file. One pass applies non-overlapping fixes of one code.
 PASSES = 100
 
 #: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.
@@ -102,7 +102,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots; `turns` has the allowed rotation (rad) of each joint's frame."""
+    """Yield the differences between two robots; `turns` has the allowed rotations (rad) by joint name."""
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return

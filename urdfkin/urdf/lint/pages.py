@@ -26,15 +26,13 @@ if TYPE_CHECKING:
 
 _MODULES = (parser, dialect, joints, bodies)
 
-#: The rules about URDF files, by the name of the module.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in _MODULES
 }
 
-#: The rules about URDF files by code, in ascending order.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: The rules about MJCF and USD files, indexed by code.
+#: The rules about MJCF and USD files.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".

@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quoted(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Kinematics uses only macros directly inside <robot> or inside a joint.
+    # A macro changes the kinematics only if it is directly inside <robot>, or inside a joint.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
     expressions: list[_Place] = [
@@ -178,7 +178,7 @@ ATTRIBUTES = {
     if colon
 }
 
-#: Tags and attributes of other formats for a pose or a part of a pose. URDF readers skip these names.
+#: Tags and attributes for poses in other formats. URDF readers skip these names.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Attributes that `--fix` does not remove, because other elements or formats define them.
@@ -338,7 +338,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
     found: dict[str, list[_Place]] = {}
-    declared = Counter(("xml", "xmlns"))  # XML itself declares these prefixes.
+    declared = Counter(("xml", "xmlns"))  # XML itself declares the prefixes.
     stack = [(root, False)]
     while stack:
         element, leaving = stack.pop()

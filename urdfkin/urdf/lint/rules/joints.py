@@ -137,10 +137,10 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Smaller deviations of an axis length from 1 are usual for numbers with few digits, so they are notes.
+#: A smaller difference between an axis length and 1 is usual for an axis with few digits.
 LENGTH_ROUNDING = 2e-4
 
-#: Maximum difference of a unit vector's length from 1, as in `kinematics.inputs`.
+#: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
 _ONE = 1e-12
 
 #: An axis counts as the z axis if its xy part is at most this fraction of its z component.
@@ -150,7 +150,7 @@ _LEAN = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _SNAPPED = 1e-12
 
-#: Smaller tilts (rad) are not reported, because the error bounds in `verify.bounds` include these tilts.
+#: The error bounds in `verify.bounds` include smaller tilts (rad).
 _TILT = 2.0**-52
 
 
@@ -498,7 +498,7 @@ NOTICEABLE = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, each with the least number of decimals of a rounded value that is reported.
+#: Multiples of pi. A rounded multiple is reported only if it has the given number of decimals or more.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
