@@ -550,7 +550,6 @@ class Reporter:
         return None if span is None else Fix((Edit(*span.value, value),), turns)
 
     def without(self, at: Element, *attributes: str) -> Fix | None:
-        """Return the fix that removes attributes and the white space before each attribute."""
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         edits = tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)

@@ -109,7 +109,6 @@ def _record(joint: yourdf.Joint) -> JointRecord:
 
 
 def _text(root: Any) -> str:
-    """Write an element tree as XML without comments and processing instructions."""
     if not isinstance(root.tag, str):
         raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:

@@ -3,7 +3,7 @@
 MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model:
 
 - Each body becomes a link with the body's frame. Each site with a name also becomes a link; a fixed joint
-  connects this link with the link of the body.
+  connects this link with the link of the site's body.
 - The joints of a body move one after the other. Joint k, with the anchor p_k and the motion J_k, changes the
   pose F of the body to F Trans(p_k) J_k Trans(-p_k). A body with several joints becomes a chain of joints and
   links. The last link of the chain is the body.
@@ -119,7 +119,6 @@ class Mjcf:
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """Return the body or site of `fused` with the name of a frame of `model`, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
@@ -394,8 +393,6 @@ def _joint_indices(model: Any, body: int) -> range:
 
 @dataclass(slots=True)
 class _MjcfReader:
-    """Convert a compiled model; `source` is the name of the file in messages."""
-
     mujoco: Any
     model: Any
     name: str

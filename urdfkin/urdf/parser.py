@@ -1,7 +1,7 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-The XML parser is expat: it keeps namespace prefixes (`xacro:macro`), reports the position of every start tag,
-parses deep nesting without recursion, and opens no file. If a document type declaration defines entities or
+The XML parser is expat, which reports the position of every start tag, keeps namespace prefixes, parses deep
+nesting without recursion, and opens no file. If a document type declaration defines entities or
 refers to an external file, parsing stops with an error. No entity is expanded.
 
 A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
@@ -365,7 +365,6 @@ class _Builder:
         self.report.add(SYNTAX, message, found=found, remedy=remedy, position=position)
 
     def _entity_name(self) -> str | None:
-        """Return the first undefined entity after the error position."""
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 

@@ -86,7 +86,6 @@ class Origin:
 
     @property
     def python(self) -> str:
-        """The call of `load` in Python."""
         values = {
             "mimic": self.mimic,
             "root_joint": self.root_joint,
@@ -172,7 +171,6 @@ def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def _suffix(source: object) -> str:
-    """Return the suffix of a path in lower case; an empty string for any other source."""
     if not isinstance(source, str | os.PathLike):
         return ""
     is_text = isinstance(source, str) and source.lstrip().startswith("<")

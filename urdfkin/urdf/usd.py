@@ -259,8 +259,7 @@ def read_usd(
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
     `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
-    with the variant set. `articulation` is the path or name of the articulation to read; None if there is
-    only one.
+    with the variant set. `articulation` is the path or name of the articulation to read.
     """
     pxr = library()
     try:
@@ -453,7 +452,6 @@ class _StageReader:
             self._report("time-samples", where, what, "write a default value")
 
     def _report_timed_transforms(self, prim: Any) -> None:
-        """Report transform operations without a default value, for a prim and its ancestors."""
         while prim and (path := str(prim.GetPath())) not in self._looked_at:
             self._looked_at.add(path)
             if prim.IsA(self.pxr.UsdGeom.Xformable):
@@ -465,7 +463,6 @@ class _StageReader:
             prim = prim.GetParent()
 
     def _uneven_scale(self, prim: Any) -> str | None:
-        """Describe the nearest ancestor with a non-uniform scale, or return None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -594,11 +591,7 @@ class _StageReader:
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return body i (0 or 1) of a joint and the joint frame; None if the body does not exist.
-
-        The result contains the path of the body (None for the world), the pose of the joint frame in the body
-        (m), and the numbers `size` and `rounded` of `_Edge`.
-        """
+        """Return body path, joint frame (m), `size` and `rounded` for body i; None for a missing body."""
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
@@ -670,10 +663,7 @@ class _StageReader:
         return self._general_motion(prim, path)
 
     def _general_motion(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the result of `_motion` for a `PhysicsJoint`, which has limits for six directions.
-
-        A direction is locked if its lower limit is above its upper limit.
-        """
+        """Return the result of `_motion` for a `PhysicsJoint`; lower > upper locks a direction."""
         limits: dict[str, tuple[float, float]] = {}
         for direction in _DIRECTIONS:
             low, high = _NO_LIMITS
@@ -696,10 +686,7 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return a limit of a `PhysicsJoint`; raise InputError if a layer blocks the limit with `None`.
-
-        For a blocked limit, OpenUSD's parser of UsdPhysics does not use the default, but other readers do.
-        """
+        """Return a limit of a `PhysicsJoint`; refuse a blocked limit (`None`), which USD readers treat differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
             message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
@@ -883,7 +870,6 @@ class _StageReader:
         self._report("left-out-of-usd", edge.path, what)
 
     def _is_outside(self, edge: _Edge, group: _Articulation) -> bool:
-        """Return whether exactly one of a joint's two bodies is below the articulation root."""
         inside = group.path + "/"
         if group.path in self._bodies or not any(path.startswith(inside) for path in group.bodies):
             return False
@@ -1095,7 +1081,6 @@ class _StageReader:
                     self._report_layer(layer.pseudoRoot, name, prim)
 
     def _report_layer(self, root: Any, name: str, prim: Any) -> None:
-        """Report another unit or up axis of a layer; `prim` is the layer's topmost prim."""
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))

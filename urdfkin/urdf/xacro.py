@@ -4,7 +4,7 @@ A xacro file is a program, and may come from an untrusted source. docs/xacro.md 
 xacro file may do. The module `expanding` contains the code of the separate process.
 
 xacro itself ignores an argument that the file does not declare, but urdfkin raises an error. If urdfkin
-cannot read all included files, every argument is accepted.
+cannot read one of the included files, every argument is accepted.
 """
 
 from __future__ import annotations

@@ -187,7 +187,6 @@ def _unified_diff(name: str, before: bytes, after: bytes) -> str:
 
 
 def _quote(name: str) -> str:
-    """Return a file name as git writes it."""
     if name.isascii() and name.isprintable() and not set(name) & {'"', "\\"}:
         return name
     return '"' + "".join(
@@ -197,7 +196,6 @@ def _quote(name: str) -> str:
 
 
 def _binary(name: str, before: bytes, after: bytes) -> str:
-    """Return git's binary patch, with the file name relative to the root of the repository."""
     here = Path.cwd()
     top = next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
     place = os.path.relpath(name, top)

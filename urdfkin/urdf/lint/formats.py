@@ -140,7 +140,6 @@ def _entry(finding: Finding) -> dict[str, Any]:
 
 
 def as_github(findings: Sequence[Finding]) -> str:
-    """Return a GitHub workflow command for each finding, errors first."""
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
         f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"

@@ -103,7 +103,6 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    """Return the rule with a code or short name, in upper or lower case."""
     known, name = RULES | OF_OTHERS, word.strip().lower()
     codes = CODES | {name: rule.id for rule in OF_OTHERS.values() for name in (rule.id.lower(), rule.slug)}
     if name not in codes:

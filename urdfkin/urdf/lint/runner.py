@@ -117,7 +117,6 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """Return the path of the file that contains a text, or None."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 

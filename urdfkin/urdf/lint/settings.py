@@ -63,7 +63,6 @@ class Baseline:
     met: int = 0
 
     def knows(self, finding: Finding) -> bool:
-        """Return whether a finding is known, and count the finding as encountered."""
         key = key_of(finding, relative(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
@@ -164,7 +163,6 @@ def find_settings(start: Path) -> Settings:
 
 
 def read_settings(file: Path) -> Settings:
-    """Return the settings in a file; raise InputError if there is no table [tool.urdfkin]."""
     if (found := _table(file, pipes=True)) is None:
         remedy = "add this table, or omit --config"
         raise InputError("no table [tool.urdfkin]", where=str(file), remedy=remedy)
@@ -207,7 +205,6 @@ def _is_list_of_strings(value: Any) -> bool:
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """Return the codes of the rules that `words` select (see `find_rules`)."""
     return frozenset(rule.id for word in words for rule in find_rules(word))
 
 

@@ -283,7 +283,6 @@ def _meshes(root: Element) -> Iterator[Element]:
 
 
 def _is_missing_file(filename: str, beside: Path | None) -> bool:
-    """Return whether a mesh address is a path, relative to the URDF, of a missing file."""
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if beside is None or not local:
         return False

@@ -128,7 +128,6 @@ def _more(group: Sequence[object]) -> str:
 
 
 def is_expression(value: str) -> bool:
-    """Return whether a value contains a xacro expression."""
     start = value.find("${")
     return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
 

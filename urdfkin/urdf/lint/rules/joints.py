@@ -39,7 +39,6 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether the joints form a tree; report all reasons why not."""
     edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
     sound = len(edges) == len(robot.joints) and _have_one_parent(report, robot, edges)
     return _one_root(report, robot) and sound and bool(robot.links)
@@ -571,7 +570,6 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
 
 
 def _replace_words(raw: str | None, words: list[str]) -> str:
-    """Replace the words of an attribute value, but keep the white space."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
     if len(blanks) != len(words) + 1:  # The text contains references such as `&#32;`.
         return " ".join(words)
@@ -643,7 +641,6 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_places(report: Reporter, robot: RobotRecord) -> None:
-    """Report joints with the parent, type, origin and axis of another joint."""
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL:
