@@ -686,7 +686,7 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return a limit of a `PhysicsJoint`; refuse a blocked limit (`None`), which USD readers treat differently."""
+        """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
             message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
