@@ -68,7 +68,7 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
 
 
 class _Evaluation:
-    """Evaluate a syntax tree; each method is named after the class of its nodes."""
+    """Evaluate a syntax tree. Each method evaluates the nodes of the class with the method's name."""
 
     def __init__(self, names: Mapping[str, Any], functions: Collection[object]) -> None:
         self._names, self._functions = names, functions

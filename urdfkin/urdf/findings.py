@@ -93,7 +93,7 @@ ROUNDING = 2.0**-50
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """The automatic fix of a finding; `turns` (rad) bounds the rotation of a joint frame by the fix."""
+    """The automatic fix of a finding; the fix rotates a joint frame by at most `turns` (rad)."""
 
     edits: tuple[Edit, ...]
     turns: float = 0.0
@@ -414,7 +414,7 @@ WRITTEN_OUT = 10_000
 
 @dataclass(slots=True)
 class _Kind:
-    """The findings of one code and severity; `lines` has the lines of findings beyond `WRITTEN_OUT`."""
+    """The findings of one code and severity; `lines` has the line numbers of findings that are not stored."""
 
     severity: Severity
     found: list[tuple[Finding, float]] = field(default_factory=list)
@@ -556,7 +556,7 @@ class Reporter:
         return Fix(edits) if edits else None
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element, or its whole line."""
+        """Return the fix that removes an empty element, and its line if nothing else is on the line."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None

@@ -95,7 +95,7 @@ class Mjcf:
     aligns: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's qpos for q (n, nq), including the values of mimic joints."""
+        """Return MuJoCo's qpos (n, nq of MuJoCo) for q (n, nq), including mimic joints."""
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.coordinates:

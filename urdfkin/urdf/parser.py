@@ -674,7 +674,7 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute; report a missing attribute, or an empty one without `number`."""
+        """Return a required attribute; report a missing attribute, but do not report an empty number."""
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"

@@ -326,7 +326,8 @@ class _Edge:
 
     Attributes:
         name: At first the name of the prim; later the unique name of the joint in the tree.
-        frames: The poses of the joint frame in the two bodies; in `ends`, None is the world.
+        ends: The paths of the two bodies that the joint connects; None is the world.
+        frames: The poses of the joint frame in the two bodies.
         rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
@@ -663,13 +664,13 @@ class _StageReader:
         return self._general_motion(prim, path)
 
     def _general_motion(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the result of `_motion` for a `PhysicsJoint`; lower > upper locks a direction."""
+        """Return the result of `_motion` for a `PhysicsJoint`, which has limits for six directions."""
         limits: dict[str, tuple[float, float]] = {}
         for direction in _DIRECTIONS:
             low, high = _NO_LIMITS
             if f"PhysicsLimitAPI:{direction}" in _schemas(prim):
                 low, high = (self._end(prim, f"limit:{direction}:physics:{end}") for end in ("low", "high"))
-            if low <= high:
+            if low <= high:  # A lower limit above the upper limit locks the direction.
                 limits[direction] = low, high
         free = tuple(limits)
         if not free:
@@ -686,7 +687,7 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
+        """Return a limit of a `PhysicsJoint`; refuse a blocked limit, because USD readers treat it differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
             message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
@@ -711,7 +712,7 @@ class _StageReader:
     # -- articulations -------------------------------------------------------------------------------
 
     def _articulations(self) -> list[_Articulation]:
-        """Group the bodies that joints connect; report a joint between two articulations instead."""
+        """Return the groups of connected bodies; report and ignore joints between articulations."""
         above: dict[str, str] = {path: path for path in self._bodies}
 
         def top(path: str) -> str:
@@ -1101,7 +1102,7 @@ class _StageReader:
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim is below a `unitsResolve` operation, which converts unit and up axis."""
+        """Return whether a prim or an ancestor has a `unitsResolve` operation, which converts units and axes."""
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
                 return True

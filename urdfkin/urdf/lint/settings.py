@@ -99,7 +99,7 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return the text of a baseline with `findings`, which are about the checked `files`.
+    """Return the text of a baseline with the findings of the checked `files`.
 
     Entries of an older baseline at `path` are copied if they are about other existing files.
     """

@@ -356,7 +356,7 @@ def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix with its attribute; None for the prefix of the tag."""
+    """Yield each namespace prefix and its attribute; None for the prefix of the tag."""
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

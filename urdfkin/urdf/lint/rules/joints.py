@@ -221,7 +221,7 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 
 
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that replaces an axis in Pinocchio, and their angle (rad), or None."""
+    """Return the coordinate axis that Pinocchio uses instead of an axis, and the angle (rad) between them."""
     if axis is None:
         return None
     for i in range(3):
@@ -577,7 +577,7 @@ def _replace_words(raw: str | None, words: list[str]) -> str:
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple and its value (rad) if a decimal is a rounded multiple of pi, else None.
+    """If a decimal number is a rounded multiple of pi, return the multiple and its value (rad).
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
