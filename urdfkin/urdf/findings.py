@@ -538,7 +538,6 @@ class Reporter:
         return self._attributes
 
     def _place(self, at: Element, attribute: str | None) -> tuple[int, int, int]:
-        """Return line, column and width of a start tag or of one attribute."""
         span = None if attribute is None else self._spans(at).get(attribute)
         if span is None:
             return at.line, at.column, 1 + len(at.tag)

@@ -246,8 +246,7 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
 def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
-    If `whole` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files. Raise
-    InputError if MuJoCo is missing, the file is invalid, or the robot has a ball joint.
+    If `whole` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files.
     """
     mujoco = library()
     fused = None
@@ -484,7 +483,6 @@ class _MjcfReader:
         return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
 
     def _rules(self) -> Iterator[tuple[str, Mimic]]:
-        """Yield the mimic rules: linear equalities of two joints, with chains combined."""
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
@@ -535,7 +533,6 @@ def fixed_joint(name: str, T: FloatArray) -> Joint:
 
 
 def leads(rules: Mapping[str, Mimic], joint: str, to: str) -> bool:
-    """Return whether `joint` mimics `to`, directly or through other mimic joints."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to

@@ -165,7 +165,6 @@ def version() -> str:
 
 
 def library() -> Any:
-    """Return a namespace of OpenUSD's modules; raise InputError if OpenUSD is not installed."""
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
@@ -687,7 +686,7 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return a limit of a `PhysicsJoint`; refuse a blocked limit, because USD readers treat it differently."""
+        """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
             message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
@@ -878,7 +877,6 @@ class _StageReader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return a prim's name, with the names of ancestors if the name is not unique."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -1102,7 +1100,7 @@ class _StageReader:
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim or an ancestor has a `unitsResolve` operation, which converts units and axes."""
+        """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
                 return True

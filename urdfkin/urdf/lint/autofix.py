@@ -171,7 +171,6 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
 
 
 def _relative(file: str) -> str:
-    """Return the name relative to the current folder if the file is in this folder."""
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 

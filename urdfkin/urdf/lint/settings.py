@@ -138,7 +138,6 @@ class Settings:
 
     @property
     def root(self) -> Path:
-        """The folder to which patterns are relative."""
         return Path() if self.file is None else self.file.parent
 
     def ignored_in(self, file: str) -> frozenset[str]:

@@ -197,7 +197,6 @@ _VECTORS = ("origin", "axis")
 
 
 def check_vocabulary(report: Reporter, root: Element) -> None:
-    """Report unknown, misplaced and repeated elements, unknown attributes, and text between tags."""
     stack = [root]
     while stack:
         element = stack.pop()

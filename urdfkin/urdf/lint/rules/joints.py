@@ -407,7 +407,6 @@ class _MimicChecker:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
-        """Report limits that do not allow the full range of the mimicked joint."""
         from urdfkin.model.configuration import allowed_range, range_words
         from urdfkin.model.tree import Limit
 
