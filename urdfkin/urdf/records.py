@@ -101,6 +101,8 @@ AXIAL = ("revolute", "continuous", "prismatic")
 
 @dataclass(slots=True)
 class LimitRecord:
+    """A `<limit>` element; the value of a missing attribute is None."""
+
     element: Element
     lower: float | None
     upper: float | None
