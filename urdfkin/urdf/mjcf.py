@@ -347,10 +347,10 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
     useless = dict(_useless(spec))
     for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
         if words in useless:
-            yield Listed(f"{words} have no effect here", tag, moves=True)
+            yield Listed(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
         counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
-        yield Listed(f"left out, since kinematics does not use them: {counts}")
+        yield Listed(f"kinematics does not use {counts}")
 
 
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:

@@ -421,7 +421,7 @@ class _StageReader:
             joints = sum(one.IsA(physics.Joint) for one in below)
             if bodies or joints:
                 what = f"the prototypes of this PointInstancer have {bodies} bodies and {joints} joints"
-                remedy = "write each copy as a prim of its own, with a reference"
+                remedy = "write each copy as a separate prim, with a reference"
                 self._report("left-out-of-usd", path, f"{what}, which are not read", remedy)
             else:
                 self._report("unused-in-usd", path, "kinematics does not use this PointInstancer")
@@ -899,7 +899,7 @@ class _StageReader:
         free = kind in (JointKind.PLANAR, JointKind.FLOATING)
         if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
             raise InputError(
-                "body0 of a floating joint must be the world, and body0 of a planar joint must be its parent",
+                "body0 of a floating joint must be the world, and body0 of a planar joint must be the parent",
                 where=f"{self.source}: joint {edge.path}",
                 found=kind.value,
                 remedy="exchange body0 and body1 of this joint, or write several joints",
@@ -1086,13 +1086,13 @@ class _StageReader:
             factor = unit / self._unit
             if abs(factor - 1.0) > SINGLE and not self._is_scaled(prim, factor):
                 what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._unit:g}"
-                remedy = f"scale this prim by {factor:g}, or write the layer in the unit of the stage"
+                remedy = f"scale this prim by {factor:g}, or save the layer in the unit of the stage"
                 self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
         up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
         if root.HasInfo(tokens.upAxis) and root.GetInfo(tokens.upAxis) != up and not self._is_resolved(prim):
             what = f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up}"
-            remedy = "turn this prim, or write the layer with the up axis of the stage"
-            self._report("up-axis", path, f"{what}; the layer is not turned", remedy)
+            remedy = "rotate this prim, or save the layer with the up axis of the stage"
+            self._report("up-axis", path, f"{what}; the layer is not rotated", remedy)
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
