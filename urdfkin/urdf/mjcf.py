@@ -509,7 +509,8 @@ class _MjcfReader:
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
         """Return the mimic joint y and its rule for the equality y - y0 = c0 + c1 (x - x0).
 
-        Here x0 and y0 are the joints' reference values. Return None if the equality is not linear.
+        Here x0 and y0 are the joints' reference values. Return None if the equality is not a linear relation
+        of two joints.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])

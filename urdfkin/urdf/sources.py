@@ -52,7 +52,7 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """The source for a new call of `load`; `-` (standard input) for text and bytes."""
+        """The source for a new call of `load`; `-` (standard input) for a source without a name."""
         return "-" if self.source.startswith("<") else self.source
 
     @property

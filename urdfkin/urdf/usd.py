@@ -74,6 +74,7 @@ _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoin
 #: Words in the names of USD types and schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of the type names of joints that a kinematic tree cannot represent.
+#: OpenUSD recognizes such a joint only if the plugin for the joint type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: Coefficients of the nonlinear terms of a MuJoCo joint equality; a mimic rule is linear.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")

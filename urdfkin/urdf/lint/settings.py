@@ -269,6 +269,7 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
     found = () if old is None else look(replace(text, data=old)).findings
+    # The finding about a mesh is new if the mesh file was deleted after the older version.
     if any(os.fsencode(name) in text.data for name in version.gone):
         found = tuple(finding for finding in found if finding.code != MESH_MISSING.id)
     elif same:

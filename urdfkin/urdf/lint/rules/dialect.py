@@ -336,7 +336,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
     found: dict[str, list[_Place]] = {}
-    declared = Counter(("xml", "xmlns"))  # XML itself declares the prefixes.
+    declared = Counter(("xml", "xmlns"))  # XML itself declares `xml` and `xmlns`.
     stack = [(root, False)]
     while stack:
         element, leaving = stack.pop()
