@@ -68,7 +68,7 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
 
 
 class _Evaluation:
-    """Evaluate a syntax tree. Each method evaluates the nodes of the class with the method's name."""
+    """Evaluate a syntax tree; for example, the method `BinOp` evaluates nodes of `ast.BinOp`."""
 
     def __init__(self, names: Mapping[str, Any], functions: Collection[object]) -> None:
         self._names, self._functions = names, functions

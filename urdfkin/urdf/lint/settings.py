@@ -125,7 +125,7 @@ _WORDS = {
     str: "a string",
 }
 
-#: Default patterns of robot files, without .xacro, because most .xacro files are a part of a robot.
+#: Default patterns of robot files, without .xacro, because most of them contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
