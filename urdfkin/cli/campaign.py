@@ -29,16 +29,15 @@ _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Estimates the speed of a validation, in chunks of samples per second, and the remaining time.
+    """Estimates the speed of a validation (chunks per second) and the remaining time.
 
-    The time until the first chunk is finished is not counted, because urdfkin may compile kernels meanwhile.
+    The time before the first new chunk is not counted, because urdfkin may compile kernels then.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
     def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
-        """Return the chunks per second and the remaining seconds; None until one chunk is finished."""
         seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
         if fresh <= 0:
             self._begin = self._now()
@@ -50,7 +49,6 @@ class Pace:
 
 @contextmanager
 def progress(*, as_json: bool) -> Iterator[Progress]:
-    """Yield the callback with which `validate` prints JSON lines, a progress bar, or lines of text."""
     pace = Pace()
     if as_json:
         with _at_intervals(_JSON, lambda state: _json(state, pace)) as tell:
@@ -97,7 +95,7 @@ def _failures(state: CampaignProgress) -> str:
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the progress every `seconds` seconds; JSON output also contains the first and the last state."""
+    """Show the progress every `seconds` seconds. JSON output always contains the first and the last state."""
     as_json = seconds == _JSON
     last_time = -math.inf if as_json else time.monotonic()
     hidden: CampaignProgress | None = None
@@ -221,7 +219,6 @@ def _reason(store: Store, robot: int) -> str:
 
 
 def _seconds_of_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
-    """Return the mean computing time of a chunk in seconds; None if no chunk is finished."""
     from urdfkin.validation.chunk import ChunkResult
 
     begun = [robot for robot, (done, _) in counts.items() if done]

@@ -14,7 +14,7 @@ _TRAILING = re.compile(r" +$", re.MULTILINE)
 
 
 class Terminal(Console):
-    """A console of the package rich in which markup and control characters in names have no effect."""
+    """A console in which markup and control characters of names have no effect."""
 
     def __init__(self, stream: TextIO, **options: Any) -> None:
         safe = SafeStream(stream, styled=True)

@@ -1,7 +1,6 @@
 """Display of objects as text, HTML, Markdown and LaTeX.
 
-The method `_sheet` of a `Displayable` returns a `TextDocument`, which `print` and notebooks display. Names
-from files may contain any characters, so each format escapes names.
+Names from files may contain any characters, so each format escapes names.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_
 LINES = "├│└ "
 #: ASCII characters that replace `LINES`.
 ASCII = str.maketrans("├│└", "+|`")
-#: Fraction of a table's largest number below which a number is displayed as 0.
+#: A number is displayed as 0 if it is below this fraction of the table's largest number.
 NOISE = 1e-15
 
 
@@ -25,10 +24,8 @@ class Table:
     """A table of text and numbers; numbers are displayed with six digits.
 
     Attributes:
-        heads: Headings of the columns.
-        rows: Cells of each row.
         left: Number of left-aligned columns, or their indices; cells in these columns keep leading blanks.
-        names: Indices of columns with names, which Markdown displays as code.
+        names: Indices of columns that Markdown displays as code.
     """
 
     heads: Sequence[str]
@@ -108,8 +105,6 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """A matrix, such as a pose, with each number as text."""
-
     rows: Sequence[Sequence[str]]
 
     def lines(self) -> list[str]:
@@ -136,7 +131,7 @@ class Matrix:
 
 
 class Strong(str):
-    """A sentence with emphasis, and with a style for terminals, such as "bold red"."""
+    """A sentence with emphasis; `style` is a style for terminals, such as "bold red"."""
 
     __slots__ = ("style",)
     style: str
@@ -155,10 +150,7 @@ class CodeLine(str):
 
 @dataclass(frozen=True, slots=True)
 class TextDocument:
-    """A title, which may be empty, and sentences, tables and matrices.
-
-    An empty string in `parts` becomes a blank line in plain text.
-    """
+    """A title, and sentences, tables and matrices; in plain text, an empty part is a blank line."""
 
     title: str
     parts: Sequence[str | Table | Matrix] = ()

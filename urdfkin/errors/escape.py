@@ -25,11 +25,10 @@ _JOINER = "&#8288;"
 
 
 def printable(text: str) -> str:
-    r"""Return one line that is safe for a terminal: unprintable characters and line ends are escaped.
+    r"""Escape unprintable characters and line ends, so that the line is safe for a terminal.
 
-    Example:
-        >>> print(printable("a\u202eb\x1b[31m\n"))
-        a\u202eb\x1b[31m\n
+    >>> print(printable("a\u202eb\x1b[31m\n"))
+    a\u202eb\x1b[31m\n
     """
     if text.isprintable():
         return text
@@ -39,9 +38,8 @@ def printable(text: str) -> str:
 def log_line(text: str) -> str:
     r"""Return one line that is safe for a terminal and for the log of a CI service.
 
-    Example:
-        >>> print(log_line("::error::a\n##vso[b]"))
-        :\u003aerror::a\n##vso\u005bb]
+    >>> print(log_line("::error::a\n##vso[b]"))
+    :\u003aerror::a\n##vso\u005bb]
     """
     line = printable(text)
     for command in COMMANDS:
@@ -52,9 +50,8 @@ def log_line(text: str) -> str:
 def markdown_text(words: str) -> str:
     r"""Escape a sentence for Markdown: one line without markup, HTML, links, mentions, lists and rules.
 
-    Example:
-        >>> markdown_text("<b>*x*"), markdown_text("1. x")
-        ('&lt;b&gt;\\*x\\*', '1\\. x')
+    >>> markdown_text("<b>*x*"), markdown_text("1. x")
+    ('&lt;b&gt;\\*x\\*', '1\\. x')
     """
     return re.sub(r"^(\d*)([-+=.])", r"\1\\\2", markdown_cell(words))
 
@@ -70,9 +67,8 @@ def markdown_cell(words: str) -> str:
 def markdown_code(name: str) -> str:
     r"""Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell.
 
-    Example:
-        >>> print(markdown_code("a`|b"))
-        `a\x60\x7cb`
+    >>> print(markdown_code("a`|b"))
+    `a\x60\x7cb`
     """
     return "`" + (printable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
 
@@ -89,12 +85,7 @@ def latex_text(text: str) -> str:
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    r"""Return rows as CSV. Pass names from files through `csv_cell` first.
-
-    Example:
-        >>> csv_text([["joint", "lower"], ["a, b", 0.5]])
-        'joint,lower\n"a, b",0.5\n'
-    """
+    """Return rows as CSV. Pass names from files through `csv_cell` first."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue()
@@ -103,9 +94,8 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def json_text(data: Any) -> str:
     r"""Return JSON in ASCII without commands to a CI service; a parser restores the original names.
 
-    Example:
-        >>> print(json_text(["\u202e ##[error]"]))
-        ["\u202e #\u0023[error]"]
+    >>> print(json_text(["\u202e ##[error]"]))
+    ["\u202e #\u0023[error]"]
     """
     text = json.dumps(data, indent=2 if isinstance(data, dict) else None, allow_nan=False)
     return text.replace("##", r"#\u0023").replace("\x7f", r"\u007f")
@@ -121,9 +111,8 @@ def csv_cell(name: str) -> str:
 
     An apostrophe before `=`, `+`, `-` or `@` marks the cell as text; `from_csv_cell` removes the apostrophe.
 
-    Example:
-        >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
-        ("'=cmd|'/C calc'!A0", 'joint1')
+    >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
+    ("'=cmd|'/C calc'!A0", 'joint1')
     """
     line = printable(name).replace("##", r"#\x23")
     return f"'{line}" if line.lstrip("' ").startswith(FORMULA) else line

@@ -49,7 +49,7 @@ def _bytes(root: ET.Element) -> bytes:
 
 
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
-    """Return the checks of `urdfkin verify` as a JUnit XML file with a test case for each function.
+    """Return JUnit XML with a test case for each function.
 
     The test case fails if the function disagrees with the reference, or if no oracle confirms the reference.
     """
@@ -169,5 +169,4 @@ def _time(seconds: float) -> str:
 
 
 def _clean(text: str) -> str:
-    """Replace each character that XML forbids by its hexadecimal code."""
     return _FORBIDDEN.sub(lambda found: f"\\x{ord(found[0]):02x}", text)

@@ -28,11 +28,9 @@ def print_document(out: Console, document: TextDocument) -> None:
 
 
 def print_table(out: Console, table: Table) -> None:
-    """Print a table with six digits of each number; a name in the first column is never split over two lines.
+    """Print a table; a name in the first column is never split over two lines.
 
-    Numbers below the rounding error of the table's largest number are shown as 0. On a narrow terminal, a
-    long name is on its own line above the other cells of the row. This line is left out if the previous row
-    has the same name.
+    On a narrow terminal, a long name is on its own line above the other cells of the row.
     """
     from rich.cells import cell_len
 
@@ -65,12 +63,11 @@ def print_table(out: Console, table: Table) -> None:
 
 
 def fits(out: Console, table: Table) -> bool:
-    """Return whether a table fits the terminal with two spaces between columns and one after the last."""
     return sum(width + 2 for width in _cells(table)[2]) - 1 <= out.width
 
 
 def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
-    """Return the lines of the table's heading, the table's rows, and the width of each column."""
+    """Return the lines of the heading, the rows, and the width of each column."""
     from rich.cells import cell_len
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")

@@ -34,12 +34,11 @@ from urdfkin.validation.robot_summary import chain_disagreement, reader_disagree
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
 #: nq and nv of each kind of joint.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(_WITH_AXIS, (1, 1))
-#: Tolerance of rotation matrices and unit axes; texts may give their numbers with only 6 digits.
+#: Tolerance of rotation matrices and unit axes, because a robot file may have only 6 digits.
 _ROUNDED = 1e-5
 
 
 def frame_names(model: ReportedModel) -> list[str]:
-    """Return the names of the compared frames: every link, then every joint."""
     return [f"link:{name}" for name in model["links"]] + [f"joint:{j['name']}" for j in model["joints"]]
 
 
@@ -124,7 +123,7 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
 
 #: Relative tolerance of recomputed quotients.
 _TOLERANCE = 1e-9
-#: Maximum number of results; a double represents all smaller integers.
+#: Maximum number of results; a double represents all integers up to this number.
 _MOST = 2**53
 
 
@@ -264,7 +263,8 @@ def _share(check: ReportedCheck) -> Iterator[str]:
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `share_of_bound` is {share:g}"
     if low > high:
-        if share or largest or check["worst_case"]:  # without a comparison, there is no bound
+        # Without a comparison, there is no bound.
+        if share or largest or check["worst_case"]:
             yield f"`bound` is {check['bound']}, but something was compared"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
@@ -314,18 +314,11 @@ _SHOWN = 3
 
 
 def read_document(path: Path) -> Document:
-    """Read and check a document from a file.
-
-    Raises:
-        SourceError: The file cannot be read.
-        InputError: The file is not JSON, is not a validation report, has another version, violates the
-            schema, or contradicts itself.
-    """
+    """Read and check a document; raise SourceError or, for an invalid document, InputError."""
     return checked(read_json(path), str(path))
 
 
 def stored_document(folder: Path) -> Document:
-    """Return the document of a store, after the same checks as in `read_document`."""
     from urdfkin.validation.campaign import stored
 
     return checked(stored(folder).as_dict(), str(folder))

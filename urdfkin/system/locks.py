@@ -58,7 +58,8 @@ class _ImportLock:
         _locks.append(self._lock)
 
     def register(self) -> None:
-        if self._registered:  # a module may call `register` while another thread imports it
+        # A module may call `register` while another thread imports that module.
+        if self._registered:
             return
         with self._lock:
             if not self._registered:

@@ -19,7 +19,8 @@ def plain_xml(text: str) -> Element:
     'drake:x'
     """
     builder = TreeBuilder()
-    parser = expat.ParserCreate("utf-8")  # expat ignores namespaces without a separator
+    # Without a namespace separator, expat ignores namespaces.
+    parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
@@ -29,7 +30,7 @@ def plain_xml(text: str) -> Element:
 
 
 def order_words(urdf: str, joints: Sequence[str]) -> str:
-    """Return a sentence that compares the order of a URDF's joints with `joints`, the order of q."""
+    """Compare the order of a URDF's joints with `joints`, the order of q, in a sentence."""
     known = set(joints)
     written = [e.get("name", "") for e in plain_xml(urdf) if e.tag == "joint" and e.get("name") in known]
     ours = [name for name in joints if name in set(written)]
