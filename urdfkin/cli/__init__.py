@@ -105,7 +105,7 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: Commands that an error message suggests, each with the unknown words that it replaces.
+#: Commands that error messages suggest, each with the unknown words that the command replaces.
 _SYNONYMS = _by_word(
     {
         "placement": "fk forward forward-kinematics pose transform tf",

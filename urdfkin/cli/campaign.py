@@ -24,21 +24,19 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Seconds between two lines of text, and between two lines of JSON
+#: Minimum time (s) between two lines of text, and between two lines of JSON
 _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Estimates the speed of a validation (chunks per second) and the remaining time.
-
-    The time before the first new chunk is not counted, because urdfkin may compile kernels then.
-    """
+    """Estimates the speed of a validation (chunks per second) and the remaining time (s)."""
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
     def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
+        # Before the first new chunk, urdfkin may compile kernels, so this time is not counted.
         if fresh <= 0:
             self._begin = self._now()
         if fresh <= 0 or seconds <= 0.0:
@@ -95,7 +93,6 @@ def _failures(state: CampaignProgress) -> str:
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the progress every `seconds` seconds. JSON output always contains the first and the last state."""
     as_json = seconds == _JSON
     last_time = -math.inf if as_json else time.monotonic()
     hidden: CampaignProgress | None = None
@@ -141,7 +138,6 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         yield tell
 
 
-#: Maximum number of failed robots that `status` lists
 _MOST_FAILED = 20
 #: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
 _MOST_CHUNKS = 200

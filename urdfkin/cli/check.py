@@ -153,7 +153,7 @@ def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS = "urdfkin.settings"
-#: Settings in pyproject.toml; each is the default of the option with the same name
+#: Settings in pyproject.toml that are defaults of the options with the same names
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 
 
@@ -217,7 +217,6 @@ settings_options = combine(
         help="File with a table [tool.urdfkin] of settings.", show_default="the nearest pyproject.toml",
     ),
 )  # fmt: skip
-#: Help texts of --max-bytes, --max-depth, ...
 _LIMITS = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
@@ -369,7 +368,6 @@ class CheckRun:
 
     Attributes:
         fold: Whether findings with the same code share a line of output.
-        diff: Whether to collect the changes of --fix as patches, without applying them.
         accepts_all: Whether --write-baseline accepts all findings, so that none of them is a failure.
     """
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 #: Pattern of a name without quotes, blanks and characters that a shell expands.
 #: A name with a colon does not match, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size (bytes) of a robot file from which shell completion reads frame names
+#: Maximum size (bytes) of a file from which shell completion reads frame names
 _MOST_BYTES = 10_000_000
 #: XML elements that define frames. In a URDF, only children of the root element define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")

@@ -30,7 +30,6 @@ FORMATS = (
     *("c", "urdf", "svg"),
 )
 
-#: Output formats for each suffix of a file
 _SUFFIXES = {
     ".txt": ("terminal",), ".md": ("markdown",), ".html": ("html",), ".tex": ("latex",), ".csv": ("csv",),
     ".json": ("json",), ".toml": ("toml",), ".py": ("numpy", "sympy", "casadi", "roboticstoolbox", "ets"),

@@ -39,11 +39,9 @@ from urdfkin.system.files import at_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
-#: Formats that support several tables
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
 #: Formats in which the result of the check is printed below the table
 _PRINTED = ("terminal", "markdown")
-#: Formats of a printed table
 _TEXTS = (*_PRINTED, "html", "latex")
 #: Number of digits of the base and tool transforms in formats with rounded numbers; None: as in --digits
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
@@ -51,11 +49,7 @@ _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 @dataclass(frozen=True, slots=True)
 class DHRequest:
-    """The options of `urdfkin dh`.
-
-    Attributes:
-        unchanged: File of a table that the command writes again; None: derive a new table.
-    """
+    """The options of `urdfkin dh`; `unchanged` is a table file that the command writes again, or None."""
 
     robot: Robot
     unchanged: str | None

@@ -36,10 +36,7 @@ class Stop:
 
 @contextmanager
 def stoppable() -> Iterator[Stop]:
-    """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP.
-
-    Later signals are ignored, so that the command can save its results.
-    """
+    """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
     stop = Stop()
     # `nohup` makes a process ignore SIGHUP, so only signals with the default handler get a new handler.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]

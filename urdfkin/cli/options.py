@@ -58,7 +58,7 @@ class NumberInRange(FiniteNumber, click.FloatRange):
 def format_from_suffix(
     context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], without_suffix: str
 ) -> str:
-    """Return the output format from --format and the suffix of the output file, which must not contradict.
+    """Return the output format; raise InputError if --format contradicts the suffix of the output file.
 
     `formats` lists the formats of each suffix, the default first: `{".py": ("numpy", "sympy")}`.
     """
@@ -141,7 +141,6 @@ def _read_pairs(separator: str, form: str, *, needs_value: bool) -> Callable[[Se
 
 
 def load_options() -> dict[str, Any]:
-    """Return the options of the running command that are arguments of `load`."""
     return dict(click.get_current_context().meta.get(_LOAD_OPTIONS, {}))
 
 
@@ -348,7 +347,6 @@ class Inputs:
         t: (n,) times of a trajectory in s; None without times.
         base: Motion of the root link; None if the root link is fixed.
         settings: Other settings that affect the result, for example `{"relative_to": "base"}`.
-        conversion: Conversion to the convention of --convention; None for urdfkin's own convention.
     """
 
     robot: Robot

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
     from urdfkin.verify.certificate import Certificate
 
-#: Formats of a printed table
 TEXTS = ("table", "markdown", "html", "latex")
 _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",

@@ -67,7 +67,6 @@ _BASE = ("base_placement", "base_velocity", "base_acceleration")
 _trajectory = trajectory_option(
     "Read q, v and a from this file instead of --q, --v and --a. CSV output has one row for each time."
 )
-#: Maximum number of samples in printed tables
 _MOST_SAMPLES = 5
 
 
@@ -95,7 +94,6 @@ def _read_options() -> Inputs:
 def _read_trajectory(
     robot: Robot, frame: str | None, path: Path, letters: str, conversion: Conversion | None
 ) -> Inputs:
-    """Read a trajectory; compute missing v and a by differences if the command needs them."""
     import numpy as np
 
     from urdfkin.robot.trajectory import read_samples, with_rates
@@ -133,7 +131,6 @@ def _verified_answer(
 def _samples(
     x: Inputs, most: int, others: str, of: Callable[[int], Iterable[str | Table]]
 ) -> Iterator[str | Table]:
-    """Yield a heading and the tables `of(k)` for each of the first `most` samples."""
     n = len(x.q)
     for k in range(min(n, most)):
         if n > 1:
@@ -270,10 +267,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 
 
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
-    """Return a table with one row for each column of a Jacobian.
-
-    The table of a Hessian has one row for each pair of joint velocities, without rows of zeros.
-    """
+    """Return one row for each column of a Jacobian, or for each nonzero pair of columns of a Hessian."""
     import numpy as np
 
     if quantity.axes == len(("row", "rate")):

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-#: Options that name an output file of a report
 FILES = ("json_", "html", "junit", "markdown")
 report_options = combine(
     click.option("--json", "json_", type=FILE, help="Write the report to this file as JSON."),

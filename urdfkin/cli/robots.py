@@ -95,7 +95,6 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of the table, with plain link names instead of a drawn tree."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

@@ -29,7 +29,6 @@ READER_GONE = 128 + signal.SIGPIPE
 
 
 def prepare() -> None:
-    """Replace the standard streams by streams that report failures."""
     _open_closed_streams()
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
@@ -44,10 +43,7 @@ def finish() -> None:
 
 
 class _RawStream(io.FileIO):
-    """Standard output or standard error as a raw file.
-
-    The first failure of standard output ends the command; failures of standard error are ignored.
-    """
+    """A standard stream; the first failure of stdout ends the command, and failures of stderr are ignored."""
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(descriptor, "w", closefd=False)

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Quantities that a function of the user can compute
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 

@@ -18,9 +18,7 @@ from urdfkin.errors.escape import log_line
 
 #: Maximum number of leading characters of a name that `nearest` compares.
 _COMPARED = 128
-#: Default for the maximum number of pairs of characters that `nearest` compares.
 WORK = 1_000_000
-#: Maximum number of suggested names.
 _OFFERED = 3
 
 

@@ -13,7 +13,6 @@ from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_
 
 #: Characters that draw the branches of a tree before a name.
 LINES = "├│└ "
-#: ASCII characters that replace `LINES`.
 ASCII = str.maketrans("├│└", "+|`")
 #: A number is displayed as 0 if it is below this fraction of the table's largest number.
 NOISE = 1e-15
@@ -156,7 +155,6 @@ class TextDocument:
     parts: Sequence[str | Table | Matrix] = ()
 
     def written(self, form: str) -> str:
-        """Return the text in the format "terminal" (or "table"), "markdown", "html" or "latex"."""
         text: str = self.text() if form in ("terminal", "table") else getattr(self, form)()
         return text + "\n"
 

@@ -25,11 +25,7 @@ _JOINER = "&#8288;"
 
 
 def printable(text: str) -> str:
-    r"""Escape unprintable characters and line ends, so that the line is safe for a terminal.
-
-    >>> print(printable("a\u202eb\x1b[31m\n"))
-    a\u202eb\x1b[31m\n
-    """
+    """Escape unprintable characters and line ends, so that the line is safe for a terminal."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
@@ -48,11 +44,7 @@ def log_line(text: str) -> str:
 
 
 def markdown_text(words: str) -> str:
-    r"""Escape a sentence for Markdown: one line without markup, HTML, links, mentions, lists and rules.
-
-    >>> markdown_text("<b>*x*"), markdown_text("1. x")
-    ('&lt;b&gt;\\*x\\*', '1\\. x')
-    """
+    """Escape a sentence for Markdown: one line without markup, HTML, links, mentions, lists and rules."""
     return re.sub(r"^(\d*)([-+=.])", r"\1\\\2", markdown_cell(words))
 
 
@@ -65,11 +57,7 @@ def markdown_cell(words: str) -> str:
 
 
 def markdown_code(name: str) -> str:
-    r"""Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell.
-
-    >>> print(markdown_code("a`|b"))
-    `a\x60\x7cb`
-    """
+    """Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell."""
     return "`" + (printable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
 
 

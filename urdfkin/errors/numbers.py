@@ -121,10 +121,6 @@ def _product(factors: str) -> float | None:
 
 
 def in_radians(degrees: float) -> float:
-    """Convert degrees to radians. For k * 15 degrees, the result is exactly k * pi / 12 in floating point.
-
-    >>> in_radians(90.0) == math.pi / 2
-    True
-    """
+    """Convert degrees to radians. For k * 15 degrees, the result is exactly k * pi / 12 in floating point."""
     twelfths = degrees / 15.0
     return twelfths * math.pi / 12.0 if twelfths == round(twelfths) else math.radians(degrees)

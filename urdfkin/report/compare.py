@@ -43,9 +43,7 @@ from urdfkin.validation.document import (
 )
 from urdfkin.verify.oracles import versions
 
-#: Maximum length of a displayed value.
 _LONGEST = 200
-#: Displayed poses are rounded to nine decimals.
 _PRECISION = Tolerance(1e-9, 1e-9)
 
 
@@ -298,10 +296,7 @@ def by_source(document: Document) -> dict[str, ReportedRobot]:
 
 
 def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
-    """Return the new source of each renamed file, by the old source.
-
-    A file counts as renamed if exactly one missing and exactly one new source have the same robot name.
-    """
+    """Return {old source: new source} if exactly one missing and one new source have the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1

@@ -14,7 +14,6 @@ from urdfkin.report.markdown import LIMIT, count_within, row_line, shortened, ta
 from urdfkin.report.words import counted
 from urdfkin.system.documents import plain
 
-#: Headings of the table of changes.
 HEADS = ("element", "what", "old", "new", "alone")
 
 
@@ -32,7 +31,6 @@ def headline(found: Changes) -> str:
     return f"{head}; together they {motion_words(found.total)}"
 
 
-#: Headings of the table of pairs of robots.
 PAIRS = ("old", "new", "changes")
 
 

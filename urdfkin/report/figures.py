@@ -82,7 +82,6 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
 
 
 def _annotate_left(axes: Axes, text: str, y: float, points: float, **style: Any) -> None:
-    """Write a text left of the axis, `points` typographic points above the height `y`."""
     place: dict[str, Any] = {"xytext": (-4, points), "textcoords": "offset points", "ha": "right"}
     axes.annotate(text, (_LEFT, y), color=TEXT, **place, **style)
 

@@ -35,7 +35,6 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 MARKED, CHARTED = 20, 60
 #: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
 SHOWN = 20
-#: Maximum number of runs and of changes that the page lists for each robot.
 _LISTED = 500
 #: Symbol of each verdict; the empty verdict means that the run did not include the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
@@ -116,11 +115,7 @@ ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 @dataclass(slots=True)
 class History:
-    """The runs and robots of several reports.
-
-    Attributes:
-        robots: The results of each robot, by the robot's source in the latest run; worse verdicts come first.
-    """
+    """The runs and robots of several reports; the key of a robot is its source in the latest run."""
 
     runs: list[ValidationRun] = field(default_factory=list)
     robots: dict[str, list[Point]] = field(default_factory=dict)

@@ -49,10 +49,7 @@ def _bytes(root: ET.Element) -> bytes:
 
 
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
-    """Return JUnit XML with a test case for each function.
-
-    The test case fails if the function disagrees with the reference, or if no oracle confirms the reference.
-    """
+    """Return JUnit XML with a test case for each function; without oracle confirmation, a case fails."""
     cases = [_function_case(check) for check in checks]
     failures = str(sum(case.find("failure") is not None for case in cases))
     counts = {"tests": str(len(cases)), "failures": failures, "errors": "0"}
@@ -107,7 +104,6 @@ def _suite_element(
 
 
 def _whole_run(document: Document) -> ET.Element:
-    """Return a suite for errors of the whole run: an interrupt, missing robots, or no robots."""
     reason = outcome_of(document).reason or ""
     case = ET.Element("testcase", {"name": "every robot was compared in full", "classname": "urdfkin"})
     ET.SubElement(case, "error", {"type": "not passed", "message": reason}).text = reason

@@ -28,10 +28,7 @@ def print_document(out: Console, document: TextDocument) -> None:
 
 
 def print_table(out: Console, table: Table) -> None:
-    """Print a table; a name in the first column is never split over two lines.
-
-    On a narrow terminal, a long name is on its own line above the other cells of the row.
-    """
+    """Print a table; on a narrow terminal, a long name is on its own line above the other cells."""
     from rich.cells import cell_len
 
     ascii_only = out.options.ascii_only
@@ -67,7 +64,6 @@ def fits(out: Console, table: Table) -> bool:
 
 
 def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
-    """Return the lines of the heading, the rows, and the width of each column."""
     from rich.cells import cell_len
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")

@@ -26,7 +26,6 @@ from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 #: GitHub accepts comments of up to 65,536 characters.
 LIMIT = 60_000
 _MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
-#: Maximum number of failed checks that are shown for each robot.
 _SHOWN = 3
 
 

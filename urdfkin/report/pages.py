@@ -74,7 +74,6 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
 
 
 def reason(robot: ReportedRobot) -> str:
-    """Return the reason of a verdict, without errors that the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -202,10 +201,7 @@ def _share(check: ReportedCheck, subject: int) -> float:
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
-    """Return a table's rows as cells: joint, a, alpha, beta if the chain has any, d, theta.
-
-    The cell of the joint variable, theta or d, also contains q.
-    """
+    """Return rows of cells: joint, a, alpha, beta if any, d, theta; the joint variable's cell contains q."""
     rows = chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
     return [_dh_cells(row, has_beta(chain)) for row in rows]
 

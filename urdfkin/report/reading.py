@@ -121,7 +121,6 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
         )
 
 
-#: Relative tolerance of recomputed quotients.
 _TOLERANCE = 1e-9
 #: Maximum number of results; a double represents all integers up to this number.
 _MOST = 2**53
@@ -309,12 +308,10 @@ def _as_number(units: Units) -> float:
     return math.inf if units is None else units
 
 
-#: Maximum number of contradictions in a message.
 _SHOWN = 3
 
 
 def read_document(path: Path) -> Document:
-    """Read and check a document; raise SourceError or, for an invalid document, InputError."""
     return checked(read_json(path), str(path))
 
 

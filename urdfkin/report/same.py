@@ -27,7 +27,6 @@ SHOWN = 12
 #: Line for models that differ and whose joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
-#: The question whether the two robots are equivalent.
 EQUIVALENT = SameQuestion()
 #: Distances up to FACTOR * (rounding error) count as rounding errors and are not printed.
 #: The factor covers the rounding errors of sums of several terms.
@@ -139,10 +138,7 @@ def as_written(found: Sameness) -> str:
 
 
 def where(found: Sameness, frame: Interval) -> str:
-    """Describe the configuration at which a lower bound is attained, with units.
-
-    The text has the coordinates of A, and of those joints of B that match no joint of A.
-    """
+    """Describe where a lower bound is attained: coordinates of A, and of joints of B without a match."""
     from urdfkin.model.configuration import coordinate_names, units
 
     a, b = found.trees
@@ -205,7 +201,6 @@ def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], l
     return found.after, [one.words for one in found.differences]
 
 
-#: Headings of the table of pairs of models.
 PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
 
 
@@ -240,7 +235,6 @@ def pairs_markdown(found: Sequence[Sameness], question: SameQuestion = EQUIVALEN
 
 
 def as_document(found: Sameness) -> TextDocument:
-    """Return the verdict, its reasons and the frames with the largest distances, for `print`."""
     parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(found), strict=True)]
     after, words = _reasons(found)
     for head, lines in (
@@ -405,9 +399,8 @@ def _axes(T: FloatArray, size: float) -> FloatArray:
 def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
-    """Project lines along the direction of view, and scale them to the size of the picture."""
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # In space, the first row points right on the page, and the second row points down.
+    # The rows are directions in space: the first points right on the page, the second points down.
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

@@ -164,7 +164,6 @@ def as_data(value: Any) -> Any:
 
 
 def typed(data: object, type_: type[_T]) -> _T:
-    """Return data as an object of a type; raise ValueError with the path of an invalid entry."""
     try:
         return msgspec.convert(data, type_)
     except msgspec.ValidationError as error:
@@ -172,11 +171,7 @@ def typed(data: object, type_: type[_T]) -> _T:
 
 
 def plain(value: Any) -> Any:
-    """Convert a result to data for JSON; infinity and NaN become None.
-
-    >>> plain({"worst": math.inf, "frames": ("a", "b")})
-    {'worst': None, 'frames': ['a', 'b']}
-    """
+    """Convert a result to data for JSON; infinity and NaN become None."""
     return json.loads(json.dumps(as_data(value)), parse_constant=lambda _: None)
 
 

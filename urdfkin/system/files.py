@@ -50,7 +50,6 @@ PATIENCE = 10.0
 MOST = 100_000_000
 #: Maximum size of data (trajectories, samples, reports), bytes.
 MOST_DATA = 2_000_000_000
-#: Maximum number of bytes of one read.
 _AT_A_TIME = 2**20
 _KINDS = {
     stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a character device",
@@ -194,10 +193,7 @@ def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
 
 
 def _first_of_pipe(descriptor: int, path: Path) -> bytes:
-    """Return the first available bytes of a pipe; b"" if a connected writer has written nothing yet.
-
-    SourceError is raised if no process opens the pipe for writing within `PATIENCE` seconds.
-    """
+    """Return available bytes of a pipe; raise SourceError if no writer connects within `PATIENCE` seconds."""
     events = select.poll()
     events.register(descriptor, select.POLLIN)
     end = time.monotonic() + PATIENCE

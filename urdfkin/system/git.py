@@ -34,7 +34,6 @@ class Version:
         return Path(os.path.relpath(path.resolve(), self.root)).as_posix()
 
     def holds(self, data: bytes) -> bool:
-        """Return whether any file of this commit has exactly this content."""
         blob = b"blob %d\0" % len(data) + data
         return any(
             hashlib.new(kind, blob, usedforsecurity=False).hexdigest() in self.digests
