@@ -237,8 +237,8 @@ def _check(
         return
     if check["worst"] != worst(check["worst_by_subject"]):
         yield (
-            f"`worst` is {check['worst']}, but {worst(check['worst_by_subject'])} over all"
-            f" {check['subjects']}"
+            f"`worst` is {check['worst']}, but the worst disagreement of all {check['subjects']} is"
+            f" {worst(check['worst_by_subject'])}"
         )
     last = max((i for i, count in enumerate(histogram) if count), default=0)
     if results and last != histogram_bin(_as_number(check["worst"]), edges):
@@ -275,7 +275,7 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
     case, model = check["worst_case"], robot["model"]
     if case is None:
         if check["worst"] != 0.0 or check["failed"]:
-            yield "`worst_case` is missing, but something disagrees"
+            yield "`worst_case` is missing, but a result disagrees"
         return
     if case["frame"] not in subjects:
         yield f"`worst_case`: {case['frame']} is not one of the compared {check['subjects']}"
@@ -287,8 +287,8 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
     )
     if _as_number(case["disagreement"]) > _as_number(of_frame):
         yield (
-            f"`worst_case` has {case['disagreement']} at {case['frame']}, but its worst disagreement"
-            f" is {of_frame}"
+            f"`worst_case` has {case['disagreement']} at {case['frame']}, but the worst disagreement at"
+            f" {case['frame']} is {of_frame}"
         )
     share, units = _as_number(check["share_of_bound"]), _as_number(case["disagreement"])
     low, high = (share * (bound or 0.0) for bound in check["bound"])

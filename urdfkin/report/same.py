@@ -156,7 +156,7 @@ def renamed(found: Sameness) -> list[str]:
     guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
     joints = [f"joint {one.a} is {one.b}" for one in pairs]
     joints += [
-        "joints of B have another order, which has no effect on the motion; compared in the order "
+        "joints of B have a different order, without effect on the motion; joints are compared in the order "
         + ", ".join(names)
         for names in found.orders
     ]
@@ -201,7 +201,7 @@ def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], l
     return found.after, [one.words for one in found.differences]
 
 
-PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
+PAIRS = ("A", "B", "verdict", "distance bound, as given", "single precision")
 
 
 def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
