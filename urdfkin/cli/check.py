@@ -368,7 +368,7 @@ class CheckRun:
 
     Attributes:
         fold: Whether findings with the same code share a line of output.
-        accepts_all: Whether --write-baseline accepts all findings, so that none of them is a failure.
+        accepts_all: Whether --write-baseline accepts all findings, so that no finding is a failure.
     """
 
     look: partial[Examined]
@@ -443,7 +443,7 @@ class CheckRun:
         self.outcome.add(file, Examined(text, data, None, findings, ()))
 
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
-        """Return whether a file and all files that it may include are the same as in `version`.
+        """Return whether a file and all files that the file may include are the same as in `version`.
 
         A file may include every file of the repository with a suffix in `suffixes`. A deleted file counts as
         included if the text contains its name.

@@ -46,7 +46,7 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
 
 
 class QuestionsSection(Enum):
-    """A section of docs/questions.md; its text is the command that prints the section.
+    """A section of docs/questions.md; `str` returns the command that prints the section.
 
     >>> print(QuestionsSection.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`

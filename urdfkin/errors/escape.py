@@ -90,7 +90,7 @@ def json_text(data: Any) -> str:
 
 
 def escape(c: str) -> str:
-    """Return a character's escape sequence for Python and TOML; up to U+FFFF, it is also valid in JSON."""
+    """Return a character's escape sequence for Python and TOML, and up to U+FFFF also for JSON."""
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 

@@ -27,7 +27,7 @@ _HEIGHT = 0.82
 
 
 def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> str:
-    """Return the plot of one robot as inline SVG; empty if nothing was compared."""
+    """Return the plot of one robot as inline SVG, or an empty text if nothing was compared."""
     names = quantities([robot])
     if not names:
         return ""

@@ -230,7 +230,7 @@ def _unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _start(path: Path) -> tuple[float, str]:
-    """Return the start time of a run in seconds and as text; infinity for a text that is not a date."""
+    """Return the start time of a run in seconds and as text; an invalid date counts as infinity."""
     data = _read(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     try:

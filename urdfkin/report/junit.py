@@ -49,7 +49,7 @@ def _bytes(root: ET.Element) -> bytes:
 
 
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
-    """Return JUnit XML with a test case for each function; without oracle confirmation, a case fails."""
+    """Return JUnit XML with a test case for each function; a case that no oracle confirms fails."""
     cases = [_function_case(check) for check in checks]
     failures = str(sum(case.find("failure") is not None for case in cases))
     counts = {"tests": str(len(cases)), "failures": failures, "errors": "0"}

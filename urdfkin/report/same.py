@@ -83,7 +83,7 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Describe the largest distance and angle between matching frames; empty if they are rounding errors."""
+    """Describe the largest distance and angle between matching frames, unless they are rounding errors."""
 
     def largest(end: str) -> float:
         return max((getattr(frame, end) for frame in frames), default=0.0)
@@ -103,7 +103,7 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Describe the distance and the angle of two matching frames; empty if they are rounding errors."""
+    """Describe the distance and the angle of two matching frames, unless they are rounding errors."""
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
     if frame.radians > FACTOR * rounding[1]:
         parts.append(up_to(angle, frame.radians_seen, frame.radians))
@@ -131,7 +131,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Describe how far a frame of the unchanged B is from A's frame; empty for a rounding error."""
+    """Describe how far a frame of the unchanged B is from A's frame, unless this is a rounding error."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -252,7 +252,7 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Describe the distance of two frames at the worst configuration; empty if the frames coincide."""
+    """Describe the distance of two frames at the worst configuration, unless the frames coincide."""
     if frame.lower:
         return length(frame.lower)
     return angle(frame.radians_seen) if frame.radians_seen else ""

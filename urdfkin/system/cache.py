@@ -133,7 +133,7 @@ def put(place: Path, data: bytes) -> None:
 
 
 def get(place: Path) -> bytes | None:
-    """Return the content of a file that `put` wrote; None for a missing or damaged file."""
+    """Return the content of a file that `put` wrote, or None for a missing or damaged file."""
     try:
         content = read_if_there(place, MOST_DATA)
     except SourceError as error:

@@ -148,10 +148,11 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; True for a path that is too long, so that reading reports the error."""
+    """Return whether a path exists; a path that is too long counts as existing."""
     try:
         return path.exists()
     except OSError:
+        # The error is reported when the path is read.
         return True
 
 
