@@ -445,8 +445,8 @@ class CheckRun:
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
         """Return whether a file and all files that the file may include are the same as in `version`.
 
-        A file may include every file of the repository with a suffix in `suffixes`. A deleted file counts as
-        included if the text contains its name.
+        The function assumes that the file includes every file of the repository with a suffix in `suffixes`,
+        and every deleted file whose name occurs in the text.
         """
         if suffixes not in self._changed:
             self._changed[suffixes] = version.changed(suffixes)

@@ -213,7 +213,7 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last line of the output and the exit code; None means that nothing was checked."""
+    """Return the last line of the output and the exit code; without `check`, nothing is verified."""
     from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"

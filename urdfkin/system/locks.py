@@ -48,9 +48,10 @@ class _ImportLock:
     Without this lock, another thread could fork a child during the import, and the child would wait for ever
     for the end of the import.
 
-    A fork also acquires the lock of `logging`, and an imported module may need that lock. To avoid a deadlock,
-    a fork must acquire the import lock before the lock of `logging`. Python calls registered functions in reverse
-    order of registration, so `register` imports `logging` before registering `_before_fork`.
+    A fork also acquires the lock of `logging`, and an imported module may need that lock. To avoid a
+    deadlock, a fork must acquire the import lock before the lock of `logging`. Python calls registered
+    functions in reverse order of registration, so `register` imports `logging` before registering
+    `_before_fork`.
     """
 
     def __init__(self) -> None:
