@@ -178,12 +178,14 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and args[0] not in commands() and not args[0].startswith("-"):
+            # During shell completion, an unknown command is not an error.
             if ctx.resilient_parsing:
                 return None, None, args
             raise _unknown_command(args[0])
         return super().resolve_command(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
+        """Return the commands and options that begin with `incomplete`, without importing a command."""
         from click.shell_completion import CompletionItem
 
         names = [
@@ -235,7 +237,8 @@ def cli() -> None:
 def main() -> None:
     streams.prepare()
     guard()
-    # For small matrices, OpenBLAS is fastest with one thread. NumPy reads this variable during its import.
+    # For small matrices, OpenBLAS is fastest with one thread.
+    # OpenBLAS reads this variable when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # An error message would disturb shell completion.
     if os.environ.get("_URDFKIN_COMPLETE"):

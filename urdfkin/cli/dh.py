@@ -1,4 +1,4 @@
-"""`urdfkin dh`: define the command and its options.
+"""Define the command `urdfkin dh` and its options.
 
 The module `dh_tables` makes the tables with NumPy. Importing NumPy here would slow --help down.
 """

@@ -49,7 +49,10 @@ _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 @dataclass(frozen=True, slots=True)
 class DHRequest:
-    """The options of `urdfkin dh`; `unchanged` is a table file that the command writes again, or None."""
+    """The options of `urdfkin dh`; `choices` are arguments of `Robot.dh`.
+
+    If ROBOT is a table file, and no option changes the rows, `unchanged` is this file.
+    """
 
     robot: Robot
     unchanged: str | None

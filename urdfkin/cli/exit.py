@@ -1,7 +1,7 @@
 """Run a command: exit codes, error messages, and a clean stop on SIGTERM and SIGHUP.
 
 SIGTERM and SIGHUP stop a command like an interrupt: finished results are saved. Exit code 1 always means a
-disagreement. Python exits with 1 after an uncaught exception, so urdfkin catches unexpected exceptions, and
+disagreement. Python exits with 1 after an uncaught exception, so urdfkin catches unexpected exceptions and
 exits with 70.
 """
 

@@ -347,6 +347,7 @@ class Inputs:
         t: (n,) times of a trajectory in s; None without times.
         base: Motion of the root link; None if the root link is fixed.
         settings: Other settings that affect the result, for example `{"relative_to": "base"}`.
+        conversion: Conversion to the convention of --convention; None for urdfkin's own convention.
     """
 
     robot: Robot
@@ -420,7 +421,10 @@ def read_inputs(
     option: str = "--q",
     conversion: Conversion | None = None,
 ) -> Inputs:
-    """Read q, v and a in the convention of `conversion`; repeat single samples."""
+    """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
+
+    If one of the arrays has several samples, single samples of the other arrays are repeated.
+    """
     import numpy as np
 
     if not any(text.startswith("random") for text in (q, v, a)):
@@ -478,7 +482,10 @@ def _read_count(where: str, text: str) -> int:
 def read_batch(
     path: Path, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
 ) -> tuple[FloatArray, Sequence[str]]:
-    """Read a CSV file with one sample per line; also return the layout that fits the number of columns."""
+    """Read a CSV file with one sample per line; also return the layout that fits the number of columns.
+
+    Each layout is a list of column names. `units` is as in `read_columns`.
+    """
     import numpy as np
 
     from urdfkin.robot.trajectory import read_columns, width_of

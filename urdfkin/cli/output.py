@@ -160,7 +160,7 @@ def report_compilation() -> Iterator[None]:
 
 
 def console(*, err: bool = False) -> Console:
-    """Return a console with the width of the terminal or, for a pipe, of the variable COLUMNS."""
+    """Return a console; for a pipe, the environment variable COLUMNS sets the width."""
     from urdfkin.cli.terminal import Terminal
 
     stream = sys.stderr if err else sys.stdout
@@ -180,6 +180,7 @@ def write_output(data: bytes | str, output: Path | None) -> None:
 
 
 def check_writable(*paths: Path | None) -> None:
+    """Raise SourceError before a long computation if an output file cannot be written."""
     for path in filter(None, paths):
         try:
             # A device is written without a temporary file.
@@ -213,7 +214,7 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last line of the output and the exit code; without `check`, nothing is verified."""
+    """Return the last line of the output and the exit code for a `TableCheck` or a similar result."""
     from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"

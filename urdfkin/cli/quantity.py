@@ -267,7 +267,11 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 
 
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
-    """Return one row for each column of a Jacobian, or for each nonzero pair of columns of a Hessian."""
+    """Return a table with one row for each column of a Jacobian.
+
+    For a Hessian, each row has the derivative of one column with respect to one coordinate. Rows that
+    contain only rounding errors are left out.
+    """
     import numpy as np
 
     if quantity.axes == len(("row", "rate")):

@@ -1,7 +1,8 @@
 """Protect the standard streams against failures, and against control characters in names.
 
-Standard output may be closed, a file on a full disk, or a pipe to a program that exits early. Its encoding
-may not support every character of a joint's name. The command then ends without a traceback.
+Standard output may be closed, a file on a full disk, or a pipe to a program that exits early. The
+encoding of standard output may not support every character of a joint's name. In each of these cases, the
+command ends without a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
 commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of

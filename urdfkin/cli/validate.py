@@ -49,7 +49,7 @@ def study_all(
     retry: bool = False,
     how: Mapping[str, Any],
 ) -> ValidationReport:
-    """Run the accuracy study of each compared robot, and add the results to a report.
+    """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
     `report` is the report of `validate` for the robots `given`. `how` are arguments of `load`. With `shard`,
     only robots whose first samples belong to the shard are studied. An interrupt skips the remaining robots.
@@ -84,7 +84,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyResult | None]:
-    """Lock a store or its shard, and yield the accuracy results."""
+    """Lock a store, or one shard of the store, and yield the stored accuracy results."""
     if folder is None:
         yield None
         return
@@ -273,7 +273,7 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load a robot from standard input, because standard input can be read only once."""
+    """Load the robot if `source` is standard input, which can be read only once."""
     from urdfkin.robot.loading import load
 
     return load(source, **how) if source == "-" else source

@@ -25,7 +25,8 @@ _OFFERED = 3
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int = WORK) -> list[str]:
     """Return up to three known names that look like `word`, the most similar first.
 
-    `cutoff` is as in `difflib.get_close_matches`. The search ends after `work` compared pairs of characters.
+    `cutoff` is the least similarity, from 0 to 1, as in `difflib.get_close_matches`. The search ends after
+    `work` compared pairs of characters.
 
     >>> nearest("pandahand", ["panda_hand", "elbow", "base"])
     ['panda_hand']

@@ -14,7 +14,7 @@ from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_
 #: Characters that draw the branches of a tree before a name.
 LINES = "├│└ "
 ASCII = str.maketrans("├│└", "+|`")
-#: A number is displayed as 0 if it is below this fraction of the table's largest number.
+#: Numbers below this fraction of the table's largest number are displayed as 0.
 NOISE = 1e-15
 
 
@@ -149,7 +149,7 @@ class CodeLine(str):
 
 @dataclass(frozen=True, slots=True)
 class TextDocument:
-    """A title, and sentences, tables and matrices; in plain text, an empty part is a blank line."""
+    """A title with sentences, tables and matrices; an empty string in `parts` becomes a blank line."""
 
     title: str
     parts: Sequence[str | Table | Matrix] = ()

@@ -73,7 +73,11 @@ def latex_text(text: str) -> str:
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
-    """Return rows as CSV. Pass names from files through `csv_cell` first."""
+    r"""Return rows as CSV. Pass names from files through `csv_cell` first.
+
+    >>> csv_text([["joint", "lower"], ["a, b", 0.5]])
+    'joint,lower\n"a, b",0.5\n'
+    """
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
     return stream.getvalue()

@@ -1,8 +1,8 @@
 """Strict parsing of numbers, and of numbers with units.
 
 `parse_float` and `parse_int` accept only finite numbers in decimal ASCII digits. Python's `float` also
-accepts `1_0`, Arabic digits, `nan` and `infinity`. `parse_quantity` parses `30deg`, `pi/2`, `5 mm`,
-`-2*pi/3` and `90 deg/s`.
+accepts `1_0`, Arabic digits, `nan` and `infinity`. `parse_quantity` parses a number with an
+optional unit: `30deg`, `pi/2`, `5 mm`, `-2*pi/3`, `90 deg/s`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,11 @@ def parse_float(text: str) -> float | None:
 
 
 def parse_int(text: str) -> int | None:
-    """Parse an integer, with optional surrounding blanks; return None for all other text."""
+    """Parse an integer, with optional surrounding blanks; return None for all other text.
+
+    >>> parse_int("12"), parse_int("1_2"), parse_int("1.0"), parse_int("1e3")
+    (12, None, None, None)
+    """
     text = text.strip(" \t\r\n")
     return int(text) if len(text) <= _LONGEST and _WHOLE.fullmatch(text) else None
 

@@ -29,6 +29,11 @@ def whole_number(value: object, name: str, least: int, most: float = math.inf) -
 
 
 def real_number(value: object, name: str) -> float:
+    """Return `value` as a finite float.
+
+    >>> real_number(1, "snap")
+    1.0
+    """
     if not is_real(value) or not math.isfinite(number := as_float(value)):
         raise InputError(f"{name} must be a finite number", found=safe_repr(value))
     return number

@@ -44,6 +44,7 @@ from urdfkin.validation.document import (
 from urdfkin.verify.oracles import versions
 
 _LONGEST = 200
+#: Displayed poses are rounded to nine decimals.
 _PRECISION = Tolerance(1e-9, 1e-9)
 
 

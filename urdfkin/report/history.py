@@ -115,7 +115,7 @@ ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 @dataclass(slots=True)
 class History:
-    """The runs and robots of several reports; the key of a robot is its source in the latest run."""
+    """The runs and robots of several reports; the keys of `robots` are the latest sources."""
 
     runs: list[ValidationRun] = field(default_factory=list)
     robots: dict[str, list[Point]] = field(default_factory=dict)
@@ -202,7 +202,7 @@ def _in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Document]]:
-    """Yield reports by start time; add other files to `found.unusable` or `found.repeated`."""
+    """Yield reports in the order of start times; add other files to `found.unusable` or `found.repeated`."""
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
@@ -334,7 +334,7 @@ def document(found: History, *, all_: bool = False) -> TextDocument:
 
 
 def headline(found: History) -> str:
-    """State the latest verdict, and how many runs before had the same verdict.
+    """State the latest verdict, and how many runs directly before had the same verdict.
 
     >>> headline(History([{"verdict": v} for v in ("disagrees", "verified", "verified")]))
     '3 runs; latest verdict: verified, as in the run before'

@@ -49,7 +49,10 @@ def _bytes(root: ET.Element) -> bytes:
 
 
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
-    """Return JUnit XML with a test case for each function; a case that no oracle confirms fails."""
+    """Return JUnit XML with a test case for each function.
+
+    A test case also fails if no oracle confirms the reference.
+    """
     cases = [_function_case(check) for check in checks]
     failures = str(sum(case.find("failure") is not None for case in cases))
     counts = {"tests": str(len(cases)), "failures": failures, "errors": "0"}

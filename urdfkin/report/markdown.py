@@ -132,7 +132,7 @@ def table_lines(
 
 
 def count_within(texts: Sequence[str], room: int) -> int:
-    """Return how many texts, each with a line end, fit into `room` characters."""
+    """Return how many of the first texts fit into `room` characters, with a line end after each text."""
     return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 

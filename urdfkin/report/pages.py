@@ -74,6 +74,7 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
 
 
 def reason(robot: ReportedRobot) -> str:
+    """Return the reason of the verdict, without errors that the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -164,7 +165,7 @@ def heat_map(
 
 
 def _columns(model: ReportedModel) -> dict[str, list[int]]:
-    """Return each joint's column indices in the Jacobian, if mimic joints have their own columns."""
+    """Return each joint's column indices in a Jacobian with separate columns for mimic joints."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -201,7 +202,10 @@ def _share(check: ReportedCheck, subject: int) -> float:
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
-    """Return rows of cells: joint, a, alpha, beta if any, d, theta; the joint variable's cell contains q."""
+    """Return rows of cells: joint, a, alpha, beta if the chain has beta, d, theta.
+
+    The cell of the joint variable (theta or d) also contains q.
+    """
     rows = chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
     return [_dh_cells(row, has_beta(chain)) for row in rows]
 

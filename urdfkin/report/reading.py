@@ -47,7 +47,7 @@ def moving_names(model: ReportedModel) -> list[str]:
 
 
 def column_names(model: ReportedModel) -> list[str]:
-    """Return the joint name of each Jacobian column, if mimic joints have their own columns."""
+    """Return the joint name of each column of a Jacobian with separate columns for mimic joints."""
     return [joint["name"] for joint in model["joints"] for _ in range(_SIZES[joint["kind"]][1])]
 
 

@@ -138,7 +138,10 @@ def as_written(found: Sameness) -> str:
 
 
 def where(found: Sameness, frame: Interval) -> str:
-    """Describe where a lower bound is attained: coordinates of A, and of joints of B without a match."""
+    """Describe the configuration at which a lower bound is attained, with units.
+
+    The text has the nonzero coordinates of A, and of joints of B that match no independent joint of A.
+    """
     from urdfkin.model.configuration import coordinate_names, units
 
     a, b = found.trees

@@ -87,7 +87,7 @@ def in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return the quantities in each column of the table of robots, by heading."""
+    """Map each heading of the table of robots to the quantities in the column."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name
@@ -158,7 +158,10 @@ def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[
 
 
 def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str]:
-    """Return the cells below `second_oracle_heads`; ratios are the largest (disagreement / bound)."""
+    """Return the cells of a row below the headings `second_oracle_heads`.
+
+    Each ratio is the largest (disagreement / bound) of all `checks`.
+    """
     checks = [check for check in checks if "second_oracle" in check]
     found = [check["second_oracle"] for check in checks]
     outliers = {

@@ -98,7 +98,10 @@ def _unsafe_reason(folder: Path) -> str | None:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group has the user's name and no other member."""
+    """Return whether a group has the user's name and no other member.
+
+    Many systems create such a private group for each user.
+    """
     try:
         name, found = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
     except KeyError:

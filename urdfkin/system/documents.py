@@ -1,6 +1,6 @@
 """JSON documents: the common header, schemas, and functions that read and write documents.
 
-A `TypedDict` defines the entries of a document, and its JSON Schema. Documents from files are checked against
+A `TypedDict` defines the entries and the JSON Schema of a document. Documents from files are checked against
 the `TypedDict`.
 """
 

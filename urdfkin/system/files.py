@@ -171,7 +171,11 @@ def at_home(name: str | os.PathLike[str]) -> Path:
 
 
 def shortened(path: Path) -> str:
-    """Return a path for a message; a path of more than 300 characters is abbreviated."""
+    """Return a path for a message; a path of more than 300 characters is abbreviated.
+
+    >>> len(shortened(Path("x" * 5000))) < 200
+    True
+    """
     text = str(path)
     return text if len(text) <= 300 else f"{text[:60]}...{text[-60:]} ({len(text)} characters)"
 

@@ -87,7 +87,7 @@ def _text(*words: str, cwd: Path) -> str:
 
 
 def _git(*words: str, cwd: Path) -> bytes:
-    # With these variables, git does not fetch, prompt or start a pager.
+    # These variables prevent git from fetching, prompting, starting a pager or translating messages.
     environ = os.environ | {
         "GIT_NO_LAZY_FETCH": "1",
         "GIT_TERMINAL_PROMPT": "0",

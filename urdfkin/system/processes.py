@@ -24,7 +24,11 @@ _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
-    """Return a command that runs code in a new interpreter without the current folder in `sys.path`."""
+    """Return a command that runs code in a new interpreter.
+
+    The new interpreter imports from the folders of `sys.path`, except the current folder and Dask's temporary
+    folder.
+    """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_path()!r}; {code}"]
 
 
