@@ -59,7 +59,7 @@ EDITED: list[tuple[str, Any, Any, str]] = [
     ("check", "histogram", reversed, "not in the last bin of the histogram"),
     ("check", ("histogram", 0), GONE, "`histogram` does not contain"),
     ("check", ("worst_by_subject", 0), GONE, "must have one entry for each of"),
-    ("check", "worst_case", None, "`worst_case` is missing, but something disagrees"),
+    ("check", "worst_case", None, "`worst_case` is missing, but a result disagrees"),
     ("case", "frame", "link:none", "is not one of the compared frames"),
     ("case", "disagreement", 1e6, "`worst_case` has 1000000.0 at"),
     ("case", "disagreement", 0.0, "`worst_case`: the disagreement 0 is not"),

@@ -1,7 +1,6 @@
-"""The command line: one module for each subject, imported only when one of its commands runs.
+"""Command-line interface; the module of a command is imported only when the command runs.
 
-This module also contains the summaries of all commands, so that `urdfkin --help` needs neither NumPy nor
-Pinocchio.
+The summaries of all commands are in this module, so that `urdfkin --help` needs neither NumPy nor Pinocchio.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
 
 #: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
 #: A command is the function `command` of its module, or `NAME_command` if the module has several commands.
-#: The function `groups` adds a command for each quantity, such as `jacobian`, below the heading `_COMPUTE`.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -90,7 +88,6 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "warm": ("warm", "Compile all kernels in advance, for container images and CI."),
     },
 }
-#: Name of the module that makes a command for each quantity in `verify/quantities.py`
 _QUANTITY = "quantity"
 
 
@@ -104,11 +101,11 @@ def commands() -> dict[str, tuple[str, str]]:
 
 
 def _by_word(table: dict[str, str]) -> dict[str, str]:
-    """Return the key of each word: `{"info": "show tree"}` gives `{"show": "info", "tree": "info"}`."""
+    """Invert a table: `{"info": "show tree"}` becomes `{"show": "info", "tree": "info"}`."""
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: For each word that is not a command, the command that the error message suggests.
+#: Commands that error messages suggest, each with the unknown words that the command replaces.
 _SYNONYMS = _by_word(
     {
         "placement": "fk forward forward-kinematics pose transform tf",
@@ -135,7 +132,7 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: For each word about a subject that urdfkin does not cover, the advice in the error message.
+#: Advice in error messages, each with words for a subject that urdfkin does not cover.
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"
@@ -161,7 +158,7 @@ def _unknown_command(name: str) -> UrdfkinError:
 
 
 class LazyGroup(click.Group):
-    """A command group that imports a command only when it is used."""
+    """A command group that imports the module of a command only when the command is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(commands())
@@ -181,7 +178,8 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and args[0] not in commands() and not args[0].startswith("-"):
-            if ctx.resilient_parsing:  # shell completion
+            # During shell completion, an unknown command is not an error.
+            if ctx.resilient_parsing:
                 return None, None, args
             raise _unknown_command(args[0])
         return super().resolve_command(ctx, args)
@@ -211,7 +209,8 @@ def _version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None
     from urdfkin.verify.pinocchio import pinocchio, version
 
     click.echo(f"urdfkin {own_version()}, Pinocchio {version()}")
-    pinocchio()  # raises an error if Pinocchio is not installed
+    # If Pinocchio is not installed, this call raises an error.
+    pinocchio()
     ctx.exit()
 
 
@@ -238,9 +237,11 @@ def cli() -> None:
 def main() -> None:
     streams.prepare()
     guard()
-    # OpenBLAS is fastest with one thread for small matrices; NumPy reads the variable when it is imported.
+    # For small matrices, OpenBLAS is fastest with one thread.
+    # OpenBLAS reads this variable when NumPy is imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if os.environ.get("_URDFKIN_COMPLETE"):  # an error message would disturb shell completion
+    # An error message would disturb shell completion.
+    if os.environ.get("_URDFKIN_COMPLETE"):
         sys.stderr = io.StringIO()
     # The last line of the output already states what is not verified, so this warning is hidden.
     warnings.filterwarnings("ignore", message="not verified")

@@ -144,7 +144,7 @@ def command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # The JSON is passed as finished text, so that no entry `check` is added.
+        # `Answer` would add an entry `check` to a mapping, but not to a text.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 
@@ -217,7 +217,8 @@ def _fit(context: click.Context, robot: Robot) -> Calibration:
     if conversion is not None and q is not None:
         q = conversion.from_(q)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # these warnings were shown when the table was loaded before
+        # The ignored warnings were already shown when the robot was loaded.
+        warnings.simplefilter("ignore")
         return fitted_model(
             source,
             q,
@@ -243,7 +244,6 @@ def _noise(text: str | None) -> tuple[float, float] | None:
 
 
 def _factory_calibration(robot: Robot, path: Path, order: str) -> Rewritten:
-    """Apply a factory calibration; print how far the tool would move with the other value of --order."""
     from urdfkin.calibration.universal_robots import ORDERS, distance, read_calibration, universal_robots
     from urdfkin.comparison.result import angle, length
 

@@ -24,22 +24,19 @@ if TYPE_CHECKING:
     from urdfkin.validation.store import Store
 
 
-#: Seconds between two lines of text, and between two lines of JSON
+#: Minimum time (s) between two lines of text, and between two lines of JSON
 _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Estimates the speed of a validation, in chunks of samples per second, and the remaining time.
-
-    The time until the first chunk is finished is not counted, because urdfkin may compile kernels meanwhile.
-    """
+    """Estimates the speed of a validation (chunks per second) and the remaining time (s)."""
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
     def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
-        """Return the chunks per second and the remaining seconds; None until one chunk is finished."""
         seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
+        # Before the first new chunk, urdfkin may compile kernels, so this time is not counted.
         if fresh <= 0:
             self._begin = self._now()
         if fresh <= 0 or seconds <= 0.0:
@@ -50,7 +47,6 @@ class Pace:
 
 @contextmanager
 def progress(*, as_json: bool) -> Iterator[Progress]:
-    """Yield the callback with which `validate` prints JSON lines, a progress bar, or lines of text."""
     pace = Pace()
     if as_json:
         with _at_intervals(_JSON, lambda state: _json(state, pace)) as tell:
@@ -97,7 +93,6 @@ def _failures(state: CampaignProgress) -> str:
 
 @contextmanager
 def _at_intervals(seconds: float, show: Callable[[CampaignProgress], Any]) -> Iterator[Progress]:
-    """Show the progress every `seconds` seconds; JSON output also contains the first and the last state."""
     as_json = seconds == _JSON
     last_time = -math.inf if as_json else time.monotonic()
     hidden: CampaignProgress | None = None
@@ -143,7 +138,6 @@ def _bar(pace: Pace) -> Iterator[Progress]:
         yield tell
 
 
-#: Maximum number of failed robots that `status` lists
 _MOST_FAILED = 20
 #: Maximum number of finished chunks that `status` reads to estimate the time for a chunk
 _MOST_CHUNKS = 200
@@ -221,7 +215,6 @@ def _reason(store: Store, robot: int) -> str:
 
 
 def _seconds_of_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> float | None:
-    """Return the mean computing time of a chunk in seconds; None if no chunk is finished."""
     from urdfkin.validation.chunk import ChunkResult
 
     begun = [robot for robot, (done, _) in counts.items() if done]

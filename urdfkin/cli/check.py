@@ -63,15 +63,10 @@ class CheckOutcome:
     """The results of all files.
 
     Attributes:
-        findings: Findings to print.
         silenced: Findings that a comment in the file suppresses, each with the reason in the comment.
         excerpts: For each finding, the faulty line of the file, and a line with carets below the fault.
-        errors: Errors of the files that could not be read.
-        unchanged: Number of files that --changed-since skips because they have not changed.
         known: Number of findings that the baseline file suppresses.
         gone: Number of entries of the baseline file that no longer have a finding.
-        to_fix: Number of findings that --fix would fix.
-        patches: Patches that --diff prints.
         unsafe: Number of findings that only --unsafe-fixes would fix.
     """
 
@@ -158,12 +153,11 @@ def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
 
 
 _SETTINGS = "urdfkin.settings"
-#: Settings in pyproject.toml; each is the default of the option with the same name
+#: Settings in pyproject.toml that are defaults of the options with the same names
 _OPTIONS = ("select", "ignore", "exclude", "strict", "notes")
 
 
 def _read_settings(context: click.Context, _: click.Parameter, file: Path | None) -> None:
-    """Use the settings in `file`, or else the settings of the repository, as defaults of the options."""
     isolated = "--isolated" in context.meta
     settings = Settings() if isolated else find_settings(Path()) if file is None else read_settings(file)
     values = dict(settings.values)
@@ -223,7 +217,6 @@ settings_options = combine(
         help="File with a table [tool.urdfkin] of settings.", show_default="the nearest pyproject.toml",
     ),
 )  # fmt: skip
-#: Help texts of --max-bytes, --max-depth, ...
 _LIMITS = {
     "bytes": "Largest size of a file in bytes.",
     "depth": "Largest nesting depth of elements.",
@@ -351,7 +344,8 @@ def _new_run(settings: Settings, options: dict[str, Any]) -> CheckRun:
     return CheckRun(
         look=look,
         choice=Choice(codes_, options["notes"], settings, baseline),
-        strict=options["strict"] and not writing,  # a baseline stores the original severities
+        # A baseline stores the original severities.
+        strict=options["strict"] and not writing,
         fold=options["style"] in ("terminal", "concise", "github") and not (options["each"] or writing),
         fix=options["fix"],
         diff=options["diff"],
@@ -373,14 +367,8 @@ class CheckRun:
     """One check of many files.
 
     Attributes:
-        look: Function that checks the text of one file.
-        choice: Selects the findings to report.
-        strict: Whether warnings become errors.
-        fold: Whether to merge findings with the same code into one line of output.
-        diff: Whether to collect the changes of --fix as patches, without applying them.
-        unsafe: Whether to apply unsafe fixes too.
-        version: The version that --changed-since names, or None.
-        accepts_all: Whether --write-baseline accepts all findings, so that none of them is a failure.
+        fold: Whether findings with the same code share a line of output.
+        accepts_all: Whether --write-baseline accepts all findings, so that no finding is a failure.
     """
 
     look: partial[Examined]
@@ -397,7 +385,6 @@ class CheckRun:
     _changed: dict[tuple[str, ...], bool] = field(default_factory=dict)
 
     def check_all(self, word: str, exclude: Sequence[str]) -> None:
-        """Check each file that an argument of the command matches, but no file twice."""
         settings = self.choice.settings
         try:
             files = collected(word, settings, settings.values.get("include", INCLUDE), exclude)
@@ -408,7 +395,8 @@ class CheckRun:
             if file not in self._seen:
                 self._seen.add(file)
                 try:
-                    if file not in (word, f"./{word}"):  # the user named a folder or a pattern
+                    # A file that the user named directly may be a pipe.
+                    if file not in (word, f"./{word}"):
                         demand_regular(Path(file))
                     self._check(file)
                 except UrdfkinError as error:
@@ -432,7 +420,6 @@ class CheckRun:
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
-        """Load a USD or MJCF file; add the findings about the robot or, if loading fails, about the error."""
         suffixes = USD if is_usd(file) else _MJCF
         if self.version is not None and self._is_unchanged(file, suffixes, self.version):
             self.outcome.unchanged += 1
@@ -456,10 +443,10 @@ class CheckRun:
         self.outcome.add(file, Examined(text, data, None, findings, ()))
 
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
-        """Return whether a file, and all files that it may refer to, are the same as in an older version.
+        """Return whether a file and all files that the file may include are the same as in `version`.
 
-        The function assumes that a file may refer to every file of the repository with a suffix in
-        `suffixes`, and to every deleted file whose name occurs in its text.
+        The function assumes that the file includes every file of the repository with a suffix in `suffixes`,
+        and every deleted file whose name occurs in the text.
         """
         if suffixes not in self._changed:
             self._changed[suffixes] = version.changed(suffixes)
@@ -490,7 +477,6 @@ class CheckRun:
         return mended.text
 
     def _safe(self, is_chosen: Callable[[Finding], bool]) -> Callable[[Finding], bool]:
-        """Return a filter for chosen findings; without --unsafe-fixes, it also rejects unsafe fixes."""
         return lambda finding: (
             is_chosen(finding) and (self.unsafe or finding.fix is None or finding.fix.is_safe)
         )
@@ -500,7 +486,6 @@ class CheckRun:
         return replace(finding, severity=Severity.ERROR) if is_raised else finding
 
     def exit_code(self) -> int:
-        """Return 2 if a file could not be read, 1 for an error or a change of --diff, 0 otherwise."""
         if self.outcome.errors:
             return 2
         if self.diff:
@@ -509,7 +494,7 @@ class CheckRun:
         return int(has_error and not self.accepts_all)
 
 
-#: Suffixes of MJCF files and of the files that they include
+#: Suffixes of MJCF files and of files that an MJCF file includes
 _MJCF = (".xml", ".mjcf")
 
 
@@ -520,7 +505,8 @@ def _is_usd_or_mjcf(file: str) -> bool:
         return False
     with contextlib.suppress(OSError):
         if b"<mujoco" not in read_start(Path(file), 1 << 16):
-            return False  # the import below loads NumPy, so it is avoided here
+            # This return avoids the import below, which loads NumPy.
+            return False
     from urdfkin.urdf.mjcf import is_mjcf
 
     return is_mjcf(file)

@@ -1,8 +1,8 @@
 """Complete commands, options, robots, files, frames, tables, codes and equations in a shell.
 
-Completion runs at each press of the Tab key, so it imports no large package and reads only the names in a
-file. Completion does not offer names with characters that a shell interprets, such as `$(...)`. Such a name
-in a malicious file could make the shell run a command.
+Completion runs at each press of the Tab key, so completion imports no large package. A name in a malicious
+file, such as `$(...)`, could make the shell run a command. Completion therefore offers only names without
+characters that a shell interprets.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from urdfkin.urdf.catalogue import catalogue
 if TYPE_CHECKING:
     Items = list[CompletionItem[str]]
 
-#: A name without quotes, blanks, and characters that a shell expands.
-#: Colons are excluded too, because bash separates words at colons.
+#: Pattern of a name without quotes, blanks and characters that a shell expands.
+#: A name with a colon does not match, because bash separates words at colons.
 _HARMLESS = re.compile(r"(?=\w)[\w./+-]+")
-#: Maximum size (bytes) of a robot file from which shell completion reads frame names
+#: Maximum size (bytes) of a file from which shell completion reads frame names
 _MOST_BYTES = 10_000_000
-#: XML elements whose attribute `name` is a frame: children of a URDF's root, any elements of an MJCF file
+#: XML elements that define frames. In a URDF, only children of the root element define frames.
 _URDF, _MJCF = ("link", "joint"), ("body", "site", "joint")
 
 
@@ -73,7 +73,6 @@ def _items(names: Iterable[str], incomplete: str) -> Items:
 
 
 def _frames(word: str) -> Iterator[str]:
-    """Yield the frame names in a robot's file, without expanding or computing anything."""
     from urdfkin.urdf.findings import Reporter
     from urdfkin.urdf.parser import read_document
     from urdfkin.urdf.sources import is_xacro, read_source
@@ -112,5 +111,5 @@ def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> No
       urdfkin completion bash
     """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     script = get_completion_class(shell)
-    # The script sets this environment variable, so that click prints completions.
+    # The script sets the variable _URDFKIN_COMPLETE, so that click prints completions.
     say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())

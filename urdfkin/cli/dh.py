@@ -1,6 +1,6 @@
-"""Define the command `urdfkin dh`.
+"""Define the command `urdfkin dh` and its options.
 
-This module does not import NumPy, which would slow --help down. `dh_tables` makes the tables with NumPy.
+The module `dh_tables` makes the tables with NumPy. Importing NumPy here would slow --help down.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ FORMATS = (
     *("c", "urdf", "svg"),
 )
 
-#: Formats of each suffix
 _SUFFIXES = {
     ".txt": ("terminal",), ".md": ("markdown",), ".html": ("html",), ".tex": ("latex",), ".csv": ("csv",),
     ".json": ("json",), ".toml": ("toml",), ".py": ("numpy", "sympy", "casadi", "roboticstoolbox", "ets"),
@@ -153,11 +152,10 @@ form_options = combine(
 )
 
 
-#: Options that --like replaces
+#: Options that have no effect with --like
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
-#: Options with which the command derives a new table, even if ROBOT is a table; without them, the table of
-#: ROBOT is written unchanged
+#: If ROBOT is a Denavit-Hartenberg table, the command derives a new table only with one of these options.
 _DERIVING = ("base", "tip", "all_", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 

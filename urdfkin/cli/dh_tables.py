@@ -1,4 +1,4 @@
-"""Make the tables of `urdfkin dh`, and its comparison of a robot with a table."""
+"""Make the tables of `urdfkin dh`, and compare a robot with a table."""
 
 from __future__ import annotations
 
@@ -39,11 +39,9 @@ from urdfkin.system.files import at_home
 from urdfkin.verify.tables import TableCheck
 from urdfkin.verify.verifier import TABLE_SAMPLES
 
-#: Formats for several tables
 _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
-#: Formats in which the result of the check is printed below the table; in other formats it goes to stderr
+#: Formats in which the result of the check is printed below the table
 _PRINTED = ("terminal", "markdown")
-#: Formats of a printed table
 _TEXTS = (*_PRINTED, "html", "latex")
 #: Number of digits of the base and tool transforms in formats with rounded numbers; None: as in --digits
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
@@ -51,11 +49,9 @@ _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 @dataclass(frozen=True, slots=True)
 class DHRequest:
-    """The options of `urdfkin dh`.
+    """The options of `urdfkin dh`; `choices` are arguments of `Robot.dh`.
 
-    Attributes:
-        unchanged: The file of a given table that the command writes again; None if it derives a new table.
-        choices: Options that are arguments of `Robot.dh`.
+    If ROBOT is a table file, and no option changes the rows, `unchanged` is this file.
     """
 
     robot: Robot
@@ -163,7 +159,6 @@ def _format_table(request: DHRequest, table: DHTable, check: TableCheck | None) 
 
 
 def _lines_below(request: DHRequest, table: DHTable, check: TableCheck | None) -> Iterator[str]:
-    """Yield the lines below a table: the check, the rounding error of the printed numbers, and hints."""
     yield check_of_path(check)[0]
     if request.format_ in _ROUNDED:
         yield from str(printed(table, request.units, _ROUNDED[request.format_])).split("\n")

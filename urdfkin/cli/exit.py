@@ -1,7 +1,7 @@
 """Run a command: exit codes, error messages, and a clean stop on SIGTERM and SIGHUP.
 
 SIGTERM and SIGHUP stop a command like an interrupt: finished results are saved. Exit code 1 always means a
-disagreement. Python also exits with 1 after an uncaught exception, so urdfkin catches all exceptions and then
+disagreement. Python exits with 1 after an uncaught exception, so urdfkin catches unexpected exceptions and
 exits with 70.
 """
 
@@ -21,18 +21,16 @@ from urdfkin.cli import streams
 from urdfkin.cli.streams import say
 from urdfkin.errors import UrdfkinError
 
-#: Signals of a scheduler, of `kill` and of a shutdown (SIGTERM), and of a closing terminal (SIGHUP)
+#: SIGTERM comes from `kill`, a scheduler or a shutdown. SIGHUP comes from a closing terminal.
 _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(slots=True)
 class Stop:
-    """The number of the signal that stopped the command, or None."""
-
     signal: int | None = None
 
     def exit_code(self, otherwise: int) -> int:
-        """Return 128 + the number of the signal, as shells do, unless the exit code is 1 (a disagreement)."""
+        """Return 128 + the number of the signal, as shells do; exit code 1 (a disagreement) stays 1."""
         return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
 
 

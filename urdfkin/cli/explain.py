@@ -20,7 +20,7 @@ _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def answers() -> dict[str, str]:
-    """Return the sections of docs/questions.md, without links; the keys are the anchors of their headings."""
+    """Map the anchor of each heading in docs/questions.md to the section, with links removed."""
     return {anchor(text.partition("\n")[0]): _LINK.sub(r"\1", text).rstrip() for text in _sections()[1:]}
 
 
@@ -32,7 +32,7 @@ def answer_to(topic: str) -> str | None:
 
 
 def as_text(answer: str) -> str:
-    """Format a section for a terminal; the code that must run before its examples is printed at the end."""
+    """Format a section for a terminal, with the setup code of its examples at the end."""
     pieces = _BLOCK.split(answer)
     prose, kinds, codes = pieces[::3], pieces[1::3], pieces[2::3]
     parts = []
@@ -45,12 +45,11 @@ def as_text(answer: str) -> str:
 
 
 def anchor(heading: str) -> str:
-    """Return the last part of a heading's web address, for example "locked-joints"."""
     return re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-")
 
 
 def _sections() -> list[str]:
-    """Split docs/questions.md at its headings; the code in the first section runs before each example."""
+    """Split docs/questions.md at its headings; the first section has the setup code of all examples."""
     return re.split(r"^## ", read_text(questions_page()), flags=re.MULTILINE)
 
 

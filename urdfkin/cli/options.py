@@ -1,4 +1,4 @@
-"""Arguments and options that several commands have, and the rules for all options.
+"""Arguments and options that several commands share, and the rules for all options.
 
 - Numbers are decimal digits in ASCII. Click's own types also accept `1_000`, Arabic digits, `nan` and `inf`.
 - The suffix of a file or --format selects the output format. A suffix that contradicts --format is an error.
@@ -37,8 +37,6 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 
 
 class WholeNumber(click.IntRange):
-    """A whole number in a range."""
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, str) and parse_int(value) is None:
             self.fail(f"{value!r} is not a whole number.", param, ctx)
@@ -46,8 +44,6 @@ class WholeNumber(click.IntRange):
 
 
 class FiniteNumber(click.types.FloatParamType):
-    """A finite number."""
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if isinstance(value, str) and parse_float(value) is None:
             hint = remedy(value)
@@ -62,11 +58,9 @@ class NumberInRange(FiniteNumber, click.FloatRange):
 def format_from_suffix(
     context: click.Context, output: Path | None, formats: Mapping[str, Sequence[str]], without_suffix: str
 ) -> str:
-    """Return the output format of the running command, from --format and the suffix of the output file.
+    """Return the output format; raise InputError if --format contradicts the suffix of the output file.
 
-    `formats` lists the formats of each suffix, for example `{".py": ("numpy", "sympy")}`; the first one is
-    the default. `without_suffix` is the format of a file whose name has no suffix. InputError is raised if
-    --format contradicts the suffix, or if no format has the suffix.
+    `formats` lists the formats of each suffix, the default first: `{".py": ("numpy", "sympy")}`.
     """
     format_: str = context.params["format_"]
     if output is None:
@@ -93,15 +87,11 @@ def format_from_suffix(
 
 
 def is_given(context: click.Context, name: str) -> bool:
-    """Return whether the user wrote a parameter on the command line."""
     return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
 def reject_unused_options(context: click.Context, unused: Collection[str], because: str) -> None:
-    """Raise InputError if the user wrote an option that has no effect.
-
-    With the reason "with --opw", the message is "--format does nothing with --opw".
-    """
+    """Raise InputError, such as "--format does nothing with --opw", for an option without effect."""
     for parameter in context.command.params:
         if parameter.name in unused and is_given(context, parameter.name):
             name = "/".join([*parameter.opts[:1], *parameter.secondary_opts[:1]])
@@ -138,8 +128,6 @@ def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bo
 
 
 def _read_pairs(separator: str, form: str, *, needs_value: bool) -> Callable[[Sequence[str]], dict[str, str]]:
-    """Return a function that splits words such as SET=NAME, and rejects words of another form."""
-
     def read(words: Sequence[str]) -> dict[str, str]:
         pairs = {}
         for word in words:
@@ -153,7 +141,6 @@ def _read_pairs(separator: str, form: str, *, needs_value: bool) -> Callable[[Se
 
 
 def load_options() -> dict[str, Any]:
-    """Return the options of the running command that are arguments of `load`, for example `mimic`."""
     return dict(click.get_current_context().meta.get(_LOAD_OPTIONS, {}))
 
 
@@ -244,8 +231,6 @@ path_options = combine(
 
 
 class _ReferenceName(click.Choice):  # type: ignore[type-arg]  # click.Choice takes a type argument only from click 8.2 on
-    """A reference frame; the error for an unknown name states where reference frames are explained."""
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             return super().convert(value, param, ctx)
@@ -310,7 +295,7 @@ def trajectory_option(help_: str) -> Callable[[_F], _F]:
 
 
 def schema_option(layout: str, what: str) -> Callable[[_F], _F]:
-    """Make the option --schema, which prints the JSON Schema of a layout such as "urdfkin.module:SAME"."""
+    """Make the option --schema, which prints the JSON Schema of `layout` ("module:name")."""
 
     def show(context: click.Context, _: click.Parameter, wanted: bool) -> None:
         if wanted and not context.resilient_parsing:
@@ -327,7 +312,6 @@ def conversion_of(robot: Robot, name: str | None) -> Conversion | None:
 
 
 def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
-    """Read a trajectory with joint velocities and accelerations, and write its warnings to stderr."""
     from urdfkin.robot.trajectory import read_trajectory
 
     motion = read_trajectory(robot, path, convention=convention)
@@ -337,7 +321,6 @@ def read_motion(robot: Robot, path: Path, convention: str | None) -> Trajectory:
 
 
 def warn_of_motion(motion: Trajectory) -> None:
-    """Write the warnings about a trajectory, and the way v and a were computed, to stderr."""
     for note in motion.notes:
         say(f"warning: {note}", err=True)
     if motion.rates != "as given":
@@ -345,13 +328,11 @@ def warn_of_motion(motion: Trajectory) -> None:
 
 
 def warn_of_limits(robot: Robot, q: FloatArray) -> None:
-    """Write a warning to stderr for each joint outside its limits."""
     for line in robot.limit_violations(q):
         say(f"warning: {line}", err=True)
 
 
 def locked_joints(robot: Robot) -> dict[str, Any]:
-    """Return a mapping with the locked joints for JSON output; it is empty if no joint is locked."""
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
@@ -364,12 +345,9 @@ class Inputs:
         v: (n, n_v) joint velocities.
         a: (n, n_v) joint accelerations.
         t: (n,) times of a trajectory in s; None without times.
-        base: Motion of the root link, from --trajectory or from the --base options; None if the root link is
-            fixed.
-        settings: Other settings that affect the result, for example `{"relative_to": "base"}`. The titles of
-            tables and the JSON output list them.
+        base: Motion of the root link; None if the root link is fixed.
+        settings: Other settings that affect the result, for example `{"relative_to": "base"}`.
         conversion: Conversion to the convention of --convention; None for urdfkin's own convention.
-        is_trajectory: Whether the samples come from --trajectory. If so, CSV output has one row per sample.
     """
 
     robot: Robot
@@ -392,7 +370,6 @@ class Inputs:
         return (self.conversion or self.robot).rate_names
 
     def converted(self) -> Inputs:
-        """Return a copy with q, v and a in the convention of --convention."""
         if self.conversion is None:
             return self
         q, v, a = self.conversion.to(self.q, self.v, self.a)
@@ -403,7 +380,6 @@ class Inputs:
 
 
 def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocchio", **how: Any) -> Robot:
-    """Load a robot with the options of the command line; `how` overrides them. Warnings go to stderr."""
     from urdfkin.robot.loading import load
     from urdfkin.urdf.findings import UrdfWarning
 
@@ -417,17 +393,13 @@ def load_robot(source: str, *, verify: bool = True, oracle: OracleName = "pinocc
 
 
 def load_several(*sources: str) -> tuple[Robot, ...]:
-    """Load a command's robots; `--xacro-arg` applies to .xacro files, `--variant` to USD files.
-
-    UsageError is raised if two of the robots are `-`, that is, standard input.
-    """
     from urdfkin.urdf.sources import is_usd, is_xacro
 
     if sources.count("-") > 1:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that remove options which apply only to another robot's file format."""
+        """Return arguments of `load` that cancel options for the file formats of other robots."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -449,9 +421,9 @@ def read_inputs(
     option: str = "--q",
     conversion: Conversion | None = None,
 ) -> Inputs:
-    """Read q, v and a as the user wrote them; a single sample is repeated for each sample of a batch.
+    """Read q, v and a in the convention of `conversion`, and convert them to urdfkin's convention.
 
-    `conversion` converts the values to urdfkin's convention. Error messages name `option` as the source of q.
+    If one of the arrays has several samples, single samples of the other arrays are repeated.
     """
     import numpy as np
 
@@ -469,7 +441,7 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat single rows until all arrays have equally many rows; raise InputError for other lengths."""
+    """Repeat single rows until all arrays have the same length; raise InputError for other lengths."""
     import numpy as np
 
     n = max(map(len, batches))
@@ -481,7 +453,6 @@ def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArr
 def _read_values(
     robot: Robot, letter: str, text: str, where: str, rng: Any, conversion: Conversion | None
 ) -> FloatArray:
-    """Return the values of --q, --v or --a as an array with one row for each sample."""
     from urdfkin.model.configuration import coordinate_layout, sample
     from urdfkin.robot.trajectory import column_units
 
@@ -511,11 +482,9 @@ def _read_count(where: str, text: str) -> int:
 def read_batch(
     path: Path, option: str, layouts: Sequence[Sequence[str]], units: Mapping[str, str] | None = None
 ) -> tuple[FloatArray, Sequence[str]]:
-    """Read a CSV file with one sample in each line, as an array with one row for each sample.
+    """Read a CSV file with one sample per line; also return the layout that fits the number of columns.
 
-    Each layout is a list of column names; the layout whose length equals the number of columns is returned.
-    If the first line names the columns, they may be in any order. The name of a column in `units` may contain
-    a unit, for example "elbow [deg]".
+    Each layout is a list of column names. `units` is as in `read_columns`.
     """
     import numpy as np
 
@@ -571,14 +540,13 @@ _BASE_OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options for the root link's motion; "qv" means its pose and velocity, for example."""
+    """Make the options for the motion of the root link; "qv" means pose and velocity."""
     return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
 
 
 def with_base(
     x: Inputs, placement: str | None = None, velocity: str | None = None, acceleration: str | None = None
 ) -> Inputs:
-    """Add the motion of the root link, if the user gave one; a single motion applies to all samples."""
     from urdfkin.model.base_motion import BaseMotion
 
     if placement is None and velocity is None and acceleration is None:
@@ -595,7 +563,6 @@ def with_base(
 
 
 def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tuple[FloatArray, Sequence[str]]:
-    """Return two things: numbers with one row per sample, and their layout (see `read_batch`)."""
     import numpy as np
 
     from urdfkin.robot.trajectory import numbers

@@ -68,7 +68,7 @@ def _table(robot: Robot) -> Answer:
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return each joint's index in q; "7/6" if its index in v differs; "-" if it has no coordinate."""
+    """Return each joint's index in q: "7", "7/6" if the index in v is 6, or "-" without a coordinate."""
     indices = conversion.q_and_v_indices
 
     def span(found: list[int]) -> str:

@@ -31,9 +31,7 @@ if TYPE_CHECKING:
 
     from urdfkin.verify.certificate import Certificate
 
-#: Formats of a printed table
 TEXTS = ("table", "markdown", "html", "latex")
-#: Suffix of each format
 _SUFFIXES = {
     "json": ".json", "csv": ".csv", "npy": ".npy", "table": ".txt", "markdown": ".md", "html": ".html",
     "latex": ".tex",
@@ -62,13 +60,11 @@ class Answer:
     """The result of a command.
 
     Attributes:
-        document: Function that returns the result as text and tables, for the formats in `TEXTS`.
+        document: Returns the result as text and tables, for the formats in `TEXTS`.
         data: For each other format, a function that returns the result: a mapping for JSON, rows for CSV, an
-            array for npy, text for any other format. If there is also a function for a
-            format in `TEXTS`, it is used instead of `document`.
+            array for npy, otherwise text. A function for a format in `TEXTS` replaces `document`.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
-        code: Exit code of the command.
-        fitted: Function that returns text and tables that fit the width of a terminal. None: use `document`.
+        fitted: Returns a document that fits the width of a terminal. None: use `document`.
     """
 
     document: Callable[[], TextDocument]
@@ -85,7 +81,7 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def convert(self, form: str) -> tuple[bytes | str, bool]:
-        """Return two things: the result in the format `form`, and whether it contains the line `check`."""
+        """Return the result in the format `form`, and whether this result contains `check`."""
         if form in self.data:
             data = self.data[form]()
             has_check = form == "json" and isinstance(data, Mapping)
@@ -98,7 +94,6 @@ class Answer:
         return document.written(form), True
 
     def write(self, form: str, forms: Sequence[str], output: Path | None = None) -> None:
-        """Write the result; print it with colours if `form` is the command's default format, `forms[0]`."""
         if form == forms[0] and output is None and form not in self.data:
             self.show(console())
             return
@@ -122,12 +117,7 @@ _CONVERTERS: dict[str, Callable[[Any], bytes | str]] = {
 
 
 def writes_answer(*names: str, suffixes: Mapping[str, tuple[str, ...]] | None = None) -> Callable[[Any], Any]:
-    """Return a decorator that makes a command from a function that returns an `Answer`.
-
-    The command has the options --format and --output. The command writes the `Answer`, and ends with its exit
-    code. `names` are the formats of --format; by default the formats in `TEXTS`, JSON and CSV. `suffixes`
-    lists the formats of each suffix; by default those of `_SUFFIXES`.
-    """
+    """Make a command with --format and --output from a function that returns an `Answer`."""
     forms = names or (*TEXTS, "json", "csv")
     formats = suffixes or {_SUFFIXES[form]: (form,) for form in forms}
     without_suffix = "csv" if "csv" in forms and "table" in forms else forms[0]
@@ -154,7 +144,6 @@ def format_option(
 
 @contextmanager
 def report_compilation() -> Iterator[None]:
-    """While the context is open, print a line when the compilation of a kernel begins and when it ends."""
     from urdfkin.compiled.kernel_cache import listen_to_compile_events
 
     hints = [", once; 'urdfkin warm' compiles all kernels"]
@@ -171,7 +160,7 @@ def report_compilation() -> Iterator[None]:
 
 
 def console(*, err: bool = False) -> Console:
-    """Return a console with the width of the terminal or, for a pipe, of the environment variable COLUMNS."""
+    """Return a console; for a pipe, the environment variable COLUMNS sets the width."""
     from urdfkin.cli.terminal import Terminal
 
     stream = sys.stderr if err else sys.stdout
@@ -181,7 +170,6 @@ def console(*, err: bool = False) -> Console:
 
 
 def write_output(data: bytes | str, output: Path | None) -> None:
-    """Write data to a file, or to standard output if `output` is None."""
     if output is not None:
         write_file(output, data.encode() if isinstance(data, str) else data)
     elif isinstance(data, str):
@@ -195,7 +183,8 @@ def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if an output file cannot be written."""
     for path in filter(None, paths):
         try:
-            if path.exists() and not path.is_file():  # a device needs no temporary file
+            # A device is written without a temporary file.
+            if path.exists() and not path.is_file():
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
                 pass
@@ -205,12 +194,10 @@ def check_writable(*paths: Path | None) -> None:
 
 
 def counted(n: int, noun: str) -> str:
-    """Return a number with its noun: "1 file", "2 files"."""
     return f"{n} {noun}{'s' * (n != 1)}"
 
 
 def check_line(certificate: Certificate) -> str:
-    """Return the last line of the output: the number of checked results, or "NOT VERIFIED"."""
     by = certificate.oracle
     if certificate.not_verified:
         return f"NOT VERIFIED by {by}: {'; '.join(certificate.not_verified)}"
@@ -227,7 +214,7 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last line of the output, and the exit code, for a `TableCheck` or a similar result."""
+    """Return the last line of the output and the exit code for a `TableCheck` or a similar result."""
     from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"

@@ -1,6 +1,6 @@
-"""Define the commands that compute a quantity of a frame, such as `urdfkin jacobian` and `placement`.
+"""Define the commands that compute a quantity of a frame, such as `urdfkin jacobian` and `urdfkin placement`.
 
-Each quantity of `verify/quantities.py` has a command. All these commands have the same options and formats.
+Each quantity of `verify/quantities.py` has a command.
 """
 
 from __future__ import annotations
@@ -67,15 +67,10 @@ _BASE = ("base_placement", "base_velocity", "base_acceleration")
 _trajectory = trajectory_option(
     "Read q, v and a from this file instead of --q, --v and --a. CSV output has one row for each time."
 )
-#: Maximum number of samples in printed tables
 _MOST_SAMPLES = 5
 
 
 def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Callable[[_F], _F]:
-    """Return a decorator that adds the options of a quantity to a command.
-
-    `--help` lists the options in `own` after --frame, and the options in `last` before --format.
-    """
     values = (_VALUE_OPTIONS[letter] for letter in inputs)
     return combine(
         *(robot_argument, frame_option, *own, convention_option, *values, _trajectory),
@@ -85,7 +80,6 @@ def computing_options(inputs: str, *own: Any, last: tuple[Any, ...] = ()) -> Cal
 
 
 def _read_options() -> Inputs:
-    """Load the robot of the running command, and read its options for q, v, a and the base."""
     options = click.get_current_context().params
     values: dict[str, Any] = {letter: options[letter] for letter in "qva" if letter in options}
     robot = load_robot(options["robot"], verify=options["verify"], oracle=options.get("oracle", "pinocchio"))
@@ -100,7 +94,6 @@ def _read_options() -> Inputs:
 def _read_trajectory(
     robot: Robot, frame: str | None, path: Path, letters: str, conversion: Conversion | None
 ) -> Inputs:
-    """Read the samples of a trajectory; compute v and a by differences only if the command needs them."""
     import numpy as np
 
     from urdfkin.robot.trajectory import read_samples, with_rates
@@ -126,7 +119,6 @@ def _read_trajectory(
 def _verified_answer(
     x: Inputs, title: str, parts: Callable[[], Iterable[str | Table]], **data: Any
 ) -> Answer:
-    """Return an answer whose last line and exit code state the result of the check with Pinocchio."""
     certificate = x.robot.certificate()
     check = check_line(certificate)
     if x.conversion is not None:
@@ -139,10 +131,6 @@ def _verified_answer(
 def _samples(
     x: Inputs, most: int, others: str, of: Callable[[int], Iterable[str | Table]]
 ) -> Iterator[str | Table]:
-    """Yield a heading and the tables `of(k)` for each of the first `most` samples.
-
-    If there are more samples, also yield their number and the option that writes all of them.
-    """
     n = len(x.q)
     for k in range(min(n, most)):
         if n > 1:
@@ -219,7 +207,6 @@ def _data(x: Inputs, quantity: Quantity, reference: str | None, result: FloatArr
 
 
 def _head(x: Inputs, letters: str, **about: Any) -> dict[str, Any]:
-    """Return the first entries of a JSON result: the robot, the entries `about`, inputs and settings."""
     times = {} if x.t is None else {"t": x.t.tolist()}
     return {
         "robot": x.robot.name,
@@ -261,7 +248,6 @@ _TIME = ("sample", "t")
 
 
 def _times(x: Inputs) -> Iterable[object]:
-    """Return the times of the samples; for samples without times, return their indices."""
     return range(len(x.q)) if x.t is None else map(repr, x.t.tolist())
 
 
@@ -272,7 +258,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    if len(value) != 3 * len(quantity.units):  # a position and a quaternion
+    # A position with a quaternion has seven numbers, but two units.
+    if len(value) != 3 * len(quantity.units):
         return Table(quantity.labels, [value.tolist()], left=0)
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
     rows = zip(names, value.reshape(-1, 3).tolist(), strict=True)
@@ -280,9 +267,10 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 
 
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
-    """Return a table with one row for each column of the Jacobian.
+    """Return a table with one row for each column of a Jacobian.
 
-    For a Hessian, the table has one row for each pair of joint velocities; rows of zeros are left out.
+    For a Hessian, each row has the derivative of one column with respect to one coordinate. Rows that
+    contain only rounding errors are left out.
     """
     import numpy as np
 
@@ -305,7 +293,7 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
     def table(k: int) -> Iterator[Table]:
         noise = NOISE * float(abs(found.terms[k]).max(initial=0.0))
         rows = [*found.contributions((k,)), ("sum", "", found.total[k])]
-        # With four digits, a row fits on the terminal.
+        # With four digits, a row fits on a terminal.
         cells = [(*names, *(six_digits(n, noise, digits=4) for n in six.tolist())) for *names, six in rows]
         yield Table(heads, cells, left=2)
 
@@ -409,7 +397,6 @@ def _short_poses(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> Flo
 
 
 def _replay_command(x: Inputs, k: int, written: str) -> str:
-    """Return a command line that computes only the pose of sample `k`, for an error message."""
     line = replay_line(x.robot.origin, "placement", x.frame, None, {"q": x.q[k].tolist()})
     options = click.get_current_context().params
     for name in ("relative_to", "base_placement"):
@@ -552,7 +539,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
         lines = [(name, *(f"{n:.15g}" for n in sides)) for name, sides in _bounded(names, found, k)]
         yield Table(("", "value", "lower bound", "upper bound"), lines)
         if singularity := found.singularity(k):
-            yield from str(singularity).splitlines()  # the manipulability has no derivative
+            # At a singularity, the manipulability may have no derivative.
+            yield from str(singularity).splitlines()
         else:
             slopes = zip(x.rate_names, gradient[k].tolist(), strict=True)
             yield Table(("joint", "manipulability changes by"), list(slopes), names=(0,))
@@ -587,7 +575,7 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
 
 
 def _bounded(names: list[str], found: SingularValues, k: int) -> Iterator[tuple[str, list[float]]]:
-    """Yield name, value and bounds of the singular values, condition and manipulability of sample `k`."""
+    """Yield name and [value, lower bound, upper bound] of each quantity of sample `k`."""
     for i, name in enumerate(names):
         yield name, [float(side[k, i]) for side in found.values]
     yield "condition", [float(side[k]) for side in found.condition]

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from urdfkin.validation.document import Document
 
 
-#: Options that name an output file of a report
 FILES = ("json_", "html", "junit", "markdown")
 report_options = combine(
     click.option("--json", "json_", type=FILE, help="Write the report to this file as JSON."),
@@ -42,10 +41,7 @@ report_options = combine(
 
 
 def write_reports(document: Document, files: Mapping[str, Path | None]) -> int:
-    """Write a report in the requested formats; if one file cannot be written, write the others.
-
-    Return 0, or the exit code of the first file that could not be written. Errors are printed.
-    """
+    """Write a report in the requested formats; return the exit code of the first failure, or 0."""
     codes = [_write(document, name, path) for name in FILES if (path := files[name]) is not None]
     return next(filter(None, codes), 0)
 
@@ -72,7 +68,6 @@ def _write(document: Document, form: str, path: Path) -> int:
 
 
 def _files(document: Document, form: str, path: Path) -> Iterator[tuple[Path, bytes]]:
-    """Yield the path and the content of each file of a report; an HTML page may have further files."""
     if form == "json_":
         yield path, (json.dumps(document, allow_nan=False) + "\n").encode()
     elif form == "junit":

@@ -61,7 +61,7 @@ def _as_dict(entry: Entry) -> dict[str, object]:
     }
 
 
-#: Only JSON output needs this function; it is imported at its first use, because its import is slow
+#: The import of this function is slow, and only JSON output needs the function.
 _describe = lazy_import("urdfkin.validation.robot_summary:describe")
 
 
@@ -82,7 +82,7 @@ def info_command(robot: str) -> Answer:
 
 
 def _fitted(out: Console, document: TextDocument) -> TextDocument:
-    """Return the document; if a table is wider than the terminal, links and joints share one column."""
+    """Merge the columns of links and joints if a table is wider than the terminal."""
     from urdfkin.report.listing import fits
 
     parts = list(document.parts)
@@ -95,7 +95,6 @@ def _fitted(out: Console, document: TextDocument) -> TextDocument:
 
 
 def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
-    """Yield the rows of the table, with plain link names instead of a drawn tree."""
     for part in document.parts:
         if isinstance(part, Table):
             yield list(part.heads)

@@ -1,13 +1,12 @@
 """Protect the standard streams against failures, and against control characters in names.
 
-A shell can close standard output. Standard output can be a file on a full disk, or a pipe to a program that
-exits early. Its encoding may not support every character of a joint's name. In these cases, the command ends
-without a traceback.
+Standard output may be closed, a file on a full disk, or a pipe to a program that exits early. The
+encoding of standard output may not support every character of a joint's name. In each of these cases, the
+command ends without a traceback.
 
 `guard` wraps standard output and standard error in a `SafeStream`, which escapes control characters and
-commands of CI services. All output passes through this stream, also the output of click and Python. A
-`SafeStream` does not escape line feeds, because most line feeds end a line of output. Line feeds in names are
-escaped earlier, by the function `say` and the class `Terminal`.
+commands of CI services. A `SafeStream` does not escape line feeds, because most line feeds end a line of
+output. The function `say` and the class `Terminal` escape line feeds in names.
 """
 
 from __future__ import annotations
@@ -26,12 +25,11 @@ import click
 from urdfkin.errors import DegreesWarning, SourceError
 from urdfkin.errors.escape import COMMAND_ANYWHERE, COMMANDS, escape, printable
 
-#: Exit code if the program that reads the pipe has exited; shells use the same code
+#: Exit code of shells for a program that writes to a closed pipe
 READER_GONE = 128 + signal.SIGPIPE
 
 
 def prepare() -> None:
-    """Replace the standard streams by streams that report failures, before a command begins."""
     _open_closed_streams()
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
@@ -41,16 +39,12 @@ def prepare() -> None:
 
 
 def finish() -> None:
-    """Flush standard output while an error can still be reported; raise SourceError if writing fails."""
+    """Flush standard output while a SourceError can still be reported."""
     sys.stdout.flush()
 
 
 class _RawStream(io.FileIO):
-    """Standard output or standard error as a raw file.
-
-    The first failure of standard output ends the command with an error. Failures of standard error are
-    ignored.
-    """
+    """A standard stream; the first failure of stdout ends the command, and failures of stderr are ignored."""
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(descriptor, "w", closefd=False)
@@ -64,7 +58,8 @@ class _RawStream(io.FileIO):
                 self._failed = True
                 if self.fileno() == 1:
                     raise _stop_command(error) from None
-        return len(memoryview(data).cast("B"))  # after a failure, data are discarded
+        # After a failure, the stream discards all data.
+        return len(memoryview(data).cast("B"))
 
 
 def _stop_command(error: OSError) -> BaseException:
@@ -110,7 +105,6 @@ def _open_closed_streams() -> None:
 def _show_warning(
     message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any
 ) -> None:
-    """Print a warning of urdfkin as one line, and other warnings in Python's format."""
     if category.__module__.startswith("urdfkin."):
         say(f"urdfkin: warning: {message}", err=True)
     else:
@@ -119,16 +113,15 @@ def _show_warning(
 
 #: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum length of an unfinished line that is stored, because the next piece may complete a CI command
+#: Maximum length of a stored unfinished line; the next piece of text may complete a CI command
 _MOST_STORED = 64
 
 
 class SafeStream:
     """A text stream that escapes control characters and CI commands.
 
-    With `styled`, escape sequences for colours are kept; use it only if all text comes from the package rich.
-    `encoding` is the encoding that this stream reports. The bytes of a NumPy file are written to the
-    attribute `buffer`, without escapes.
+    With `styled`, escape sequences for colours are kept, so the caller must escape names first. `encoding` is
+    the encoding that this stream reports. Bytes can be written to the attribute `buffer`, without escapes.
     """
 
     def __init__(self, stream: TextIO, *, styled: bool = False, encoding: str | None = None) -> None:
@@ -148,7 +141,6 @@ class SafeStream:
         self._write_raw(COMMAND_ANYWHERE.sub(lambda found: found[0][:-1] + escape("["), _plain(text)))
 
     def write_file(self, text: str) -> None:
-        """Write a file's text as UTF-8, whatever the encoding of the stream."""
         self.stream.flush()
         self.stream.buffer.write(self.escaped_file(text).encode())
         self.stream.buffer.flush()
@@ -178,7 +170,7 @@ class SafeStream:
         before = len(self._line)
         whole = self._line + piece
         at = [m.start(1) for command in COMMANDS for m in command.finditer(whole) if m.start(1) >= before]
-        # Of a long line, only the last 16 characters are stored; an "x" before them replaces other text.
+        # Only the last 16 characters of a long line are stored; an "x" replaces the text before them.
         # Without the "x", these characters could look like a CI command at the beginning of a line.
         is_long = len(whole) > _MOST_STORED
         self._line = ("x" if whole.strip() else "") + whole[-16:] if is_long else whole
@@ -196,7 +188,6 @@ def _plain(text: str) -> str:
 
 
 def guard() -> None:
-    """Wrap standard output and standard error in `SafeStream` until the process ends."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, SafeStream):
@@ -205,12 +196,11 @@ def guard() -> None:
 
 
 def say(line: str, *, err: bool = False) -> None:
-    """Print one line; control characters are escaped."""
+    """Print one line with escaped control characters."""
     click.echo(printable(line), err=err)
 
 
 def say_styled(*words: tuple[str, dict[str, Any]]) -> None:
-    """Print one line; each word has a style, which only a terminal shows."""
     stream = SafeStream(sys.stdout, styled=sys.stdout.isatty())
     texts = (
         click.style(printable(text), **style) if stream.styled else printable(text) for text, style in words
@@ -223,7 +213,7 @@ def say_file(text: str) -> None:
 
 
 def harmless(text: str) -> str:
-    """Return a text as `say_file` would print it, with control characters escaped."""
+    """Return a text as `say_file` would print it."""
     return SafeStream(sys.stdout).escaped_file(text)
 
 

@@ -14,7 +14,7 @@ _TRAILING = re.compile(r" +$", re.MULTILINE)
 
 
 class Terminal(Console):
-    """A console of the package rich in which markup and control characters in names have no effect."""
+    """A console in which markup and control characters of names have no effect."""
 
     def __init__(self, stream: TextIO, **options: Any) -> None:
         safe = SafeStream(stream, styled=True)
@@ -22,7 +22,7 @@ class Terminal(Console):
         safe.styled = self.is_terminal
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print tables and texts; texts are not wrapped, so that they can be copied."""
+        """Print tables and texts; texts are not wrapped, so that users can copy them."""
         texts = [printable(o) if isinstance(o, str) else o for o in objects]
         only_text = all(isinstance(o, str) for o in objects)
         if self.is_terminal or only_text:

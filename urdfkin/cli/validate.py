@@ -49,13 +49,10 @@ def study_all(
     retry: bool = False,
     how: Mapping[str, Any],
 ) -> ValidationReport:
-    """Run the accuracy study of every compared robot, and return the report with the results of the study.
+    """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
-    `report` is the report of `validate` for the robots `given`. If `shard` is I/N, `report` covers only part
-    I of N, and only robots whose first samples belong to this part are studied. The results are also written
-    to the folder `store`. With `retry`, a study that failed in an earlier run is repeated. `how` are
-    arguments of `load`. If the study of a robot fails, a line on stderr states the reason. An interrupt skips
-    the remaining robots.
+    `report` is the report of `validate` for the robots `given`. `how` are arguments of `load`. With `shard`,
+    only robots whose first samples belong to the shard are studied. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.accuracy_store import FailedStudy
     from urdfkin.validation.campaign import chunks_of_shard
@@ -87,7 +84,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyResult | None]:
-    """Yield the accuracy results of a store or of a shard; meanwhile, no other process can write to it."""
+    """Lock a store, or one shard of the store, and yield the stored accuracy results."""
     if folder is None:
         yield None
         return
@@ -103,7 +100,7 @@ def _open_results(
 def _study(
     source: Robot | str, settings: StudySettings, stamp: str | None, how: Mapping[str, Any]
 ) -> tuple[AccuracyStudy | FailedStudy, bool]:
-    """Return two things: the accuracy result of a robot, and whether to store it.
+    """Return the accuracy result of a robot, and whether to store this result.
 
     A failure is stored only if the robot file is unchanged and the exception is an `UrdfkinError`.
     """
@@ -276,14 +273,13 @@ def _cluster(scheduler: str | None) -> Iterator[Engine | None]:
 
 
 def _load_stdin(source: str, how: dict[str, Any]) -> Robot | str:
-    """Load a robot from standard input, which can be read only once; return another source unchanged."""
+    """Load the robot if `source` is standard input, which can be read only once."""
     from urdfkin.robot.loading import load
 
     return load(source, **how) if source == "-" else source
 
 
 def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> Robot | str:
-    """Load a USD file with its variants and its articulation; return another robot unchanged."""
     from urdfkin.urdf.sources import is_usd
 
     loading = {name: how[name] for name in ("mimic", "root_joint") if name in how}
@@ -293,7 +289,6 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
-    """Print the results of a shard; a report needs the results of all shards."""
     from urdfkin.report.words import counted
 
     for robot in report.robots:

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from urdfkin.validation.functions import FunctionCheck
 
-#: Quantities that a function of the user can compute
 _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", "acceleration", "imu")
 
 
@@ -214,7 +213,8 @@ def _import_file(path: str) -> ModuleType:
     file = Path(path).resolve()
     if not file.is_file():
         raise SourceError("no such file", where=path)
-    name = f"_urdfkin_checks_{file.stem}"  # the prefix prevents clashes with installed modules
+    # The prefix prevents clashes with installed modules.
+    name = f"_urdfkin_checks_{file.stem}"
     spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None
     assert spec.loader is not None

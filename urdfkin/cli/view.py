@@ -95,7 +95,8 @@ def command(
         Viewer(server, loaded, None if start is None else start[0], motion, conversion)
     try:
         say(f"{loaded.name}: {server.address}")
-        sys.stdout.flush()  # a pipe is buffered: without flush, its reader would get the address late
+        # Python buffers output to a pipe, so without a flush the reader gets the address late.
+        sys.stdout.flush()
         opens = sys.stdout.isatty() and has_screen() if browser is None else browser
         with opened_page(server.address) if opens else nullcontext():
             server.sleep_forever()

@@ -1,8 +1,7 @@
-"""The exceptions that urdfkin raises.
+"""Exceptions of urdfkin.
 
-Every message has four parts, which are also attributes of the exception: the problem, the place, the value
-found and the remedy. A message may end with the command that prints a section of docs/questions.md. The
-function `nearest` suggests existing names for a misspelt name.
+A message states the problem, the place, the wrong value and the remedy. Each part is also an attribute of the
+exception.
 """
 
 from __future__ import annotations
@@ -19,9 +18,7 @@ from urdfkin.errors.escape import log_line
 
 #: Maximum number of leading characters of a name that `nearest` compares.
 _COMPARED = 128
-#: Maximum number of pairs of characters that `nearest` compares, by default.
 WORK = 1_000_000
-#: Maximum number of suggested names.
 _OFFERED = 3
 
 
@@ -50,9 +47,7 @@ def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6, work: int =
 
 
 class QuestionsSection(Enum):
-    """A section of docs/questions.md, by the anchor of its heading.
-
-    The text of a member is the command that prints the section:
+    """A section of docs/questions.md; `str` returns the command that prints the section.
 
     >>> print(QuestionsSection.MIMIC_JOINTS)
     see `urdfkin explain mimic-joints`
@@ -93,7 +88,7 @@ class DegreesWarning(UserWarning):
 
 
 def warn_caller(message: str, category: type[Warning]) -> None:
-    """Issue a warning whose location is the line outside urdfkin that called urdfkin."""
+    """Issue a warning for the line outside urdfkin that called urdfkin."""
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith("urdfkin."):
         level, frame = level + 1, frame.f_back
@@ -143,11 +138,11 @@ class UrdfkinError(Exception):
         remedy = f"; {self.remedy}" if self.remedy else ""
         apart = " " if remedy.endswith("?") else "; "
         question = f"{apart}{self.question}" if self.question else ""
-        # The message may contain a name from a file, which must not add lines or terminal commands.
+        # A name from a file must not add lines or terminal commands to the message.
         return log_line(f"{place}{self.what}{found}{remedy}{question}")
 
     def __reduce__(self) -> tuple[Callable[..., Self], tuple[Any, ...]]:
-        # Errors are pickled by `validate --jobs`; Python's `__reduce__` would lose the keyword arguments.
+        # `validate --jobs` pickles errors, and Python's own `__reduce__` loses keyword arguments.
         return _rebuild, (type(self), self.__dict__)
 
 
@@ -241,7 +236,6 @@ class RepresentationSingularityError(InputError):
     """Euler angles are at their representational singularity, where their derivatives do not exist (7.56).
 
     Attributes:
-        sequence: Name of the sequence of Euler angles.
         distance: Distance (rad) of the middle angle from its value at the singularity.
         sample: Index of the worst sample of a batch; () for a single sample.
     """

@@ -1,7 +1,6 @@
 """Display of objects as text, HTML, Markdown and LaTeX.
 
-The method `_sheet` of a `Displayable` returns a `TextDocument`, which `print` and notebooks display. Names
-from files may contain any characters, so each format escapes names.
+Names from files may contain any characters, so each format escapes names.
 """
 
 from __future__ import annotations
@@ -14,9 +13,8 @@ from urdfkin.errors.escape import latex_text, log_line, markdown_cell, markdown_
 
 #: Characters that draw the branches of a tree before a name.
 LINES = "├│└ "
-#: ASCII characters that replace `LINES`.
 ASCII = str.maketrans("├│└", "+|`")
-#: Fraction of a table's largest number below which a number is displayed as 0.
+#: Numbers below this fraction of the table's largest number are displayed as 0.
 NOISE = 1e-15
 
 
@@ -25,10 +23,8 @@ class Table:
     """A table of text and numbers; numbers are displayed with six digits.
 
     Attributes:
-        heads: Headings of the columns.
-        rows: Cells of each row.
         left: Number of left-aligned columns, or their indices; cells in these columns keep leading blanks.
-        names: Indices of columns with names, which Markdown displays as code.
+        names: Indices of columns that Markdown displays as code.
     """
 
     heads: Sequence[str]
@@ -108,8 +104,6 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Matrix:
-    """A matrix, such as a pose, with each number as text."""
-
     rows: Sequence[Sequence[str]]
 
     def lines(self) -> list[str]:
@@ -136,7 +130,7 @@ class Matrix:
 
 
 class Strong(str):
-    """A sentence with emphasis, and with a style for terminals, such as "bold red"."""
+    """A sentence with emphasis; `style` is a style for terminals, such as "bold red"."""
 
     __slots__ = ("style",)
     style: str
@@ -155,16 +149,12 @@ class CodeLine(str):
 
 @dataclass(frozen=True, slots=True)
 class TextDocument:
-    """A title, which may be empty, and sentences, tables and matrices.
-
-    An empty string in `parts` becomes a blank line in plain text.
-    """
+    """A title with sentences, tables and matrices; an empty string in `parts` becomes a blank line."""
 
     title: str
     parts: Sequence[str | Table | Matrix] = ()
 
     def written(self, form: str) -> str:
-        """Return the text in the format "terminal" (or "table"), "markdown", "html" or "latex"."""
         text: str = self.text() if form in ("terminal", "table") else getattr(self, form)()
         return text + "\n"
 

@@ -25,12 +25,7 @@ _JOINER = "&#8288;"
 
 
 def printable(text: str) -> str:
-    r"""Return one line that is safe for a terminal: unprintable characters and line ends are escaped.
-
-    Example:
-        >>> print(printable("a\u202eb\x1b[31m\n"))
-        a\u202eb\x1b[31m\n
-    """
+    """Escape unprintable characters and line ends, so that the line is safe for a terminal."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
@@ -39,9 +34,8 @@ def printable(text: str) -> str:
 def log_line(text: str) -> str:
     r"""Return one line that is safe for a terminal and for the log of a CI service.
 
-    Example:
-        >>> print(log_line("::error::a\n##vso[b]"))
-        :\u003aerror::a\n##vso\u005bb]
+    >>> print(log_line("::error::a\n##vso[b]"))
+    :\u003aerror::a\n##vso\u005bb]
     """
     line = printable(text)
     for command in COMMANDS:
@@ -50,12 +44,7 @@ def log_line(text: str) -> str:
 
 
 def markdown_text(words: str) -> str:
-    r"""Escape a sentence for Markdown: one line without markup, HTML, links, mentions, lists and rules.
-
-    Example:
-        >>> markdown_text("<b>*x*"), markdown_text("1. x")
-        ('&lt;b&gt;\\*x\\*', '1\\. x')
-    """
+    """Escape a sentence for Markdown: one line without markup, HTML, links, mentions, lists and rules."""
     return re.sub(r"^(\d*)([-+=.])", r"\1\\\2", markdown_cell(words))
 
 
@@ -68,12 +57,7 @@ def markdown_cell(words: str) -> str:
 
 
 def markdown_code(name: str) -> str:
-    r"""Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell.
-
-    Example:
-        >>> print(markdown_code("a`|b"))
-        `a\x60\x7cb`
-    """
+    """Return a name as Markdown code, with escapes for backticks and for the bars that end a table cell."""
     return "`" + (printable(name).replace("`", r"\x60").replace("|", r"\x7c") or " ") + "`"
 
 
@@ -91,9 +75,8 @@ def latex_text(text: str) -> str:
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
     r"""Return rows as CSV. Pass names from files through `csv_cell` first.
 
-    Example:
-        >>> csv_text([["joint", "lower"], ["a, b", 0.5]])
-        'joint,lower\n"a, b",0.5\n'
+    >>> csv_text([["joint", "lower"], ["a, b", 0.5]])
+    'joint,lower\n"a, b",0.5\n'
     """
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(rows)
@@ -103,16 +86,15 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def json_text(data: Any) -> str:
     r"""Return JSON in ASCII without commands to a CI service; a parser restores the original names.
 
-    Example:
-        >>> print(json_text(["\u202e ##[error]"]))
-        ["\u202e #\u0023[error]"]
+    >>> print(json_text(["\u202e ##[error]"]))
+    ["\u202e #\u0023[error]"]
     """
     text = json.dumps(data, indent=2 if isinstance(data, dict) else None, allow_nan=False)
     return text.replace("##", r"#\u0023").replace("\x7f", r"\u007f")
 
 
 def escape(c: str) -> str:
-    """Return a character's escape sequence for Python and TOML; up to U+FFFF, it is also valid in JSON."""
+    """Return a character's escape sequence for Python and TOML, and up to U+FFFF also for JSON."""
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 
@@ -121,9 +103,8 @@ def csv_cell(name: str) -> str:
 
     An apostrophe before `=`, `+`, `-` or `@` marks the cell as text; `from_csv_cell` removes the apostrophe.
 
-    Example:
-        >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
-        ("'=cmd|'/C calc'!A0", 'joint1')
+    >>> csv_cell("=cmd|'/C calc'!A0"), csv_cell("joint1")
+    ("'=cmd|'/C calc'!A0", 'joint1')
     """
     line = printable(name).replace("##", r"#\x23")
     return f"'{line}" if line.lstrip("' ").startswith(FORMULA) else line

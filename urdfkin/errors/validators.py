@@ -14,8 +14,6 @@ from urdfkin.errors import InputError
 def whole_number(value: object, name: str, least: int, most: float = math.inf) -> int:
     """Return `value` as an int from `least` to `most`.
 
-    >>> whole_number(3, "threads", 1)
-    3
     >>> whole_number(True, "threads", 1)
     Traceback (most recent call last):
     urdfkin.errors.InputError: threads must be a whole number, at least 1: found True
@@ -42,12 +40,10 @@ def real_number(value: object, name: str) -> float:
 
 
 def is_real(value: object) -> TypeGuard[Real]:
-    """Return whether `value` is a real number; a boolean is not."""
     return isinstance(value, Real | Decimal) and not isinstance(value, bool)
 
 
 def as_float(value: Any) -> float:
-    """Return the nearest float; +-inf if the value exceeds the range of floats."""
     try:
         return float(value)
     except OverflowError:
@@ -83,8 +79,8 @@ def as_bool(value: object, name: str) -> bool:
 
 
 def safe_repr(value: object) -> str:
-    """Return the first 60 characters of a value's repr, or a description if the repr raises an exception."""
     try:
         return repr(value)[:60]
-    except Exception:  # for example, the repr of an int with 5,000 digits raises ValueError
+    except Exception:
+        # For example, the repr of an int with 5,000 digits raises ValueError.
         return f"an object of type {type(value).__name__}"

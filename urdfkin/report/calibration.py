@@ -16,7 +16,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.words import counted
 from urdfkin.system.documents import plain
 
-#: Largest ratio (residuals) / (noise) at which the residuals are only rounding errors.
+#: Residuals below this fraction of the noise are only rounding errors.
 _ROUNDING = 0.5
 
 

@@ -43,14 +43,13 @@ from urdfkin.validation.document import (
 )
 from urdfkin.verify.oracles import versions
 
-#: Maximum length of a displayed value.
 _LONGEST = 200
 #: Displayed poses are rounded to nine decimals.
 _PRECISION = Tolerance(1e-9, 1e-9)
 
 
 def model_changes(old: ReportedModel | None, new: ReportedModel | None) -> Iterator[tuple[str, str, str]]:
-    """Yield the name, the old value and the new value of each change in a model; a missing value is empty."""
+    """Yield name, old value and new value of each change; a missing value is empty."""
     before, after = _joints(old), _joints(new)
     for name in dict.fromkeys([*before, *after]):
         was, now = before.get(name), after.get(name)
@@ -163,7 +162,7 @@ def _cell(value: Units | str) -> str:
     return value if isinstance(value, str) else units(value)
 
 
-#: It is a regression if the largest disagreement of a robot grows by more than this factor.
+#: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
 #: Smaller factors are normal, because the samples are random.
 FACTOR = 2.0
 #: Largest disagreement (in eps * scale) that is never a regression; a single rounding can be as large.
@@ -174,13 +173,7 @@ _SHARE_FLOOR = 0.1
 
 @dataclass(frozen=True, slots=True)
 class ReportChange:
-    """A difference between two reports.
-
-    Attributes:
-        robot: The robot's source; None for the run as a whole.
-        old: Old value as text; empty if it was missing.
-        new: New value as text; empty if it is missing.
-    """
+    """A difference between two reports; `robot` is None for the whole run, and a missing value is empty."""
 
     robot: str | None
     what: str
@@ -209,7 +202,6 @@ class ReportComparison:
         return 1 if self.regressions else 0
 
     def as_dict(self, command: str | None = None) -> ComparisonDocument:
-        """Return plain data for JSON; `command` is the command line that requested the data."""
         document = {
             "schema": COMPARISON.name,
             "versions": versions(),
@@ -240,7 +232,6 @@ class ComparisonDocument(Header):
     changes: Annotated[list[ChangeEntry], says("All changes between the two reports.")]
 
 
-#: Layout of the document
 COMPARISON = DocumentKind(
     "urdfkin-comparison/1",
     ComparisonDocument,
@@ -250,7 +241,6 @@ COMPARISON = DocumentKind(
 
 
 def compare(old: Document, new: Document, factor: float = FACTOR) -> ReportComparison:
-    """Compare two reports; a growth of a robot's largest disagreement above `factor` is a regression."""
     changes = [*_run(old, new), *_robots(old, new, factor)]
     return ReportComparison(tuple(changes), tuple(new["sha256"]))
 
@@ -295,7 +285,7 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChang
 
 
 def by_source(document: Document) -> dict[str, ReportedRobot]:
-    """Return robots by source; a number is added to a source that occurs again: `ur5`, `ur5 (2)`."""
+    """Return robots by source; repeated sources get numbers: `ur5`, `ur5 (2)`."""
     named: dict[str, ReportedRobot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1
@@ -307,10 +297,7 @@ def by_source(document: Document) -> dict[str, ReportedRobot]:
 
 
 def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, ReportedRobot]) -> dict[str, str]:
-    """Return the new source of each renamed file; the key is the old source.
-
-    A file counts as renamed if exactly one missing and exactly one new source have the same robot name.
-    """
+    """Return {old source: new source} if exactly one missing and one new source have the same robot name."""
     gone, new = _by_name(before, after), _by_name(after, before)
     return {
         gone[name][0]: new[name][0] for name in gone if len(gone[name]) == 1 and len(new.get(name, [])) == 1
@@ -320,7 +307,6 @@ def renamed_files(before: Mapping[str, ReportedRobot], after: Mapping[str, Repor
 def _by_name(
     robots: Mapping[str, ReportedRobot], others: Mapping[str, ReportedRobot]
 ) -> dict[str, list[str]]:
-    """Return, for each robot name, the sources in `robots` that are missing in `others`."""
     named: dict[str, list[str]] = {}
     for source, robot in robots.items():
         if source not in others:
@@ -355,7 +341,6 @@ def _robot(source: str, old: ReportedRobot, new: ReportedRobot, factor: float) -
 
 
 def _tables(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[ReportChange]:
-    """Yield a change for each table that Pinocchio checked in only one of the two reports."""
     before, after = ({(c["base"], c["tip"]): bool(c["samples"]) for c in r["chains"]} for r in (old, new))
     for base, tip in dict.fromkeys([*before, *after]):
         ends = [compared.get((base, tip), False) for compared in (before, after)]
@@ -398,7 +383,6 @@ def _grew(old: Units, new: Units, factor: float, floor: float = FLOOR) -> bool:
 
 
 def _findings(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[ReportChange]:
-    """Yield a change for each code whose number of errors or warnings changed."""
     counts: list[dict[str, int]] = [{}, {}]
     for count, robot in zip(counts, (old, new), strict=True):
         for finding in robot["findings"]:
@@ -412,7 +396,6 @@ def _findings(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[R
 
 
 def figures(old: Document, new: Document) -> list[tuple[str, Units | str, Units | str]]:
-    """Return each quantity with its worst disagreement in both reports; empty if it was not compared."""
     names = dict.fromkeys(c["quantity"] for d in (old, new) for r in d["robots"] for c in r["checks"])
     return [(name, _worst(old, name), _worst(new, name)) for name in names]
 

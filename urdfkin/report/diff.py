@@ -14,12 +14,10 @@ from urdfkin.report.markdown import LIMIT, count_within, row_line, shortened, ta
 from urdfkin.report.words import counted
 from urdfkin.system.documents import plain
 
-#: Titles of the columns of the table of changes.
 HEADS = ("element", "what", "old", "new", "alone")
 
 
 def headline(found: Changes) -> str:
-    """Return the number of changes, and the distance by which all changes together move a frame."""
     rounding = ""
     if found.rounding is not None:
         metres, radians = found.rounding
@@ -33,12 +31,10 @@ def headline(found: Changes) -> str:
     return f"{head}; together they {motion_words(found.total)}"
 
 
-#: Titles of the columns of the table of pairs.
 PAIRS = ("old", "new", "changes")
 
 
 def pairs_document(found: Sequence[Changes]) -> TextDocument:
-    """Return a table with a row for each pair of robots, followed by the changes of each pair."""
     rows = [(*one.sources, headline(one)) for one in found]
     return TextDocument(
         "", [Table(PAIRS, rows, left=3), *(line for one in found if one for line in lines_of(one))]
@@ -53,7 +49,6 @@ def pairs_markdown(found: Sequence[Changes]) -> str:
 
 
 def lines_of(found: Changes) -> list[str]:
-    """Return the changes as lines; after a joint's changes, a line states how far they move a frame."""
     lines = [f"{found.sources[0]} -> {found.sources[1]}"]
     by_element: dict[str, list[ModelChange]] = {}
     for change in found.changes:
@@ -72,7 +67,6 @@ def document(found: Changes) -> TextDocument:
 
 
 def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]:
-    """Return the cells of each change; old and new values have at most `longest` characters."""
     rows: list[tuple[str, ...]] = []
     for change in found.changes:
         effect = found.effect_of.get(change.element)
@@ -87,7 +81,6 @@ def rows_of(found: Changes, longest: int | None = None) -> list[tuple[str, ...]]
 
 
 def markdown_of(found: Changes, limit: int = LIMIT) -> str:
-    """Return the changes as Markdown for a pull request's comment, at most `limit` characters."""
     lines = [f"## {text(headline(found))}", "", f"{text(found.sources[0])} → {text(found.sources[1])}", ""]
     if found:
         lines += table_lines(HEADS)
@@ -100,8 +93,6 @@ def markdown_of(found: Changes, limit: int = LIMIT) -> str:
 
 
 def as_data(found: Changes) -> dict[str, Any]:
-    """Return the changes as JSON data. A missing value and an unbounded distance are null."""
-
     def far(interval: Any) -> dict[str, Any] | None:
         if interval is None:
             return None

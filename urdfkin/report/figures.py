@@ -1,9 +1,8 @@
-"""Histograms of the disagreements, and the data of the 3D view.
+"""Histograms of the disagreements with Pinocchio, and the data of the 3D view.
 
-The plot has one row for each quantity, with all reference frames together. The x axis of each histogram is
-logarithmic and shows the disagreement in eps * scale. The triangle shows the worst result. The bar shows the
-range of the bounds, because different frames have different bounds. If all results are verified, the
-histogram lies left of the bar. The numbers of the 3D view have seven digits.
+The plot has one row for each quantity, with all reference frames together. The x axis is logarithmic and
+shows the disagreement in eps * scale. A triangle shows the worst result. A bar shows the range of the bounds,
+because different frames have different bounds.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _HEIGHT = 0.82
 
 
 def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> str:
-    """Return the plot of one robot as inline SVG; empty if nothing was compared."""
+    """Return the plot of one robot as inline SVG, or an empty text if nothing was compared."""
     names = quantities([robot])
     if not names:
         return ""
@@ -53,7 +52,6 @@ def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> 
 
 
 def _right(checks: Sequence[ReportedCheck], edges: Sequence[float]) -> float:
-    """Return the right end of the x axis: twice the largest bound or disagreement, within limits."""
     ends = [check["bound"][1] or 1.0 for check in checks] + [check["worst"] or 1.0 for check in checks]
     return float(min(max(ends) * 2.0, edges[-1] * 10.0))
 
@@ -73,7 +71,8 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
     _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    if largest is None or largest > right:  # the mark is at the right end of the axis
+    # A result outside the axis has a mark at the right end of the axis.
+    if largest is None or largest > right:
         text = "✗ not finite" if largest is None else f"✗ {units(largest)} ▸"
         place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}
         axes.annotate(text, (1.0, base + 0.13), fontsize=8, weight="bold", color=THIRD, zorder=6, **place)
@@ -83,7 +82,6 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
 
 
 def _annotate_left(axes: Axes, text: str, y: float, points: float, **style: Any) -> None:
-    """Write a text left of the axis, `points` typographic points above the height `y`."""
     place: dict[str, Any] = {"xytext": (-4, points), "textcoords": "offset points", "ha": "right"}
     axes.annotate(text, (_LEFT, y), color=TEXT, **place, **style)
 

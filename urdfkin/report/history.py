@@ -1,8 +1,8 @@
 """History of robots in several validation reports: verdicts, results, findings and changes from run to run.
 
-Runs are ordered by start time. Robots are matched by source, or by the robot's name if a file was renamed, as
-in `compare`. Each report is read twice, first for the start time and then for the results, so that only one
-report at a time is in memory.
+Runs are ordered by start time. Robots are matched by source, or by the robot's name if a file was renamed.
+Each report is read twice, first for the start time and then for the results, so that few reports are in
+memory at the same time.
 """
 
 from __future__ import annotations
@@ -35,7 +35,6 @@ MOST_RUNS, MOST_FILES = 1000, 20_000
 MARKED, CHARTED = 20, 60
 #: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
 SHOWN = 20
-#: Maximum number of runs and of changes that the page lists for each robot.
 _LISTED = 500
 #: Symbol of each verdict; the empty verdict means that the run did not include the robot.
 MARKS = {"verified": "✓", "disagrees": "✗", "not verified": "!", "bad input": "✗", "": "·"}
@@ -84,7 +83,7 @@ class Point(TypedDict):
 
 
 class RobotHistory(TypedDict):
-    """The results of one robot in all validation runs that contain it."""
+    """The results of one robot in all validation runs with this robot."""
 
     robot: Annotated[str, says("The robot's latest source.")]
     points: Annotated[list[Point], says("The runs of this robot, the oldest first.")]
@@ -110,21 +109,13 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: Changes of each source, each with the index of the run.
+#: Pairs (index of the run, change), by the source of the robot.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
 @dataclass(slots=True)
 class History:
-    """The runs and robots of several reports.
-
-    Attributes:
-        runs: The runs, the oldest first.
-        robots: For each robot, the results in each run. The key is the robot's source in the latest run.
-            Worse verdicts come first.
-        unusable: Files that cannot be used, with the reason.
-        repeated: Files that contain the same validation run as another file.
-    """
+    """The runs and robots of several reports; the keys of `robots` are the latest sources."""
 
     runs: list[ValidationRun] = field(default_factory=list)
     robots: dict[str, list[Point]] = field(default_factory=dict)
@@ -136,7 +127,6 @@ class History:
         return 2 if self.unusable else 0
 
     def as_dict(self, command: str | None = None) -> HistoryDocument:
-        """Return plain data for JSON; `command` is the command line that requested the data."""
         last = len(self.runs) - 1
         latest = [points[-1]["sha256"] for points in self.robots.values() if points[-1]["run"] == last]
         document = {
@@ -154,11 +144,7 @@ class History:
 
 
 def history(paths: Sequence[Path]) -> History:
-    """Return the history of reports: JSON files of `urdfkin validate --json`, stores, and folders of both.
-
-    Raises:
-        InputError: No report can be used, or there are too many reports.
-    """
+    """Read reports, stores and folders; raise InputError for no usable report or too many reports."""
     found = History()
     before: Document | None = None
     for file, report in _in_order(list(_files(paths)), found):
@@ -183,7 +169,6 @@ def history(paths: Sequence[Path]) -> History:
 
 
 def _files(paths: Sequence[Path]) -> Iterator[Path]:
-    """Yield the path of each file or store; a folder contributes its files *.json at any depth."""
     count = 0
     for path in paths:
         has_reports = is_folder(path) and not (path / "manifest.json").is_file()
@@ -217,7 +202,7 @@ def _in_folder(folder: Path) -> Iterator[Path]:
 
 
 def _in_order(files: Sequence[Path], found: History) -> Iterator[tuple[str, Document]]:
-    """Yield each report, ordered by start time; add other files to `found.unusable` or `found.repeated`."""
+    """Yield reports in the order of start times; add other files to `found.unusable` or `found.repeated`."""
     starts = list[tuple[float, str, Path]]()
     for path in files:
         try:
@@ -245,7 +230,7 @@ def _unused(path: Path, error: UrdfkinError) -> Unused:
 
 
 def _start(path: Path) -> tuple[float, str]:
-    """Return the start time of a run in seconds and as text; infinity for a text that is not a date."""
+    """Return the start time of a run in seconds and as text; an invalid date counts as infinity."""
     data = _read(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
     try:
@@ -310,7 +295,6 @@ def _point(run: int, source: str, robot: ReportedRobot) -> Point:
 
 
 def document(found: History, *, all_: bool = False) -> TextDocument:
-    """Return the history for a terminal; with `all_`, all runs and changes, otherwise only the latest."""
     some = None if all_ else SHOWN
     first = 0 if all_ else max(0, len(found.runs) - SHOWN)
     runs = [
@@ -350,7 +334,7 @@ def document(found: History, *, all_: bool = False) -> TextDocument:
 
 
 def headline(found: History) -> str:
-    """Return the latest verdict and the number of equal verdicts before it, in one line.
+    """State the latest verdict, and how many runs directly before had the same verdict.
 
     >>> headline(History([{"verdict": v} for v in ("disagrees", "verified", "verified")]))
     '3 runs; latest verdict: verified, as in the run before'
@@ -366,19 +350,17 @@ def headline(found: History) -> str:
 
 
 def marks(found: History, points: Sequence[Point]) -> str:
-    """Return a mark for each of the latest runs: `✓`, `✗`, `!`, or `·` if the robot is missing."""
     return "".join(MARKS[verdict] for verdict in _latest_verdicts(found, points))
 
 
 def _latest_verdicts(found: History, points: Sequence[Point]) -> list[str]:
-    """Return the verdict of a robot in each of the latest runs; empty if the robot is missing."""
     verdicts = {point["run"]: point["verdict"] for point in points}
     last = len(found.runs)
     return [verdicts.get(run, "") for run in range(max(0, last - MARKED), last)]
 
 
 def changes(found: History) -> list[tuple[int, ChangeEntry]]:
-    """Return all changes, each with the index of its run; latest runs first, in a run regressions first."""
+    """Return pairs (index of the run, change): latest runs first, and in a run regressions first."""
     found_changes = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
     return sorted(found_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 
@@ -391,7 +373,6 @@ def _changes_by_source(found: History) -> ChangesBySource:
 
 
 def _changes_of(grouped: ChangesBySource, points: Sequence[Point]) -> list[tuple[int, ChangeEntry]]:
-    """Return the changes of a robot, for all source names of the robot."""
     sources = dict.fromkeys(point["source"] for point in points)
     return [one for source in sources for one in grouped.get(source, [])]
 
@@ -402,7 +383,6 @@ def words_of(change: ChangeEntry) -> str:
 
 
 def _share(one: ValidationRun | Point) -> str:
-    """Return the largest ratio of a disagreement to its bound as text; empty if nothing was compared."""
     return percent(one["share_of_bound"]) if one["results"] else ""
 
 
@@ -411,7 +391,7 @@ def _date(run: ValidationRun) -> str:
 
 
 def as_html(found: History, command: str | None = None) -> str:
-    """Return a page with charts and the history of each robot; the template escapes all names."""
+    """Return a page with charts; the template escapes all names."""
     grouped = _changes_by_source(found)
     return rendered(
         "history.html.j2",
@@ -438,7 +418,6 @@ def as_html(found: History, command: str | None = None) -> str:
 
 
 def _stacks(found: History) -> list[dict[str, Counter[str]]]:
-    """Return, for each run, the number of robots by verdict and the number of findings by severity."""
     stacks: list[dict[str, Counter[str]]] = [
         {"verdicts": Counter(), "findings": Counter()} for _ in found.runs
     ]

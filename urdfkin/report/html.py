@@ -1,8 +1,8 @@
 """Report as an HTML page that works offline, uses no network and escapes every name.
 
 A large report is split: the page has the summary, and each robot has a file with its details. The page loads
-a robot's file when the reader unfolds the robot. The files are scripts, because a page that is opened from
-disk cannot load other types of files.
+a robot's file when the reader opens the robot's section. The files are scripts, because a page that is opened
+from disk cannot load other types of files.
 """
 
 from __future__ import annotations
@@ -78,7 +78,6 @@ def environment() -> Environment:
 
 
 def rendered(template: str, **values: Any) -> str:
-    """Return a page with the common style sheet."""
     return environment().get_template(template).render(style=as_is(asset("report.css")), **values)
 
 
@@ -93,14 +92,14 @@ def as_is(text: str) -> Markup:
 
 
 def as_html(document: Document) -> str:
-    """Return the report as one page; the template escapes all names, even `<script>`."""
+    """Return the report as one page; the template escapes all names."""
     document = _worst_first(document)
     robots = enumerate(document["robots"])
     return _page(document, [_summary(robot, i) | _robot(robot, i, document) for i, robot in robots])
 
 
 def as_files(document: Document, name: str) -> Iterator[tuple[str, str]]:
-    """Yield the path and the text of each file; paths are relative to the page, which is the last file.
+    """Yield the path, relative to the page, and the text of each file; the page is the last file.
 
     If all details together are longer than `MOST` characters, each robot has its own file. For the page
     `report.html`, these files are in the folder `report-robots`.
@@ -162,7 +161,6 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
 
 
 def _summary(robot: ReportedRobot, index: int) -> dict[str, Any]:
-    """Return the data for the heading of a robot's section."""
     opened = robot["verdict"] != "verified" and index < _FAILURES_OPEN
     return {"index": index, "data": robot, "summary": pages.overview(robot, []), "file": "", "opened": opened}
 
@@ -182,7 +180,6 @@ def _totals(document: Document) -> dict[str, Any]:
 
 
 def _model_verdict(document: Document) -> dict[str, Any]:
-    """Return the banner about problems in the robots' files: colour, title, counts, first affected robot."""
     severities = ("error", "warning", "note")
     found = [
         Counter[str](finding["severity"] for finding in robot["findings"]) for robot in document["robots"]
@@ -257,14 +254,13 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
 
 
 def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
-    """Return the plot of a robot; empty without matplotlib, and for verified robots of a large report."""
     if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
         return ""
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 
 
 def when(started: str) -> str:
-    """Return the start time as text; an input that is not an ISO date is returned unchanged."""
+    """Format an ISO date; return other texts unchanged."""
     try:
         moment = datetime.fromisoformat(started)
     except ValueError:

@@ -28,12 +28,7 @@ def print_document(out: Console, document: TextDocument) -> None:
 
 
 def print_table(out: Console, table: Table) -> None:
-    """Print a table with six digits of each number; a name in the first column is never split over two lines.
-
-    Numbers below the rounding error of the table's largest number are shown as 0. On a narrow terminal, a
-    long name is on its own line above the other cells of the row. This line is left out if the previous row
-    has the same name.
-    """
+    """Print a table; on a narrow terminal, a long name is on its own line above the other cells."""
     from rich.cells import cell_len
 
     ascii_only = out.options.ascii_only
@@ -65,12 +60,10 @@ def print_table(out: Console, table: Table) -> None:
 
 
 def fits(out: Console, table: Table) -> bool:
-    """Return whether a table fits the terminal with two spaces between columns and one after the last."""
     return sum(width + 2 for width in _cells(table)[2]) - 1 <= out.width
 
 
 def _cells(table: Table) -> tuple[list[list[str]], list[list[str]], list[int]]:
-    """Return the lines of the table's heading, the table's rows, and the width of each column."""
     from rich.cells import cell_len
 
     lines = zip_longest(*(head.split("\n") for head in table.heads), fillvalue="")

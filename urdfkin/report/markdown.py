@@ -26,15 +26,11 @@ from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 #: GitHub accepts comments of up to 65,536 characters.
 LIMIT = 60_000
 _MARKS = {"verified": "✅", "disagrees": "❌", "not verified": "⚠️", "bad input": "⛔"}
-#: Maximum number of failed checks that are shown for each robot.
 _SHOWN = 3
 
 
 def as_markdown(document: Document) -> str:
-    """Return the report as a comment, failed robots first.
-
-    If the comment is too long, some robots are left out, and a line states their number.
-    """
+    """Return the report as a comment, failed robots first; robots that do not fit are only counted."""
     found = outcome_of(document)
     head = [
         f"## {'✅ Verified against' if found.passed else '❌ Not verified against'} Pinocchio"
@@ -130,7 +126,7 @@ def row_line(cells: Iterable[str]) -> str:
 def table_lines(
     heads: Sequence[str], rows: Iterable[Iterable[str]] = (), left: Collection[int] | None = None
 ) -> list[str]:
-    """Return the lines of a table of escaped cells; `left` are the left-aligned columns (default: all)."""
+    """Return the lines of a table. Cells must be escaped; `left` are left-aligned columns (default: all)."""
     marks = ["---" if left is None or i in left else "---:" for i in range(len(heads))]
     return [row_line(cells) for cells in (heads, marks, *rows)]
 

@@ -74,7 +74,7 @@ def overview(robot: ReportedRobot, quantities_of: Sequence[Sequence[str]]) -> di
 
 
 def reason(robot: ReportedRobot) -> str:
-    """Return the reason of a verdict, without the file's errors, which the page lists as findings."""
+    """Return the reason of the verdict, without errors that the page lists as findings."""
     first, *lines = (robot["reason"] or "").split("\n")
     found = [(one["code"], one["message"]) for one in robot["findings"] if one["severity"] == "error"]
     others = [line for line in lines if not any(code in line and words in line for code, words in found)]
@@ -111,7 +111,6 @@ def joint_rows(model: ReportedModel) -> list[dict[str, Any]]:
 
 
 def _remaining_range(joint: ReportedJoint) -> str:
-    """Return a sentence about limits of mimic joints that narrow a joint's range; otherwise an empty text."""
     kept = joint.get("kept")
     if kept is None:
         return ""
@@ -149,10 +148,7 @@ def _limits(limit: ReportedLimit | None, kind: str) -> dict[str, str]:
 def heat_map(
     robot: ReportedRobot, model: ReportedModel
 ) -> tuple[list[str], list[tuple[str, list[HeatCell]]]]:
-    """Return the column heads, and a row with the name and the cells of each moving joint.
-
-    A cell shows the largest disagreement in all reference frames.
-    """
+    """Return the column heads, and (name, cells) for each moving joint."""
     quantities_of = columns([robot])
     frame = {name: i for i, name in enumerate(robot["frames"])}
     moving = {name: i for i, name in enumerate(robot["joints"])}
@@ -169,7 +165,7 @@ def heat_map(
 
 
 def _columns(model: ReportedModel) -> dict[str, list[int]]:
-    """Return, for each joint, the indices of its columns in the Jacobian of all joints."""
+    """Return each joint's column indices in a Jacobian with separate columns for mimic joints."""
     own: dict[str, list[int]] = {}
     at = 0
     for joint in model["joints"]:
@@ -191,14 +187,14 @@ def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatC
 
 
 def _share(check: ReportedCheck, subject: int) -> float:
-    """Return an upper estimate of (disagreement / bound) for one frame, joint or column.
+    """Return an upper bound of (disagreement / bound) for one frame, joint or column.
 
-    The document has no bound for a single frame, joint or column. Therefore, the disagreement is divided by
-    the smallest bound of the check. If this quotient is larger than the
-    largest ratio in the check, the function returns the largest ratio, which is an upper bound too.
+    The document has no bound for a single frame, joint or column, so the disagreement is divided by the
+    check's smallest bound. The check's largest ratio is also an upper bound; the smaller number is returned.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
-    if not value:  # a disagreement of 0 lies within every bound
+    # A disagreement of 0 lies within every bound.
+    if not value:
         return math.inf if value is None else 0.0
     if not tightest:
         return math.inf
@@ -206,9 +202,9 @@ def _share(check: ReportedCheck, subject: int) -> float:
 
 
 def chain_rows(chain: Chain, convention: str) -> list[list[str]]:
-    """Return a table's rows as cells: joint, a, alpha, beta if the chain has any, d, theta.
+    """Return rows of cells: joint, a, alpha, beta if the chain has beta, d, theta.
 
-    The cell of theta (revolute joint) or d (prismatic joint) also contains q.
+    The cell of the joint variable (theta or d) also contains q.
     """
     rows = chain["standard"]["rows"] if convention == "standard" else chain["modified"]["rows"]
     return [_dh_cells(row, has_beta(chain)) for row in rows]
@@ -271,7 +267,6 @@ def check_rows(robot: ReportedRobot) -> list[dict[str, Any]]:
 
 
 def failures(robot: ReportedRobot) -> list[dict[str, Any]]:
-    """Return the rows of the failed checks, the largest ratio of a disagreement to its bound first."""
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),
         key=lambda check: -_sortable(check["share_of_bound"]),

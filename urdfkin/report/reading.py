@@ -34,12 +34,11 @@ from urdfkin.validation.robot_summary import chain_disagreement, reader_disagree
 _WITH_AXIS = ("revolute", "continuous", "prismatic")
 #: nq and nv of each kind of joint.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)} | dict.fromkeys(_WITH_AXIS, (1, 1))
-#: Tolerance of rotation matrices and unit axes; texts may give their numbers with only 6 digits.
+#: Tolerance of rotation matrices and unit axes, because a robot file may have only 6 digits.
 _ROUNDED = 1e-5
 
 
 def frame_names(model: ReportedModel) -> list[str]:
-    """Return the names of the compared frames: every link, then every joint."""
     return [f"link:{name}" for name in model["links"]] + [f"joint:{j['name']}" for j in model["joints"]]
 
 
@@ -48,7 +47,7 @@ def moving_names(model: ReportedModel) -> list[str]:
 
 
 def column_names(model: ReportedModel) -> list[str]:
-    """Return the joint name of each Jacobian column, if mimic joints have their own columns."""
+    """Return the joint name of each column of a Jacobian with separate columns for mimic joints."""
     return [joint["name"] for joint in model["joints"] for _ in range(_SIZES[joint["kind"]][1])]
 
 
@@ -122,9 +121,8 @@ def _numbering(model: ReportedModel) -> Iterator[str]:
         )
 
 
-#: Relative tolerance of recomputed quotients.
 _TOLERANCE = 1e-9
-#: Maximum number of results; a double represents all smaller integers.
+#: Maximum number of results; a double represents all integers up to this number.
 _MOST = 2**53
 
 
@@ -239,8 +237,8 @@ def _check(
         return
     if check["worst"] != worst(check["worst_by_subject"]):
         yield (
-            f"`worst` is {check['worst']}, but {worst(check['worst_by_subject'])} over all"
-            f" {check['subjects']}"
+            f"`worst` is {check['worst']}, but the worst disagreement of all {check['subjects']} is"
+            f" {worst(check['worst_by_subject'])}"
         )
     last = max((i for i, count in enumerate(histogram) if count), default=0)
     if results and last != histogram_bin(_as_number(check["worst"]), edges):
@@ -264,7 +262,8 @@ def _share(check: ReportedCheck) -> Iterator[str]:
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
         yield f"`failed` is {check['failed']} of {check['results']}, but `share_of_bound` is {share:g}"
     if low > high:
-        if share or largest or check["worst_case"]:  # without a comparison, there is no bound
+        # Without a comparison, there is no bound.
+        if share or largest or check["worst_case"]:
             yield f"`bound` is {check['bound']}, but something was compared"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
@@ -276,7 +275,7 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
     case, model = check["worst_case"], robot["model"]
     if case is None:
         if check["worst"] != 0.0 or check["failed"]:
-            yield "`worst_case` is missing, but something disagrees"
+            yield "`worst_case` is missing, but a result disagrees"
         return
     if case["frame"] not in subjects:
         yield f"`worst_case`: {case['frame']} is not one of the compared {check['subjects']}"
@@ -288,8 +287,8 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
     )
     if _as_number(case["disagreement"]) > _as_number(of_frame):
         yield (
-            f"`worst_case` has {case['disagreement']} at {case['frame']}, but its worst disagreement"
-            f" is {of_frame}"
+            f"`worst_case` has {case['disagreement']} at {case['frame']}, but the worst disagreement at"
+            f" {case['frame']} is {of_frame}"
         )
     share, units = _as_number(check["share_of_bound"]), _as_number(case["disagreement"])
     low, high = (share * (bound or 0.0) for bound in check["bound"])
@@ -309,23 +308,14 @@ def _as_number(units: Units) -> float:
     return math.inf if units is None else units
 
 
-#: Maximum number of contradictions in a message.
 _SHOWN = 3
 
 
 def read_document(path: Path) -> Document:
-    """Read and check a document from a file.
-
-    Raises:
-        SourceError: The file cannot be read.
-        InputError: The file is not JSON, is not a validation report, has another version, violates the
-            schema, or contradicts itself.
-    """
     return checked(read_json(path), str(path))
 
 
 def stored_document(folder: Path) -> Document:
-    """Return the document of a store, after the same checks as in `read_document`."""
     from urdfkin.validation.campaign import stored
 
     return checked(stored(folder).as_dict(), str(folder))

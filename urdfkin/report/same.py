@@ -28,12 +28,11 @@ SHOWN = 12
 #: Line for models that differ and whose joints were not matched by name.
 GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
 HEADS = ("frame", "at least", "at most", "angle at most")
-#: The question whether the two robots are equivalent.
 EQUIVALENT = SameQuestion()
-#: Factor above 1: distances up to FACTOR * (rounding error) count as rounding and are not printed.
+#: Distances up to FACTOR * (rounding error) count as rounding errors and are not printed.
 #: The factor covers the rounding errors of sums of several terms.
 FACTOR = 1.001
-#: Heading for joints whose mimic joints can exceed their limits.
+#: Heading for joints that can move a mimic joint beyond the limits of the mimic joint.
 NARROWED = "limits of mimic joints (the bounds of the distance ignore these limits)"
 
 
@@ -69,7 +68,6 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
 
 
 def _within(found: Sameness, most: float) -> str:
-    """Return the answer to `--within`, with the name of a frame that exceeds the distance."""
     limit = f"WITHIN {most:g} m and rad without changes of B: "
     if found.within(most):
         return f"{limit}no frame is ever off by more than {_both(*found.written)}"
@@ -88,7 +86,7 @@ def _both(metres: float, radians: float) -> str:
 
 
 def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
-    """Describe the largest distance and angle between matching frames; empty if they are rounding errors."""
+    """Describe the largest distance and angle between matching frames, unless they are rounding errors."""
 
     def largest(end: str) -> float:
         return max((getattr(frame, end) for frame in frames), default=0.0)
@@ -108,7 +106,7 @@ def _by(frames: Sequence[Interval], rounding: tuple[float, float]) -> str:
 
 
 def _off(frame: Interval, rounding: tuple[float, float]) -> str:
-    """Describe the distance and the angle of two matching frames; empty if they are rounding errors."""
+    """Describe the distance and the angle of two matching frames, unless they are rounding errors."""
     parts = [up_to(length, frame.lower, frame.upper)] if frame.upper > FACTOR * rounding[0] else []
     if frame.radians > FACTOR * rounding[1]:
         parts.append(up_to(angle, frame.radians_seen, frame.radians))
@@ -116,7 +114,6 @@ def _off(frame: Interval, rounding: tuple[float, float]) -> str:
 
 
 def far_frames(found: Sameness) -> list[Interval]:
-    """Return the frames whose bound exceeds rounding, the largest bound first."""
     metres, radians = found.rounding
     far = [frame for frame in found.frames if frame.upper > metres or frame.radians > radians]
     return sorted(far, key=lambda frame: (-frame.upper, -frame.lower))
@@ -137,16 +134,16 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Describe how far a frame of the unchanged B is from A's frame; empty for a rounding error."""
+    """Describe how far a frame of the unchanged B is from A's frame, unless this is a rounding error."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
 
 
 def where(found: Sameness, frame: Interval) -> str:
-    """Return the configuration at which a lower bound is attained, with units.
+    """Describe the configuration at which a lower bound is attained, with units.
 
-    The text has the coordinates of A, and the coordinates of those joints of B that match no joint of A.
+    The text has the nonzero coordinates of A, and of joints of B that match no independent joint of A.
     """
     from urdfkin.model.configuration import coordinate_names, units
 
@@ -161,12 +158,11 @@ def where(found: Sameness, frame: Interval) -> str:
 
 
 def renamed(found: Sameness) -> list[str]:
-    """Return lines about different names of joints and links, and about a different order of joints."""
     pairs = [one for one in found.joints if one.a != one.b]
     guessed = [one for one in pairs if one.b not in spellings(one.a) and one.a not in spellings(one.b)]
     joints = [f"joint {one.a} is {one.b}" for one in pairs]
     joints += [
-        "joints of B have another order, which has no effect on the motion; compared in the order "
+        "joints of B have a different order, without effect on the motion; joints are compared in the order "
         + ", ".join(names)
         for names in found.orders
     ]
@@ -176,7 +172,7 @@ def renamed(found: Sameness) -> list[str]:
 
 
 def document(found: Sameness, question: SameQuestion = EQUIVALENT, *, all_: bool = False) -> TextDocument:
-    """Return the answer with reasons; with `all_`, all lines, otherwise at most `SHOWN` of each kind."""
+    """Return the answer with reasons; without `all_`, at most `SHOWN` lines of each kind."""
     parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(found), strict=True)]
     head = headline(found, question)
     parts.append(Strong(head, "bold green" if found.holds(question) else "bold red"))
@@ -201,27 +197,20 @@ def _names(found: Sameness) -> list[str]:
 
 
 def _worst_case(found: Sameness, frames: Sequence[Interval]) -> list[str]:
-    """Return a line with the first frame's distance and the configuration with this distance, if any."""
     off = attained(frames[0])
     return [f"{frames[0].frame} is {off} off at: {where(found, frames[0])}"] if off else []
 
 
 def _reasons(found: Sameness, *, all_: bool = False) -> tuple[tuple[str, ...], list[str]]:
-    """Return the changes of B and the differences.
-
-    Without `all_`, both lists are empty for the verdict "same up to single precision".
-    """
     if found.up_to_single and not all_:
         return (), []
     return found.after, [one.words for one in found.differences]
 
 
-#: Titles of the columns of the table of pairs.
-PAIRS = ("A", "B", "verdict", "at most apart as written", "single precision")
+PAIRS = ("A", "B", "verdict", "distance bound, as given", "single precision")
 
 
 def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[str, ...]]:
-    """Return the rows of the table with the titles `PAIRS`: one row for each pair of models."""
     rows = list[tuple[str, ...]]()
     for one in found:
         words = "equivalent" if one.verdict is Verdict.SAME_AFTER else one.verdict.value
@@ -237,7 +226,6 @@ def _pair_rows(found: Sequence[Sameness], question: SameQuestion) -> list[tuple[
 
 
 def pairs_document(found: Sequence[Sameness], question: SameQuestion = EQUIVALENT) -> TextDocument:
-    """Return a table of pairs of models, followed by a line for each pair that differs."""
     rows = _pair_rows(found, question)
     different = [
         f"{one.sources[0]} and {one.sources[1]}: {headline(one, question)}"
@@ -253,7 +241,6 @@ def pairs_markdown(found: Sequence[Sameness], question: SameQuestion = EQUIVALEN
 
 
 def as_document(found: Sameness) -> TextDocument:
-    """Return the verdict, its reasons and the frames with the largest distances, for `print`."""
     parts: list[str | Table] = [f"{k}: {name}" for k, name in zip("AB", _names(found), strict=True)]
     after, words = _reasons(found)
     for head, lines in (
@@ -271,7 +258,7 @@ def as_document(found: Sameness) -> TextDocument:
 
 
 def attained(frame: Interval) -> str:
-    """Return in words the distance of two frames at the worst configuration; empty if they coincide."""
+    """Describe the distance of two frames at the worst configuration, unless the frames coincide."""
     if frame.lower:
         return length(frame.lower)
     return angle(frame.radians_seen) if frame.radians_seen else ""
@@ -332,11 +319,7 @@ def as_html(
     options: Sequence[str] = (),
     started: datetime | None = None,
 ) -> str:
-    """Return an HTML page with the answer; the template escapes all names.
-
-    `options` are further options for the command line that the page shows. `started` is the date and time on
-    the page.
-    """
+    """Return an HTML page with the answer; the template escapes all names."""
     from urdfkin.report.html import rendered, when
     from urdfkin.verify.oracles import versions
 
@@ -378,11 +361,11 @@ def command_of(robots: tuple[Robot, Robot], question: SameQuestion, options: Seq
 def pictures(
     found: Sameness, robots: tuple[Robot, Robot], worst: Interval | None, *, written: bool = False
 ) -> list[dict[str, Any]]:
-    """Draw the skeletons of the two robots in two views, and an enlarged picture of the worst frame.
+    """Draw the skeletons of both robots in two views, and an enlarged picture of the worst frame.
 
-    If `worst` is None, the zero configuration is drawn. If `written`, B is drawn without the changes that
-    make B equivalent to A. Each view has a title, a scale bar, and three groups of lines (x, y, x, y): the
-    lines of A, the lines of B, and the lines that connect A with B.
+    Without `worst`, the robots are in the zero configuration. With `written`, B is drawn without the changes
+    that make B equivalent to A. Each view has three groups of lines (x, y, x, y): the lines of A, the lines
+    of B, and the lines that connect A with B.
     """
     a, b = robots
     q_a = np.array(worst.q_a) if worst else a.neutral()
@@ -422,9 +405,8 @@ def _axes(T: FloatArray, size: float) -> FloatArray:
 def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
-    """Project lines along the direction of view, and scale them to the size of the picture."""
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # The first row is the direction in space that points right on the page; the second row points down.
+    # The rows are directions in space: the first points right on the page, the second points down.
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

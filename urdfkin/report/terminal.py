@@ -45,11 +45,7 @@ _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report; the width of the console determines the layout.
-
-    Each failure has the command that computes its worst case again. With `cases`, every check has this
-    command.
-    """
+    """Print a report; with `cases`, every check has the command that computes its worst case again."""
     robots = document["robots"]
     out.print(
         f"worst disagreement with Pinocchio {pinocchio(document)}, in eps*scale (rounding gives 1 to 10)",

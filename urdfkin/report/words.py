@@ -33,7 +33,6 @@ def check_name(check: ReportedCheck | ReportedAccuracyLine) -> str:
 
 
 def second_reader_words(robot: ReportedRobot) -> str:
-    """Return in words whether yourdfpy reads the same tree as urdfkin; empty if there was no comparison."""
     reading = robot.get("second_reader")
     if reading is None:
         return ""
@@ -49,7 +48,7 @@ def second_reader_words(robot: ReportedRobot) -> str:
 
 
 def units(value: Units, *, compared: bool = True) -> str:
-    """Format a disagreement; None is infinity. Return an empty text if nothing was compared."""
+    """Format a disagreement; None means infinity."""
     if not compared:
         return ""
     if value is None:
@@ -65,7 +64,7 @@ def percent(share: Units) -> str:
 
 
 def worst(values: Iterable[Units]) -> Units:
-    """Return the largest value; None means infinity, in the values and in the result."""
+    """Return the largest value; None means infinity."""
     largest = 0.0
     for value in values:
         if value is None:
@@ -75,7 +74,6 @@ def worst(values: Iterable[Units]) -> Units:
 
 
 def quantities(robots: Sequence[ReportedRobot]) -> list[str]:
-    """Return the compared quantities of all robots; known quantities come first, in a fixed order."""
     found = {check["quantity"] for robot in robots for check in robot["checks"]}
     return [q for q in QUANTITIES if q in found] + sorted(found - set(QUANTITIES))
 
@@ -89,7 +87,7 @@ def in_order(robot: ReportedRobot) -> list[ReportedCheck]:
 
 
 def columns(robots: Sequence[ReportedRobot]) -> dict[str, tuple[str, ...]]:
-    """Return the quantities in each column of the table of robots; the key is the heading."""
+    """Map each heading of the table of robots to the quantities in the column."""
     heads: dict[str, tuple[str, ...]] = {}
     for name in quantities(robots):
         head = QUANTITIES[name].head if name in QUANTITIES else name
@@ -102,17 +100,14 @@ def column(robot: ReportedRobot, names: Sequence[str]) -> list[ReportedCheck]:
 
 
 def worst_of(robot: ReportedRobot, names: Sequence[str]) -> str:
-    """Return the text of a cell: the worst disagreement of several quantities in all reference frames."""
     return worst_cell(column(robot, names))
 
 
 def worst_cell(checks: Sequence[ReportedCheck]) -> str:
-    """Return the worst disagreement of checks as text; empty if there are no checks."""
     return units(worst(check["worst"] for check in checks), compared=bool(checks))
 
 
 def share_cell(robot: ReportedRobot) -> str:
-    """Return the largest ratio of a disagreement to its bound as text; empty if nothing was compared."""
     return percent(share_of(robot)) if robot["checks"] else ""
 
 
@@ -128,7 +123,6 @@ def more_accurate(line: ReportedAccuracyLine) -> Literal["urdfkin", "Pinocchio",
 
 
 def more_accurate_counts(lines: Sequence[ReportedAccuracyLine]) -> str:
-    """Return in words how often urdfkin's typical error is smaller, equal or larger than Pinocchio's."""
     counts = Counter(more_accurate(line) for line in lines)
     return (
         f"urdfkin is more accurate in {counts['urdfkin']:,} of {counted(len(lines), 'line')}, equal in "
@@ -137,7 +131,6 @@ def more_accurate_counts(lines: Sequence[ReportedAccuracyLine]) -> str:
 
 
 def accuracy_words(study: ReportedAccuracy) -> str:
-    """Describe the samples, the base's motion and the result of the accuracy study."""
     moving = " on a moving base" if study.get("moving_base") else ""
     return f"{counted(study['samples'], 'sample')}{moving}; {more_accurate_counts(study['lines'])}"
 
@@ -158,7 +151,6 @@ def second_oracle_heads(title: str) -> list[str]:
 
 
 def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[tuple[str, list[str]]]:
-    """Yield (quantity, cells) for each row of the table of the second oracle; a row covers all robots."""
     for name in quantities(robots):
         checks = [check for robot in robots for check in of_quantity(robot, name) if "second_oracle" in check]
         if checks:
@@ -166,9 +158,9 @@ def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[
 
 
 def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str]:
-    """Return the cells of a table row with the headings `second_oracle_heads`, for several checks.
+    """Return the cells of a row below the headings `second_oracle_heads`.
 
-    The cell of a pair of libraries contains the largest ratio of a disagreement to its bound.
+    Each ratio is the largest (disagreement / bound) of all `checks`.
     """
     checks = [check for check in checks if "second_oracle" in check]
     found = [check["second_oracle"] for check in checks]
@@ -188,7 +180,6 @@ def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str
 
 
 def share_of(robot: ReportedRobot) -> Units:
-    """Return the largest ratio of a disagreement to its bound."""
     return worst(check["share_of_bound"] for check in robot["checks"])
 
 
@@ -204,12 +195,10 @@ def summary(document: Document) -> str:
 
 
 def counted(n: int, noun: str) -> str:
-    """Return a number with its noun: `1 robot`, `2 robots`."""
     return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
 
 
 def verdict_counts(document: Document) -> dict[str, int]:
-    """Return the number of robots for each verdict that occurs, the worst verdict first."""
     counts = dict.fromkeys(VERDICTS, 0)
     for robot in document["robots"]:
         counts[robot["verdict"]] += 1

@@ -1,12 +1,12 @@
 """Store results in a cache on disk, with a checksum in each file.
 
 urdfkin executes or unpickles cached files, so another user's file could run any code. A folder is therefore
-used only if no other user can write to it. The name of a folder contains a digest of the source files, so a
-changed source file leads to another folder. A folder that urdfkin has not used for a month is deleted.
+used only if no other user can write to it. The name of a folder contains a digest of the source files, so
+changed source files get a new folder. A folder that urdfkin has not used for a month is deleted.
 
-A truncated or corrupted file could crash the process or cause a wrong result, so such a file is reported and
-replaced. The checksum includes the names of the file and of the folder, because a renamed file could belong
-to another robot.
+A damaged file could crash the process or cause a wrong result, so the file is reported and replaced. The
+checksum includes the names of the file and of the folder, because a renamed file could belong to another
+robot.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import platformdirs
 from urdfkin.errors import SourceError
 from urdfkin.system.files import MOST_DATA, read_bytes, read_if_there
 
-#: Version of the checksum, which is a part of the digest in a folder's name.
+#: Version of the checksum; the digest in a folder's name depends on this version.
 _CHECKSUM_VERSION = "sealed with its name"
 _A_MONTH = 30 * 24 * 3600.0
 #: Name of a file whose modification time is the last use of the folder.
@@ -43,10 +43,9 @@ class CacheWarning(UserWarning):
 
 
 def cache_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | None = None) -> Path | None:
-    """Return a cache folder to which only this user can write; None, with a warning, if impossible.
+    """Return a cache folder to which only this user can write; warn and return None if this is impossible.
 
-    The folder's name is `kind`, followed by a digest of the files `sources` and of the strings `texts`, for
-    example options. `root` is the parent folder; None: the user's cache folder. Missing folders are created.
+    The folder's name is `kind`, followed by a digest of the files `sources` and of the strings `texts`.
     """
     digest = hashlib.sha256("\n".join([_CHECKSUM_VERSION, *texts]).encode())
     for source in sources:
@@ -59,18 +58,19 @@ def cache_folder(kind: str, sources: Iterable[Path], *texts: str, root: Path | N
         if (reason := _unsafe_reason(folder)) is not None:
             say_once(f"the cache is not used: {reason}")
             return None
-    except (OSError, RuntimeError) as error:  # a loop of symbolic links raises RuntimeError
+    # A loop of symbolic links raises RuntimeError.
+    except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         say_once(f"the cache cannot be written in {root}: {reason}; set XDG_CACHE_HOME to another folder")
         return None
-    with contextlib.suppress(OSError):  # files that exist on a full or read-only disk are still readable
+    # On a full or read-only disk, existing files are still readable.
+    with contextlib.suppress(OSError):
         (folder / _USED).touch()
         _delete_unused(root, kind)
     return folder
 
 
 def say_once(message: str) -> None:
-    """Issue a `CacheWarning`, each message at most once per process."""
     if message not in _warned:
         _warned.add(message)
         warnings.warn(message, CacheWarning, stacklevel=3)
@@ -80,7 +80,7 @@ _warned: set[str] = set()
 
 
 def _unsafe_reason(folder: Path) -> str | None:
-    """Return the reason why another user could have written to a folder; None if no other user could.
+    """Return the reason why another user could have written to a folder, or None.
 
     A user who can write to a parent folder without the sticky bit can replace the folder.
     """
@@ -98,7 +98,10 @@ def _unsafe_reason(folder: Path) -> str | None:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group is the user's private group, which many systems create for each user."""
+    """Return whether a group has the user's name and no other member.
+
+    Many systems create such a private group for each user.
+    """
     try:
         name, found = pwd.getpwuid(os.geteuid()).pw_name, grp.getgrgid(group)
     except KeyError:
@@ -133,7 +136,7 @@ def put(place: Path, data: bytes) -> None:
 
 
 def get(place: Path) -> bytes | None:
-    """Return the content of a file that `put` wrote; None for a missing or, with a warning, damaged file."""
+    """Return the content of a file that `put` wrote, or None for a missing or damaged file."""
     try:
         content = read_if_there(place, MOST_DATA)
     except SourceError as error:
@@ -156,5 +159,4 @@ def _checksum(place: Path, data: bytes) -> bytes:
 
 
 def report_damaged(place: Path, reason: str) -> None:
-    """Warn that a cached file is damaged, and that urdfkin computes the content again."""
     say_once(f"{place} is damaged and is computed again: {reason}")

@@ -1,7 +1,7 @@
-"""JSON documents: their common header, their schemas, and functions that read and write them.
+"""JSON documents: the common header, schemas, and functions that read and write documents.
 
-A `TypedDict` defines the entries of a document. urdfkin generates the document's JSON Schema from the
-`TypedDict`, and uses the `TypedDict` to check documents from files. `plain` turns results into documents.
+A `TypedDict` defines the entries and the JSON Schema of a document. Documents from files are checked against
+the `TypedDict`.
 """
 
 from __future__ import annotations
@@ -30,26 +30,18 @@ def of_length(n: int) -> Meta:
     return Meta(min_length=n, max_length=n)
 
 
-#: A count: an integer that is 0 or larger.
 Count = Annotated[int, Meta(ge=0)]
-#: A number that is 0 or larger.
 Size = Annotated[float, Meta(ge=0)]
-#: Homogeneous transform (4, 4) as a list of rows, with the translation in metres.
 Matrix = Annotated[
     list[Annotated[list[float], of_length(4)]],
     of_length(4),
     says("Homogeneous transform (4, 4) as a list of rows, with the translation in metres."),
 ]
-#: The SHA-256 of a text.
 Sha256 = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
 
 class Header(TypedDict):
-    """The first entries of every certificate and report.
-
-    The entries name the kind of document, the verdict, and the package versions and robot texts on which the
-    verdict depends.
-    """
+    """The first entries of every certificate and report."""
 
     schema: Annotated[str, says("Name and version of the layout of this document.")]
     versions: Annotated[
@@ -77,8 +69,6 @@ class DocumentKind(Generic[_T]):
     """A kind of document, for example a certificate.
 
     Attributes:
-        name: Value of the entry "schema": a name, a slash and a version.
-        type: The `TypedDict` of the entries.
         verdicts: The possible verdicts; empty if the document has no header.
         made_by: Command that writes documents of this kind.
         is_open: Whether a document may have unknown entries, for example of a later version of urdfkin.
@@ -91,7 +81,6 @@ class DocumentKind(Generic[_T]):
     is_open: bool = False
 
     def schema(self) -> dict[str, Any]:
-        """Return the JSON Schema (draft 2020-12), with the entries in the order of the `TypedDict`s."""
         parts: dict[str, Any] = msgspec.json.schema(self.type)["$defs"]
         for name, part in parts.items():
             entries = getattr(sys.modules[self.type.__module__], name).__annotations__
@@ -116,7 +105,6 @@ class DocumentKind(Generic[_T]):
         return self.checked(read_json(path), str(path))
 
     def checked(self, data: object, where: str) -> _T:
-        """Return the data of the file `where` as a document; raise InputError for an invalid document."""
         self._demand_name(data, where)
         try:
             document = typed(data, self.type)
@@ -158,7 +146,7 @@ class DocumentKind(Generic[_T]):
 
 
 def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str] | None:
-    """Return the JSON path and the name of an entry of `data` that is not in `document`; None: no entry."""
+    """Return the JSON path and a description of an entry that only `data` has."""
     if isinstance(data, dict):
         if unknown := [name for name in data if name not in document]:
             return place, f"unknown entry {unknown[0]!r}"
@@ -176,7 +164,6 @@ def as_data(value: Any) -> Any:
 
 
 def typed(data: object, type_: type[_T]) -> _T:
-    """Return data as an object of a type; raise ValueError with the path of an invalid entry."""
     try:
         return msgspec.convert(data, type_)
     except msgspec.ValidationError as error:
@@ -184,19 +171,11 @@ def typed(data: object, type_: type[_T]) -> _T:
 
 
 def plain(value: Any) -> Any:
-    """Return a result as plain data for JSON.
-
-    Data classes become objects, enums become their values, and arrays and tuples become lists. Infinity and
-    NaN, which JSON does not have, become None.
-
-    >>> plain({"worst": math.inf, "frames": ("a", "b")})
-    {'worst': None, 'frames': ['a', 'b']}
-    """
+    """Convert a result to data for JSON; infinity and NaN become None."""
     return json.loads(json.dumps(as_data(value)), parse_constant=lambda _: None)
 
 
 def read_json(path: Path) -> object:
-    """Read a JSON file; raise SourceError if the file cannot be read, and InputError like `parse_json`."""
     return parse_json(read_bytes(path, MOST_DATA, pipes=True), str(path))
 
 

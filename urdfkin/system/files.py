@@ -50,7 +50,6 @@ PATIENCE = 10.0
 MOST = 100_000_000
 #: Maximum size of data (trajectories, samples, reports), bytes.
 MOST_DATA = 2_000_000_000
-#: Maximum number of bytes of one read.
 _AT_A_TIME = 2**20
 _KINDS = {
     stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a character device",
@@ -61,7 +60,7 @@ _KINDS = {
 def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
     """Return the content of a file of at most `most` bytes, or raise SourceError.
 
-    With `pipes=True`, for paths that the user named, the function also reads pipes and devices.
+    With `pipes`, the function also reads pipes and devices. Use `pipes` only for paths that the user named.
     """
     data = read_start(path, most + 1, pipes=pipes)
     if len(data) > most:
@@ -70,9 +69,9 @@ def read_bytes(path: Path, most: int = MOST, *, pipes: bool = False) -> bytes:
 
 
 def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
-    """Return the first `count` bytes of a file, or the whole file if it is shorter, like `read_bytes`."""
+    """Return at most the first `count` bytes of a file; `pipes` is as in `read_bytes`."""
     try:
-        # Without O_NONBLOCK, opening a pipe blocks until a writer opens it.
+        # Without O_NONBLOCK, opening a pipe blocks until a writer opens the pipe.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
         try:
             kind = os.fstat(descriptor).st_mode
@@ -87,7 +86,8 @@ def read_start(path: Path, count: int, *, pipes: bool = False) -> bytes:
             os.close(descriptor)
     except SourceError:
         raise
-    except (OSError, ValueError) as error:  # a null character in the name raises ValueError
+    # A null character in the name raises ValueError.
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise SourceError("cannot be read", where=shortened(path), found=reason) from error
 
@@ -112,7 +112,6 @@ def _check_regular(path: Path, kind: int) -> None:
 
 
 def read_if_there(path: Path, most: int = MOST) -> bytes | None:
-    """Return the content of a file like `read_bytes`; None if the file does not exist."""
     try:
         return read_bytes(path, most)
     except SourceError as error:
@@ -122,7 +121,6 @@ def read_if_there(path: Path, most: int = MOST) -> bytes | None:
 
 
 def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
-    """Return the text of a UTF-8 file like `read_bytes`; the file may begin with a byte order mark."""
     try:
         return read_bytes(path, most, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -132,7 +130,6 @@ def read_text(path: Path, most: int = MOST, *, pipes: bool = False) -> str:
 
 
 def read_standard_input(most: int = MOST) -> bytes:
-    """Return the content of standard input, at most `most` bytes, or raise SourceError."""
     data = read_start_of_standard_input(most + 1)
     if len(data) > most:
         raise _too_large("standard input", most)
@@ -140,9 +137,9 @@ def read_standard_input(most: int = MOST) -> bytes:
 
 
 def read_start_of_standard_input(count: int) -> bytes:
-    """Return at most the first `count` bytes of standard input, or raise SourceError."""
     try:
-        if sys.stdin is None:  # the parent process closed standard input
+        # The parent process may have closed standard input.
+        if sys.stdin is None:
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
         data: bytes = sys.stdin.buffer.read(count)
     except OSError as error:
@@ -151,15 +148,15 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; True for a path that is too long, so that reading reports the error."""
+    """Return whether a path exists; a path that is too long counts as existing."""
     try:
         return path.exists()
     except OSError:
+        # The error is reported when the path is read.
         return True
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether a path is a folder; a name that is too long is not a folder."""
     try:
         return path.is_dir()
     except OSError:
@@ -167,7 +164,6 @@ def is_folder(path: Path) -> bool:
 
 
 def at_home(name: str | os.PathLike[str]) -> Path:
-    """Expand `~` to the home folder, if the home folder is known."""
     try:
         return Path(name).expanduser()
     except RuntimeError:
@@ -202,11 +198,7 @@ def _read_up_to(count: int, descriptor: int, first: bytes) -> bytes:
 
 
 def _first_of_pipe(descriptor: int, path: Path) -> bytes:
-    """Return the first available bytes of a pipe, or b"" if a connected writer has written nothing yet.
-
-    Raises:
-        SourceError: no process opens the pipe for writing within `PATIENCE` seconds.
-    """
+    """Return available bytes of a pipe; raise SourceError if no writer connects within `PATIENCE` seconds."""
     events = select.poll()
     events.register(descriptor, select.POLLIN)
     end = time.monotonic() + PATIENCE
@@ -214,7 +206,8 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
         try:
             if piece := os.read(descriptor, _AT_A_TIME):
                 return piece
-        except BlockingIOError:  # a writer is connected
+        # A writer is connected, but has written nothing yet.
+        except BlockingIOError:
             return b""
         # POLLHUP means that a writer has connected and then closed the pipe.
         if any(event & select.POLLHUP for _, event in events.poll(0)):
@@ -229,12 +222,9 @@ def _first_of_pipe(descriptor: int, path: Path) -> bytes:
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all: write a temporary file in the same folder, and rename it.
+    """Write a file completely or not at all; raise SourceError if this fails.
 
     A link is followed. A device or a pipe, such as `/dev/null`, is written directly.
-
-    Raises:
-        SourceError: the file cannot be written, for example without permission or on a full disk.
     """
     name = ""
     try:
@@ -242,7 +232,8 @@ def write_file(path: Path, data: bytes) -> None:
             path.write_bytes(data)
             return
         path = path.resolve()
-        if path.exists() and not os.access(path, os.W_OK):  # a rename would ignore this permission
+        # Renaming the temporary file would ignore a missing write permission.
+        if path.exists() and not os.access(path, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
         import tempfile

@@ -21,9 +21,7 @@ class Version:
     """The files of one commit of a git repository.
 
     Attributes:
-        root: The repository's root folder.
         files: Git's digest of the content of each file, by the name relative to `root`.
-        digests: The digests of all files.
         gone: Base names of the files that no longer exist in the working tree.
     """
 
@@ -36,7 +34,6 @@ class Version:
         return Path(os.path.relpath(path.resolve(), self.root)).as_posix()
 
     def holds(self, data: bytes) -> bool:
-        """Return whether any file of this commit has exactly this content."""
         blob = b"blob %d\0" % len(data) + data
         return any(
             hashlib.new(kind, blob, usedforsecurity=False).hexdigest() in self.digests
@@ -44,18 +41,12 @@ class Version:
         )
 
     def changed(self, endings: tuple[str, ...]) -> bool:
-        """Return whether a file with one of the suffixes `endings` has changed since this version."""
         names = (name for name in self.files if name.endswith(endings))
         return not all(
             (self.root / name).is_file() and self.holds(read_bytes(self.root / name)) for name in names
         )
 
     def read(self, path: Path) -> bytes | None:
-        """Return the content of a file in this version; None if the file did not exist.
-
-        Raises:
-            SourceError: git failed, or the file was larger than `MOST` bytes.
-        """
         if (digest := self.files.get(self.name(path))) is None:
             return None
         if int(size := _text("cat-file", "-s", digest, cwd=self.root)) > MOST:
@@ -69,11 +60,7 @@ class Version:
 
 
 def version_before(reference: str, folder: Path) -> Version:
-    """Return the merge base of the current commit and a reference (a branch, tag or commit).
-
-    Raises:
-        SourceError: git is not installed, the folder is in no repository, or there is no merge base.
-    """
+    """Return the merge base of HEAD and a branch, tag or commit, or raise SourceError."""
     root = Path(os.fsdecode(_git("rev-parse", "--show-toplevel", cwd=folder).rstrip(b"\n")))
     try:
         commit = _text(
@@ -100,7 +87,7 @@ def _text(*words: str, cwd: Path) -> str:
 
 
 def _git(*words: str, cwd: Path) -> bytes:
-    # git must not fetch, prompt or start a pager.
+    # These variables prevent git from fetching, prompting, starting a pager or translating messages.
     environ = os.environ | {
         "GIT_NO_LAZY_FETCH": "1",
         "GIT_TERMINAL_PROMPT": "0",

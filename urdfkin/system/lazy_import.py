@@ -1,6 +1,6 @@
 """Lazy imports, versions of installed packages, and hooks.
 
-A hook is a function with a name, which a module can call without importing the function's module.
+A hook is a named function that a module can call without importing the module of the function.
 `urdfkin/__init__.py` registers the hooks.
 """
 
@@ -47,8 +47,8 @@ def installed_version(package: str) -> str | None:
         for name in os.listdir(entry):  # noqa: PTH208
             if name.startswith(start) and name.endswith(end):
                 return name[len(start) : -len(end)]
-    # `metadata` imports many modules, which files in the current folder could replace at the start of
-    # urdfkin.
+    # `metadata` imports many modules. At the start of urdfkin, files in the current folder could replace
+    # these modules.
     from importlib import metadata
 
     try:
@@ -70,16 +70,11 @@ EXTRAS = {
 
 
 def install_remedy(extra: str) -> str:
-    """Return the command that installs the package of an extra; no package index has `urdfkin[...]` yet.
-
-    >>> install_remedy("usd")
-    "pip install 'usd-core>=25.5'"
-    """
+    """Return the command that installs the package of an extra; no package index has `urdfkin[...]` yet."""
     return f"pip install '{EXTRAS[extra]}'"
 
 
 def own_version() -> str:
-    """Return the version of urdfkin, or the text "of a checkout" if urdfkin is not installed."""
     return installed_version("urdfkin") or "of a checkout"
 
 

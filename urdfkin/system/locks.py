@@ -48,9 +48,10 @@ class _ImportLock:
     Without this lock, another thread could fork a child during the import, and the child would wait for ever
     for the end of the import.
 
-    A fork also acquires the lock of `logging`, which an imported module may need. To avoid a deadlock, a fork
-    must acquire the import lock before the lock of `logging`. Python calls registered functions in reverse
-    order of registration, so `register` imports `logging` before it registers `_before_fork`.
+    A fork also acquires the lock of `logging`, and an imported module may need that lock. To avoid a
+    deadlock, a fork must acquire the import lock before the lock of `logging`. Python calls registered
+    functions in reverse order of registration, so `register` imports `logging` before registering
+    `_before_fork`.
     """
 
     def __init__(self) -> None:
@@ -58,7 +59,8 @@ class _ImportLock:
         _locks.append(self._lock)
 
     def register(self) -> None:
-        if self._registered:  # a module may call `register` while another thread imports it
+        # A module may call `register` while another thread imports that module.
+        if self._registered:
             return
         with self._lock:
             if not self._registered:

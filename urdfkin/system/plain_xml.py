@@ -13,13 +13,10 @@ from urdfkin.errors import QuestionsSection
 
 
 def plain_xml(text: str) -> Element:
-    """Return the root element of a URDF; raise expat.ExpatError if the text is not well-formed.
-
-    >>> plain_xml("<robot><drake:x/></robot>")[0].tag
-    'drake:x'
-    """
+    """Return the root element of a URDF; raise expat.ExpatError if the text is not well-formed."""
     builder = TreeBuilder()
-    parser = expat.ParserCreate("utf-8")  # expat ignores namespaces without a separator
+    # Without a namespace separator, expat ignores namespaces.
+    parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end

@@ -24,9 +24,10 @@ _ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
 
 
 def own_python(code: str, *, options: Sequence[str] = ()) -> list[str]:
-    """Return a command that runs code in a new interpreter with the given options.
+    """Return a command that runs code in a new interpreter.
 
-    The new interpreter imports from all folders of `sys.path`, except the current folder.
+    The new interpreter imports from the folders of `sys.path`, except the current folder and Dask's temporary
+    folder.
     """
     return [sys.executable, "-I", *options, "-c", f"import sys; sys.path[:] = {_path()!r}; {code}"]
 
@@ -43,12 +44,10 @@ def _is_scratch(entry: str) -> bool:
 
 
 def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:
-    """Run a process with a minimal environment, and with a request on standard input.
+    """Run a process with a minimal environment and a request on standard input.
 
-    The process is killed after `patience` seconds, and after more than `most` bytes of output.
-
-    Returns:
-        The output, at most `most` + 1 bytes, and the exit status; None after a timeout.
+    The process is killed after `patience` seconds, and after more than `most` bytes of output. Return at most
+    `most` + 1 bytes of output, and the exit status; after a timeout, the status is None.
     """
     import subprocess
 
@@ -105,9 +104,6 @@ def with_stack(size: int, function: Callable[[], _T]) -> _T:
     """Return `function()`, called on a stack of at least `size` bytes.
 
     Pinocchio and its parser are recursive: a chain of about 3,000 links overflows a stack of 8 MiB.
-
-    >>> with_stack(64 * 2**20, lambda: 6 * 7)
-    42
     """
     from concurrent.futures import Future
 
@@ -119,7 +115,8 @@ def with_stack(size: int, function: Callable[[], _T]) -> _T:
         except BaseException as error:
             future.set_exception(error)
 
-    with _stack_size_lock:  # the stack size is a global setting of the process
+    # The stack size is a global setting of the process.
+    with _stack_size_lock:
         before = threading.stack_size(max(size, _USUAL_STACK))
         try:
             thread = threading.Thread(target=run)

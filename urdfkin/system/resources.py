@@ -21,7 +21,7 @@ def questions_page() -> Path:
 
 
 def _file(what: str, *paths: str) -> Path:
-    """Return the first of `paths` that exists; they are relative to the folder that contains the package."""
+    """Return the first existing path; `paths` are relative to the folder that contains the package."""
     here = Path(__file__).resolve().parents[2]
     if (file := next((path for path in map(here.joinpath, paths) if path.is_file()), None)) is None:
         raise SourceError(
@@ -32,7 +32,6 @@ def _file(what: str, *paths: str) -> Path:
 
 @cache
 def example_robots_dir() -> Path:
-    """Return the folder `share/example-robot-data/robots` without importing that package."""
     candidates = list(_example_candidates())
     for folder in candidates:
         if folder.is_dir():
@@ -55,6 +54,6 @@ def _example_candidates() -> Iterator[Path]:
         pass
     spec = importlib.util.find_spec("pinocchio")
     if spec is not None and spec.origin is not None:
-        # <prefix>/lib/python3.x/site-packages/pinocchio/__init__.py
+        # `origin` is <prefix>/lib/python3.x/site-packages/pinocchio/__init__.py.
         yield from (prefix / below for prefix in Path(spec.origin).parents[4:5])
     yield Path(sys.prefix) / below
