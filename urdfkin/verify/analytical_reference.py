@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Arrays of floats, or of the fifty-digit numbers of the accuracy study.
 Numbers = NDArray[Any]
 
 
@@ -29,10 +28,8 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     The derivative of each angle is the dot product of the angular velocity and a vector of the reciprocal
     basis of the three axes.
 
-    Args:
-        name: SciPy's name of the sequence: capital letters mean body axes, small letters mean fixed axes.
-        R: (..., 3, 3) rotation from body axes to world axes.
-        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in world axes.
+    `name` is SciPy's name of the sequence: capital letters mean body axes, small letters fixed axes. R (...,
+    3, 3) rotates body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian in world axes.
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)
@@ -42,7 +39,7 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     sign = 1.0 if k == i else float(np.linalg.det(np.eye(3)[[j, i, k]]))
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = sign * n / length
-        volume = -sign * length  # first . (middle x third)
+        volume = -sign * length  # The volume is first . (middle x third).
         reciprocal = [np.cross(middle, third) / volume, middle, np.cross(first, middle) / volume]
     rows = np.stack(reciprocal[::-1] if name.islower() else reciprocal, axis=-2)
     return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), length[..., 0]

@@ -22,7 +22,6 @@ from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason why results of calls with verify=False are unchecked.
 CHECK_TURNED_OFF = "the check was turned off by verify=False"
-#: Lock for all ledgers.
 _ledger_lock = lock_over_forks()
 
 
@@ -77,12 +76,8 @@ class VerificationError(UrdfkinError):
 class CertificateLine:
     """The line of a certificate about one quantity.
 
-    Attributes:
-        checked: Number of results that the oracle confirmed.
-        worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
-            scale.
-        share: Largest ratio of a difference to its bound.
-        unchecked: Number of results that were not checked.
+    `checked` counts the results that the oracle confirmed. `worst` is the largest difference in multiples of
+    eps * scale, and `share` the largest ratio of a difference to its bound.
     """
 
     quantity: str
@@ -252,8 +247,8 @@ class Account:
     Attributes:
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         turned_off: Number of results of calls with verify=False.
-        counters: A pair (array, index) for each fast evaluator without checks: array[index] is the number of
-            results that the evaluator has returned.
+        counters: A pair (array, index) for each fast evaluator without checks. The number of results of this
+            evaluator is array[index].
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)
@@ -267,7 +262,6 @@ class Account:
         return CertificateLine(quantity, found.results, found.worst, found.share, unchecked)
 
     def turned_off_in_all(self) -> int:
-        """Return the number of results of calls with verify=False, and of fast evaluators without checks."""
         return self.turned_off + sum(int(counts[index]) for counts, index in self.counters)
 
 
@@ -279,7 +273,6 @@ class Ledger:
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """Return the counts of a quantity; later calls return the same object."""
         if (known := self._accounts.get(quantity)) is not None:
             return known
         with _ledger_lock:

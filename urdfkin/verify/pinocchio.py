@@ -48,9 +48,8 @@ _REQUIREMENT = "'pin>=4,<5'"
 def pinocchio() -> Any:
     """Return the module of Pinocchio.
 
-    Raises:
-        InstallationError: Pinocchio is not installed, has an unsupported version, or is a different project
-            of the same name.
+    Raises InstallationError if Pinocchio is missing or unsupported, or if another project has the module's
+    name.
     """
     try:
         import pinocchio as module
@@ -116,14 +115,14 @@ _SHALLOW = 100
 #: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MOST_RATES = 315
 
-#: Number of floating-point values in a block of results; such a block fits into the processor's cache.
+#: Number of floating-point values in a block of results that fits into the processor's cache.
 _BLOCK_SIZE = 16384
 #: Function (n) that returns the results for the next n configurations.
 _Next = Callable[[int], list[FloatArray]]
 #: Name of the free-flyer of a moving base.
 _BASE = "base"
 
-#: Character before link names while Pinocchio reduces a model; XML does not allow it in names.
+#: Prefix of link names while Pinocchio reduces a model; XML does not allow this character in names.
 _LINK_MARK = "\x01"
 
 
@@ -138,20 +137,14 @@ def build_model(
 ) -> Any:
     """Return Pinocchio's model of a URDF text.
 
-    Pinocchio would crash the process in two cases. A robot that needs too much memory is rejected. A long
-    chain of links is parsed with a larger stack.
+    Without enough memory or stack, Pinocchio would crash the process. A robot with too many joint velocities
+    is therefore rejected, and a long chain of links is parsed with a larger stack.
 
-    Args:
-        text: The URDF text.
-        tree: urdfkin's tree of the text, from which the size of the model is computed.
-        root_joint: Kind of the joint between the world and the root: "floating" or "planar"; None: fixed.
-        mimic: True: the mimic joints follow their mimic rules. False: each mimic joint is independent.
-        lock: Value (rad or m) of each locked joint, which `buildReducedModel` removes from the model.
-        coupled: Whether a locked joint also locks the joints that mimic the locked joint.
+    `root_joint` is the kind of the joint between the world and the root: "floating" or "planar", or None for
+    a fixed root. `buildReducedModel` removes the joints in `lock`, with values in rad or m. With `coupled`,
+    the joints that mimic a locked joint are also locked.
 
-    Raises:
-        OracleError: Pinocchio does not accept the text, or the robot is too large.
-        InstallationError: Pinocchio is missing, or the module `pinocchio` belongs to a different project.
+    Raises OracleError if Pinocchio does not accept the text, or if the robot is too large.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MOST_RATES:
@@ -169,7 +162,6 @@ def build_model(
 
 
 def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool) -> Any:
-    """Return a model without the locked joints, by `buildReducedModel`."""
     pin, q = pinocchio(), pinocchio().neutral(model)
     rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if coupled else {}
     locked = locked_by_rules(lock, rules)
@@ -228,8 +220,7 @@ class PinocchioOracle(Oracle):
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames.
 
-        The base's frame takes the place of the world's frame in the list of frames. A root joint of the robot
-        stays in the model.
+        The base's frame takes the place of the world's frame in the list of frames.
         """
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
         # `appendModel` rejects a link with the name of a joint or of the free-flyer.
@@ -274,7 +265,6 @@ class PinocchioOracle(Oracle):
     # -- quantities ----------------------------------------------------------------------------------
 
     def placements(self, x: QueryBatch) -> FloatArray:
-        """Return T_world_frame (n, frames, 4, 4) by `updateFramePlacement`."""
         pin = self._pin
         return self._collected(
             (4, 4),
@@ -285,11 +275,9 @@ class PinocchioOracle(Oracle):
         )
 
     def velocities(self, x: QueryBatch) -> FloatArray:
-        """Return velocities (n, frames, 6) by `getFrameVelocity`."""
         return self._six(x, 2, self._pin.getFrameVelocity)
 
     def accelerations(self, x: QueryBatch) -> FloatArray:
-        """Return classical accelerations (n, frames, 6) by `getFrameClassicalAcceleration`."""
         return self._six(x, 3, self._pin.getFrameClassicalAcceleration)
 
     def _six(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
@@ -303,11 +291,6 @@ class PinocchioOracle(Oracle):
         )
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
-        """Return Jacobians (n, frames, 6, nv).
-
-        `computeFrameJacobian` computes the Jacobian of a single frame, `getFrameJacobian` the Jacobians of
-        several frames, and `getJointJacobian` the Jacobians of joints.
-        """
         pin = self._pin
         if len(x.frames) == 1 and not (x.joints or x.divided):
             shape = len(x.inputs[0]), 1, 6, self._model.nv
@@ -316,7 +299,6 @@ class PinocchioOracle(Oracle):
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians; for a single frame, in blocks of configurations that fit into the cache."""
         if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return
@@ -330,7 +312,6 @@ class PinocchioOracle(Oracle):
         return lambda n: list(islice(found, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
-        """Return J-dot (n, frames, 6, nv) by Pinocchio's functions for frames or for joints."""
         pin = self._pin
         get = pin.getJointJacobianTimeVariation if x.joints else pin.getFrameJacobianTimeVariation
         return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
@@ -401,7 +382,6 @@ class PinocchioOracle(Oracle):
 
 
 def _stacked(compute: _Next, *shape: int) -> FloatArray:
-    """Return all results of `compute` in one array of the given shape (n, frames, ...)."""
     out = np.empty(shape)
     for _ in _blocks(compute, shape[0], out):
         pass

@@ -31,10 +31,11 @@ from urdfkin.verify.oracle import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Two programs compute a rotation matrix from the same angles: bound on the difference of two entries.
-#: A sine and a cosine have an error of one eps each; two products and a sum (at most 1), half an eps each.
+#: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
+#: A sine and a cosine have an error of one eps each.
+#: Two products and a sum of at most 1 have an error of half an eps each.
 _ROTATION = 9.0 * EPS
-#: Two programs normalise the same axis: bound on the difference of two components.
+#: Bound on the difference of a component of an axis that two programs normalise.
 #: The length has an error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
 #: An axis is normalised if its length differs from 1 by at most this number.
@@ -43,7 +44,7 @@ _UNIT = 1e-6
 _LISTED = 8
 #: Maximum number of quoted characters of an error of yourdfpy.
 _QUOTED = 200
-#: Kinds of joints with position limits in the specification.
+#: Kinds of joints that have position limits in the URDF specification.
 _BOUNDED = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -53,12 +54,8 @@ _VELOCITY_EFFORT = ("velocity", "effort")
 class SecondReading:
     """Result of the comparison with yourdfpy's tree.
 
-    Attributes:
-        by: Name and version of yourdfpy.
-        joints: Number of compared joints, fixed joints included.
-        differences: Differences between the trees, due to an unknown error of urdfkin or of yourdfpy.
-        known: Differences due to known faults of yourdfpy.
-        unread: Reason why yourdfpy cannot read the text; None if yourdfpy can.
+    `joints` counts fixed joints too. `differences` result from an unknown error of urdfkin or of yourdfpy,
+    and `known` from known faults of yourdfpy. `unread` is the reason why yourdfpy cannot read the text.
     """
 
     by: str
@@ -73,19 +70,16 @@ def second_reading(
 ) -> SecondReading:
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
 
-    Args:
-        text: The URDF text.
-        tree: urdfkin's tree of the text.
-        mimic: Whether the tree couples mimic joints; if not, the mimic rules are not compared.
-        root_joint: Whether `load` has added the first joint and link of the tree, which the text does not
-            contain.
+    Without `mimic`, the mimic rules are not compared. `root_joint` states that `load` has added the first
+    joint and link of the tree, which are not in the text.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    if "<!DOCTYPE" in text:  # yourdfpy would read the files that the document type declaration names
+    # yourdfpy would read the files that a document type declaration names.
+    if "<!DOCTYPE" in text:
         return SecondReading(by, unread="the file has a document type")
     try:
         robot = read(text)
-    except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions
+    except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions.
         words = " ".join(str(error).split()) or "no message"
         return SecondReading(by, unread=printable(f"{type(error).__name__}: {words}")[:_QUOTED])
     ours = {
@@ -114,7 +108,7 @@ def second_reading(
 
 def read(text: str) -> yourdf.Robot:
     """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
-    import yourdfpy  # yourdfpy imports trimesh, which is slow
+    import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
     # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
@@ -130,7 +124,7 @@ def read(text: str) -> yourdf.Robot:
 def _differences(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield each difference of a joint, and the known fault of yourdfpy that explains it ("": no fault)."""
+    """Yield each difference of a joint, with yourdfpy's known fault that explains it, or an empty text."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""
@@ -167,7 +161,6 @@ def _limit(joint: yourdf.Joint) -> dict[str, float] | None:
 
 
 def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
-    """Return yourdfpy's mimic rules of moving joints, with chains of mimic joints resolved."""
     return resolved_rules(
         {
             name: Mimic(joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
@@ -189,7 +182,6 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield a line for each name whose number of occurrences differs between the two readers."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:

@@ -234,7 +234,7 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # A lower bound that is not finite becomes 0; an upper bound that is not finite becomes inf.
+    # A lower bound of NaN becomes 0, and an upper bound of NaN becomes inf.
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 

@@ -80,22 +80,15 @@ def read_usd(
 ) -> UsdReading:
     """Read the robot of a USD file in a process with limits on time (s) and memory.
 
-    OpenUSD's readers also read the stage and the files to which it refers, for `check_usd_source`.
+    OpenUSD's readers also read the stage and the files to which it refers, for `check_usd_source`. `variants`
+    contains pairs (variant set, variant), and `articulation` a path or a name.
 
-    Args:
-        source: Path of the USD file.
-        variants: Pairs (variant set, variant) to select.
-        articulation: Path or name of the articulation; None: the stage has only one.
-        patience: Time limit, s.
-
-    Raises:
-        SourceError: the file cannot be read or is too large.
-        InputError: OpenUSD is not installed, does not accept the file, or takes too much time or memory; or
-            the robot has a joint that urdfkin does not support.
+    Raises SourceError if the file cannot be read. Raises InputError if OpenUSD is missing, rejects the file
+    or exceeds a limit, or if the robot has an unsupported joint.
     """
     version()
     path = at_home(source)
-    read_bytes(path)  # raises the usual error if the file is missing
+    read_bytes(path)  # `read_bytes` raises the usual error if the file is missing.
     request = {
         "path": os.path.realpath(path),
         "name": str(path),
@@ -122,11 +115,8 @@ def read_usd(
 def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
     """Compare a robot with the data that OpenUSD reads from the same stage.
 
-    Returns:
-        A sentence for the certificate, and remarks about prims whose placements differ.
-
-    Raises:
-        OracleError: OpenUSD's parser and urdfkin disagree about a joint.
+    Returns a sentence for the certificate, and remarks about prims whose placements differ. Raises
+    OracleError if OpenUSD's parser and urdfkin disagree about a joint.
     """
     joints = read.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
@@ -144,8 +134,8 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
     Let u = `SINGLE` be the relative error of one rounding to single precision.
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
-      quaternions adds 4 u to each number. The vector of the four errors has the length 8 u, and the angle
-      error is twice this length, 16 u. The sum is `_ROTATION` u.
+      quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
+      is twice this length, 16 u. The sum is `_ROTATION` u.
     - Origin: three rounding errors (`_ORIGIN`): of the scale factor, of the scaled origin, and of the
       transformed origin.
     """
@@ -275,7 +265,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
-    if tree.links[0] in prims:  # the root's pose in the stage is arbitrary, so all poses are relative to it
+    # The root's pose in the stage is arbitrary, so all poses become relative to the root.
+    if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
     of_links = single_precision(tree, answer["single"]).links
@@ -311,7 +302,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         words = (
             f"UsdGeom places {len(remarks)} of the {len(prims)} prims elsewhere, by up to {worst[0]:.3g} m"
         )
-        # An error of one body displaces all bodies after it, so only the first difference is reported.
+        # An error of one body displaces all later bodies, so only the first difference is reported.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

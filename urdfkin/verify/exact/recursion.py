@@ -67,7 +67,7 @@ def move(
 ) -> ExactMotion:
     """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
-    `joints` is a result of `read_exact`, in which each joint comes after the joints between it and the root.
+    In `joints`, a result of `read_exact`, each joint comes after the joints between the joint and the root.
     """
     q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
@@ -141,13 +141,11 @@ def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Refer
 
 
 def jacobian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the Jacobian (6, nv) of a link."""
     found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
 def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the time derivative (6, nv) of a link's Jacobian."""
     found = _RECURSION.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
