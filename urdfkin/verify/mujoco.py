@@ -238,7 +238,6 @@ class MujocoOracle(Oracle):
         return out
 
     def _moved(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return placements, velocities and classical accelerations in LOCAL_WORLD_ALIGNED."""
         velocity, acceleration = np.empty((2, len(x.q), len(x.frames), 6))
 
         def read(body: int, at: tuple[int, int]) -> None:
@@ -422,7 +421,6 @@ def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]
 
 
 def _scalar_first(quaternion: FloatArray) -> FloatArray:
-    """Return quaternions in MuJoCo's order (w, x, y, z)."""
     return np.roll(quaternion, 1, axis=-1)
 
 

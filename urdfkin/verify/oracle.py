@@ -51,10 +51,7 @@ from urdfkin.verify.bounds import KERNELS
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return the mimic rule of each joint in `joints`, resolved to an independent joint.
-
-    Raises ValueError for an invalid number, and ExpatError for invalid XML.
-    """
+    """Return the mimic rule of each joint in `joints`, resolved to an independent joint."""
     if "mimic" not in text:
         return {}
     rules = {
@@ -106,10 +103,7 @@ _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
-    """First indices of a joint in q and v, in Pinocchio (`full_q`, `full_v`) and in urdfkin.
-
-    `sizes` is the pair (nq, nv) in Pinocchio.
-    """
+    """First indices of a joint in q and v, in Pinocchio (`full_q`, `full_v`) and in urdfkin."""
 
     sizes: tuple[int, int]
     full_q: int
@@ -410,10 +404,9 @@ class BaseRows(NamedTuple):
 class QueryBatch(NamedTuple):
     """The arguments of a call for an oracle, with one batch axis: q (n, nq), v and a (n, nv) in `inputs`.
 
-    Attributes:
-        joints: Use the library's functions for joints; `frames` contains `JointFrame` objects.
-        divided: `frames` is a section of a longer list. Even for one frame, the oracle then uses its function
-            for several frames, because its function for a single frame may round differently.
+    If `joints` is True, `frames` contains `JointFrame` objects. If `divided` is True, `frames` is a section
+    of a longer list. Even for one frame, the oracle then uses its function for several frames, because its
+    function for a single frame may round differently.
     """
 
     frames: Sequence[str]
@@ -517,7 +510,6 @@ class OracleQuery:
 
 
 def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
-    """Return the mimic rules of some joints; raise OracleError if a rule cannot be read."""
     try:
         return rules_of_text(text, set(joints))
     except (ValueError, ExpatError) as error:
@@ -529,20 +521,12 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 class Oracle:
     """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    A subclass builds the library's model in `__init__`. The methods for quantities return arrays (n, frames,
-    ...).
+    A subclass builds the library's model in `__init__`. Results have the shape (n, frames, ...).
+    `moving_base` connects the world and the root by a free-flyer. `root_joint` is the kind of a root joint
+    that the tree contains, but not the text. `lock` contains the values (rad or m) of locked joints.
+    `new_data` returns a new data structure of the library, for one thread.
 
-    - `tree`: urdfkin's tree of the text; its joints are compared with the joints in the library's model.
-    - `mimic`: couple mimic joints; otherwise, every mimic joint moves freely.
-    - `moving_base`: connect the world and the root by a free-flyer.
-    - `root_joint`: kind of the root joint that urdfkin has added to the tree; the text does not contain this
-      joint.
-    - `lock`: value (rad or m) of each locked joint, which is a fixed joint in the tree.
-    - `new_data`: function that returns a new data structure of the library, for one thread.
-
-    Raises:
-        OracleError: the library does not accept the text, or reads other joints from it.
-        InstallationError: the library is missing.
+    Raises OracleError if the library does not accept the text, or reads other joints from the text.
     """
 
     title: ClassVar[str]
@@ -563,10 +547,7 @@ class Oracle:
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
     def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
-        """Return the mimic rules of `joints`, the library's moving joints.
-
-        Raises OracleError if the joints or their order differ from the tree's.
-        """
+        """Return the mimic rules of `joints`; raise OracleError if the tree has other joints."""
         tree = self.tree
         rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}
         coordinates = [name for name in joints if name not in rules]
@@ -593,7 +574,6 @@ class Oracle:
         raise NotImplementedError
 
     def velocities(self, x: QueryBatch) -> FloatArray:
-        """Return velocities (n, frames, 6)."""
         raise NotImplementedError
 
     def accelerations(self, x: QueryBatch) -> FloatArray:
@@ -601,7 +581,6 @@ class Oracle:
         raise NotImplementedError
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
-        """Return Jacobians (n, frames, 6, nv)."""
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
@@ -609,7 +588,6 @@ class Oracle:
         yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
-        """Return J-dot (n, frames, 6, nv)."""
         raise NotImplementedError
 
     def hessians(self, x: QueryBatch) -> FloatArray:
@@ -627,9 +605,8 @@ class Oracle:
 def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
-    The columns of J_full listed in `columns` are added in this order. `index` and `factor` contain the index
-    in v and the nonzero element of G for each column of J_full. The kernel and NumPy return identical
-    results.
+    Each column of J_full has an index in v (`index`) and a nonzero element of G (`factor`). The kernel and
+    NumPy return identical results.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:

@@ -46,11 +46,7 @@ _REQUIREMENT = "'pin>=4,<5'"
 
 
 def pinocchio() -> Any:
-    """Return the module of Pinocchio.
-
-    Raises InstallationError if Pinocchio is missing or unsupported, or if another project has the module's
-    name.
-    """
+    """Return Pinocchio's module; raise InstallationError if Pinocchio is missing or unsupported."""
     try:
         import pinocchio as module
     except ImportError as error:
@@ -135,16 +131,14 @@ def build_model(
     lock: Mapping[str, float] = MappingProxyType({}),
     coupled: bool = True,
 ) -> Any:
-    """Return Pinocchio's model of a URDF text.
+    """Return Pinocchio's model of a URDF text; raise OracleError if the text is rejected or the robot too
+    large.
 
     Without enough memory or stack, Pinocchio would crash the process. A robot with too many joint velocities
     is therefore rejected, and a long chain of links is parsed with a larger stack.
 
-    `root_joint` is the kind of the joint between the world and the root: "floating" or "planar", or None for
-    a fixed root. `buildReducedModel` removes the joints in `lock`, with values in rad or m. With `coupled`,
-    the joints that mimic a locked joint are also locked.
-
-    Raises OracleError if Pinocchio does not accept the text, or if the robot is too large.
+    `root_joint` is "floating" or "planar", or None for a fixed root. The values in `lock` are in rad or m.
+    With `coupled`, the joints that mimic a locked joint are also locked.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MOST_RATES:
@@ -218,10 +212,7 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames.
-
-        The base's frame takes the place of the world's frame in the list of frames.
-        """
+        """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
         # `appendModel` rejects a link with the name of a joint or of the free-flyer.
         # Numbers as names avoid this error.

@@ -52,14 +52,11 @@ class Quantity:
     Attributes:
         inputs: The inputs of the quantity: "q", "qv" or "qva".
         shape: Shape of one result; "nv" stands for the robot's number of joint velocities.
-        equations: Equation numbers of the textbook.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
             frames, ...). If `recursive` is False, the function has other arguments.
         ask: Function (oracle, query) that returns the oracle's results (n, frames, ...).
-        blocks: Generator (oracle, query) of the oracle's results in blocks of configurations, for large
-            results.
-        scale: Function (plan, magnitudes, reference) that returns the scale of the bound
-            (`urdfkin.verify.bounds`).
+        blocks: Generator (oracle, query) of the oracle's results in blocks of configurations.
+        scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
         factors: Number of factors in the bound (`urdfkin.verify.bounds`) for LOCAL_WORLD_ALIGNED.
         against: Function (oracle, part, ours, by) that returns the oracle's results and the bound; used
             instead of `ask` and `scale`.
@@ -69,9 +66,6 @@ class Quantity:
         referred: True if the quantity depends on a reference frame.
         of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
         head: Heading of the column in reports; several quantities may share a column.
-        labels: Names of the rows of a result.
-        units: Unit of each group of three numbers, by the name of the group.
-        page: Help text of the command, without the summary.
     """
 
     name: str
@@ -341,12 +335,10 @@ def validated(of: str = "frames") -> list[Quantity]:
 
 
 def compared() -> str:
-    """Return the titles of the validated quantities, such as "placement and velocity"."""
     return _listed([row.title for row in validated()])
 
 
 def not_compared() -> str:
-    """Return the titles of the quantities of frames that a validation does not compare."""
     return _listed(
         [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
     )

@@ -255,7 +255,6 @@ class _Explanation:
         return None
 
     def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        """Return the geometric reason why columns of revolute joints are dependent, if there is one."""
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())

@@ -162,7 +162,6 @@ _Differences = dict[str, tuple[FloatArray, FloatArray]]
 def _measured(
     differences: _Differences, size: Sizes, slack: _Slack
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the largest difference of each quantity, in eps * scale and as fraction of the bound."""
     rates = size.rates**2 + size.accelerations
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
@@ -188,7 +187,6 @@ def _measured(
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """Return the largest number in `found` as a multiple of its unit; 0 if number and unit are 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
@@ -233,11 +231,10 @@ class Sizes:
     Attributes:
         reach: (n,) length of the path from the root to the table's base plus length of the path from the root
             to the table's tip, m.
-        turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table
-            moves. Only joints from the root to the table's base or tip count.
+        turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves.
+            Only joints from the root to the table's base or tip count.
         sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate moves.
         rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.
-        accelerations: (n,) sum of the absolute values of all joint accelerations, rad/s^2 and m/s^2.
         rounding: (n,) upper bound on the relative error. The bound includes the angles between nearly
             parallel axes that the table treats as parallel (`urdfkin.dh.common_normals`).
     """

@@ -70,10 +70,9 @@ class NotVerifiedWarning(UserWarning):
 class Verifier:
     """Checks the results of one robot and records them.
 
-    `policy` is the default of the argument `verify` of the robot's methods. `unverifiable` is a known reason
-    why Pinocchio cannot check the robot. `oracle` checks the results of the robot's methods; Pinocchio always
-    checks tables, the accuracy study and enclosures. `reading` describes the check of a conversion to URDF,
-    and is empty for a URDF.
+    `unverifiable` is a known reason why Pinocchio cannot check the robot. `oracle` checks the results of the
+    robot's methods; Pinocchio always checks tables, the accuracy study and enclosures. `reading` describes
+    the check of a conversion to URDF, and is empty for a URDF.
     """
 
     def __init__(
@@ -99,11 +98,7 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer.
-
-        Raises OracleError if the oracle does not accept the text, and InputError if the oracle is not
-        installed.
-        """
+        """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer."""
         key = by.name, base is not None
         if key not in self._oracles:
             self._oracles[key] = by.oracle(
@@ -189,11 +184,7 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check the results of a call, in the shape that the call returns, and record the check.
-
-        Raises VerificationError if a difference exceeds the bound, and OracleError for results of a wrong
-        shape.
-        """
+        """Check and record the results of a call; raise VerificationError if a difference exceeds the bound."""
         ledger, policy = self.ledger, self.policy_of_call(verify)
         if policy is False:
             ledger.unchecked(quantity.name, call.results)
@@ -305,8 +296,7 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table; return None, with a warning, if Pinocchio cannot check the robot.
 
-        Raises TableError if a difference exceeds the bound. If only very large lengths in the table explain a
-        difference, the function warns instead.
+        Raises TableError if a difference exceeds the bound.
         """
         from urdfkin.verify.tables import TableError, check_table
 
@@ -328,10 +318,9 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Compare the links' placements from Khalil-Kleinfinger parameters with Pinocchio's; return a text.
+        """Compare Khalil-Kleinfinger parameters with Pinocchio's placements of the links; return a text.
 
-        The result is None, with a warning, if Pinocchio cannot check the robot. Raises TableError if a
-        difference exceeds the bound.
+        The result is None, with a warning, if Pinocchio cannot check the robot.
         """
         from urdfkin.verify.tables import TableError
 
@@ -365,10 +354,6 @@ class Verifier:
 def comparison_with_oracle(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> BatchComparison:
-    """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
-
-    Raises OracleError if the oracle does not return a result for each configuration.
-    """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
         _check_count(quantity, by, len(theirs), len(ours))
@@ -421,7 +406,6 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
 
 
 def own_results(quantity: Quantity, x: Part) -> FloatArray:
-    """Return the results (n, frames, ...) of urdfkin's forward recursion."""
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
@@ -455,8 +439,7 @@ def as_verify(verify: object) -> Verify:
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
-    The sample is random with a fixed seed, because every k-th configuration of an ordered batch may be
-    biased.
+    The sample is random, because every k-th configuration of an ordered batch may be biased.
     """
     step = min(_MOST, max(1, _PART_SIZE // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

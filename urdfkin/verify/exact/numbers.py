@@ -52,8 +52,8 @@ _ONE_THREAD = lock_over_forks()
 def enough_digits(joints: int) -> int:
     """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    Each joint on the path to the frame adds one digit. This is enough, because a joint with an oblique axis
-    loses only about a third of a digit.
+    Each joint on the path to the frame adds one digit, because a joint with an oblique axis loses only about
+    a third of a digit.
     """
     return _TWO_DOUBLES + joints
 
@@ -204,20 +204,14 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
 ) -> dict[int, ExactJoint]:
-    """Return the exact constants of the joints with the indices `among` (None: all), by index.
-
-    Raises InputError if a joint is not in the text, unless `load` has added the joint.
-    """
+    """Return the exact constants of the joints with the indices `among` (None: all), by index."""
     exact_text = _ExactText(text, kind)
     indices = range(len(tree.joints)) if among is None else among
     return {i: exact_text.joint_of(tree.joints[i], tree.name) for i in indices}
 
 
 def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-    """Return the errors of converting a URDF's decimals to doubles, for `true_value_magnitudes`.
-
-    `path` contains the indices of the joints from the root to a frame; q has the shape (n, nq).
-    """
+    """Return the errors of converting the decimals of a path's joints to doubles, for q (n, nq)."""
     return _ExactText(text).conversion(tree, path, q)
 
 
@@ -241,7 +235,6 @@ class _ExactText:
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
     def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
-        """Return a fixed joint: the joint `free` at the value in `lock`."""
         R, p = free.R, free.p
         value = free.multiplier * self.kind.number(lock.q) + free.offset
         if lock.joint.kind.turns:

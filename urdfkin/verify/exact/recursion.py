@@ -110,7 +110,6 @@ def move(
 
 
 def placement_values(motion: ExactMotion, link: int) -> NDArray[np.object_]:
-    """Return the placement T_world_link (4, 4) of a link."""
     s = motion.states[link]
     return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
 
