@@ -10,9 +10,8 @@ The program reads a list of cases `{"name", "text", "configurations"}` and print
 case. A configuration maps each independent joint to its value: one number (rad or m), three numbers for a
 planar joint (x, y, angle), or seven for a floating joint (x, y, z, qx, qy, qz, qw).
 
-An adapter passes all inputs that the library's documentation requires. It passes no values for mimic joints,
-because the library can read the mimic rules from the file. The adapter does not correct poses that the
-library computes wrongly.
+An adapter passes all inputs that the library's documentation requires. An adapter passes no values for mimic
+joints, because the library can read the mimic rules from the file. Wrong poses are not corrected.
 """
 
 from __future__ import annotations
@@ -71,7 +70,6 @@ def _root(text: str) -> str:
 
 
 def _children(text: str) -> dict[str, str]:
-    """Return the child link of each joint."""
     return {
         joint.get("name", ""): child.get("link", "")
         for joint in ET.fromstring(text).iterfind("joint")
@@ -133,7 +131,7 @@ def read_pinocchio(text: str) -> Reading:
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
-    # Joint 0 is the world.
+    # In Pinocchio, joint 0 is the world.
     moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]
     return Reading(moving, poses)
 
@@ -358,7 +356,6 @@ def read_skrobot(text: str) -> Reading:
 
 
 def read_newton(path: str) -> Reading:
-    """Read a USD stage with Newton, which computes in single precision."""
     import newton
 
     builder = newton.ModelBuilder()
@@ -397,8 +394,7 @@ def read_newton(path: str) -> Reading:
 class Library:
     """A library that reads robot files.
 
-    `package` is the name for pip, and `module` the name for Python's `import`. `forms` lists the file formats
-    that the adapter `read` accepts.
+    `package` is the name for pip, and `forms` lists the file formats that the adapter `read` accepts.
     """
 
     title: str

@@ -36,7 +36,7 @@ class VerificationError(UrdfkinError):
         ours: urdfkin's result for the worst sample.
         theirs: The oracle's result for the worst sample.
         bound: Largest allowed difference between `ours` and `theirs`, for each number of the result.
-        units: The difference between `ours` and `theirs` in multiples of eps * scale.
+        units: Largest difference between `ours` and `theirs`, in multiples of eps * scale.
         reproduce: A shell command or a line of Python that computes the sample again.
 
     >>> import urdfkin
@@ -88,8 +88,6 @@ class CertificateLine:
 
 
 class LineEntry(TypedDict):
-    """The line about one quantity in the JSON file of a certificate."""
-
     quantity: Annotated[str, says("Name of the quantity.")]
     checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
     worst: Annotated[
@@ -131,7 +129,7 @@ class Certificate(Displayable):
 
     Attributes:
         robot: The robot's name.
-        oracle: Name and version of the oracle: "Pinocchio 4.1.0".
+        oracle: Name and version of the oracle, such as "Pinocchio 4.1.0".
         lines: One line for each computed quantity.
         not_verified: Reasons why results were not checked; empty if all were checked.
         reading: Result of the check of the conversion to URDF from another format; empty for a URDF.

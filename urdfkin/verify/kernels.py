@@ -61,7 +61,7 @@ def _units(difference, size):
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference in row `i`, divided by row `k` of the scale, for finite numbers."""
+    """Return the largest difference in row `i`, in units of eps * `scale[k]`, for finite numbers."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -110,7 +110,7 @@ def _most(x, count):
 
 @kernel(ROWS, ROWS, ROWS, SCRATCH, WHOLE, SCRATCH, SCRATCH, WHOLE)
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
-    """Write the largest difference in each row to `out`. If a row contains inf or NaN, write inf.
+    """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
 
     The rows of `scale` are repeated if `scale` has fewer rows than `out`. `unit` (the size of `scale`) and
     `units` (one row) are working memory. `out_bits` and `bits` are views of `out` and `units` as integers,

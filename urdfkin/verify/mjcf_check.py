@@ -48,12 +48,9 @@ _QUOTED = 300
 class MjcfReading:
     """The result of reading an MJCF file in a separate process, as plain data.
 
-    Attributes:
-        listed: Elements of the file that the tree does not contain.
-        path: The file; None for a text.
-        not_whole: Reason why MuJoCo compiled the file only without shapes and inertias; None: MuJoCo compiled
-            the complete file.
-        pinocchio: Report of the process about Pinocchio's reader; None without a report.
+    `listed` contains elements of the file that the tree does not contain. `not_whole` is the reason why
+    MuJoCo compiled the file only without shapes and inertias, and `pinocchio` a report about Pinocchio's
+    reader.
     """
 
     urdf: str

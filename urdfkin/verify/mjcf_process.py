@@ -46,7 +46,7 @@ _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 def serve() -> None:
     request = json.load(sys.stdin)
     try:
-        # Without this function, MuJoCo writes a log file.
+        # Without a warning function, MuJoCo writes a log file.
         library().set_mju_user_warning(lambda message: None)
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
@@ -83,9 +83,8 @@ def parse_answers(
 ) -> tuple[list[dict[str, Any]], str]:
     """Return the answers in the output of a process, and the reason why further answers are missing.
 
-    Lines that libraries print are skipped, and also a last line that is incomplete because of a crash. A
-    `status` of None means that the process ran longer than `patience` (s). Raises InputError if the process
-    reports an error.
+    Incomplete lines and lines that libraries print are skipped. A `status` of None means that the process ran
+    longer than `patience` (s). Raises InputError if the process reports an error.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -175,10 +174,9 @@ def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
 def _pinocchio_placements(
     path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return the placements (n, bodies, 4, 4) that Pinocchio computes from an MJCF file at MuJoCo's `qpos`.
+    """Return Pinocchio's placements (n, bodies, 4, 4) for an MJCF file at MuJoCo's `qpos`.
 
-    `coordinates` maps a joint's name to an index in `qpos`. Raises OracleError if Pinocchio rejects the file
-    or reads other joints or bodies.
+    `coordinates` maps a joint's name to an index in `qpos`.
     """
     pin = pinocchio()
     try:

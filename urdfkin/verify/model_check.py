@@ -116,6 +116,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return the sum of |R^T R - 1| over the rotations R of base and tool."""
+    """Return the sum of the Frobenius norms of R^T R - I over the rotations R of base and tool."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

@@ -141,7 +141,7 @@ class PinocchioLayout:
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
             self._joints.append(_JointIndices(size, *full, *at[rule.leader], rule.multiplier, rule.offset))
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: Index in v and factor in G for each of Pinocchio's joint velocities; both are 0 for the base.
+        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`; the factor is 0 for the base.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):

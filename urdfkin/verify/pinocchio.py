@@ -104,7 +104,7 @@ def _project_of(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Bytes of stack for each link; Pinocchio 4.1.0, which is recursive, needs less than 4 kB for each link.
+#: Bytes of stack for each link; the recursive parser of Pinocchio 4.1.0 needs less than 4 kB for each link.
 _STACK_FOR_A_LINK = 16_384
 #: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
 _SHALLOW = 100
@@ -113,9 +113,8 @@ MOST_RATES = 315
 
 #: Number of floating-point values in a block of results that fits into the processor's cache.
 _BLOCK_SIZE = 16384
-#: Function (n) that returns the results for the next n configurations.
+#: Function of n that returns the results for the next n configurations.
 _Next = Callable[[int], list[FloatArray]]
-#: Name of the free-flyer of a moving base.
 _BASE = "base"
 
 #: Prefix of link names while Pinocchio reduces a model; XML does not allow this character in names.
@@ -131,8 +130,7 @@ def build_model(
     lock: Mapping[str, float] = MappingProxyType({}),
     coupled: bool = True,
 ) -> Any:
-    """Return Pinocchio's model of a URDF text; raise OracleError if the text is rejected or the robot too
-    large.
+    """Return Pinocchio's model of a URDF text; raise OracleError if Pinocchio cannot build the model.
 
     Without enough memory or stack, Pinocchio would crash the process. A robot with too many joint velocities
     is therefore rejected, and a long chain of links is parsed with a larger stack.
@@ -166,7 +164,7 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` confuses a link with a joint of the same name; a prefix of link names avoids this.
+    # `buildReducedModel` confuses a link with a joint of the same name, so link names get a prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_MARK + frame.name
@@ -214,8 +212,7 @@ class PinocchioOracle(Oracle):
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects a link with the name of a joint or of the free-flyer.
-        # Numbers as names avoid this error.
+        # `appendModel` rejects a link with the name of a joint or of the free-flyer, so all names change.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -344,7 +341,8 @@ class PinocchioOracle(Oracle):
         """Return the columns (n, 6, columns) of Pinocchio's joint Jacobian, mimic joints included."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes the process if nv is 0, and returns a vector if nv is 1.
+        # Pinocchio 4.1 crashes the process for a Jacobian without columns.
+        # For a Jacobian with one column, Pinocchio 4.1 returns a vector.
         for k, q_k in enumerate(self._inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]

@@ -42,7 +42,7 @@ _AXIS = 5.0 * EPS
 _UNIT = 1e-6
 #: Maximum number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
-#: Maximum number of quoted characters of an error of yourdfpy.
+#: Maximum length of a quoted yourdfpy error.
 _QUOTED = 200
 #: Kinds of joints that have position limits in the URDF specification.
 _BOUNDED = ("revolute", "prismatic")
@@ -124,7 +124,7 @@ def read(text: str) -> yourdf.Robot:
 def _differences(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield each difference of a joint, with yourdfpy's known fault that explains it, or an empty text."""
+    """Yield each difference of a joint, and the known fault of yourdfpy that explains the difference."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""

@@ -179,9 +179,9 @@ class SingularValues(Displayable):
         """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
 
         The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
-        manipulability is the product of all singular values; the product rule gives its derivative without a
-        division by a singular value. The gradient is NaN if the smallest singular value may be 0, because the
-        manipulability may not be differentiable there.
+        manipulability is the product of all singular values. The product rule gives the derivative of this
+        product without a division by a singular value. The gradient is NaN if the smallest singular value may
+        be 0, because the manipulability may then not be differentiable.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.

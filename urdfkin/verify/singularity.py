@@ -26,9 +26,9 @@ from urdfkin.model.tree import FloatArray, KinematicTree
 
 #: The search finds minimal dependent sets of up to this number of columns.
 _LARGEST_SET = 4
-#: A Jacobian with more columns than this number is not searched for minimal dependent sets.
+#: The search for minimal dependent sets is skipped for a Jacobian with more columns than this number.
 _MOST_COLUMNS = 16
-#: Relative rounding error of a singular value decomposition, in eps times the number of rows plus columns.
+#: Relative rounding error of a singular value decomposition, divided by eps and by (rows + columns).
 _ROUNDINGS = 16.0
 #: At random configurations, a singular value below this fraction of the norm counts as 0.
 _NEGLIGIBLE = 1e-9

@@ -50,7 +50,7 @@ PROMISED = 10.0
 
 
 class TableError(UrdfkinError):
-    """A table and Pinocchio differ by more than rounding errors and `--snap` can explain.
+    """A table differs from Pinocchio by more than rounding errors and the option `--snap` can explain.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.TableError, urdfkin.UrdfkinError)

@@ -6,9 +6,9 @@ from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 - with OpenUSD's parser UsdPhysics. UsdPhysics and urdfkin's parser must find the same bodies, frames, degrees
   of freedom and limits for each joint. A difference is an error.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
-  robot in one configuration, in which each link must have the placement of its prim. The file states these
-  transforms separately from the joint frames. A difference means that the file contradicts itself, and is
-  only a warning.
+  robot in one configuration, in which each link must have the placement of its prim. The file states the
+  prims' transforms separately from the joint frames. A difference means that the file contradicts itself, and
+  is only a warning.
 
 Both comparisons allow only rounding to single precision, in which a stage stores its numbers.
 """
@@ -60,10 +60,7 @@ _TRANSFORM = 6.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The tree of a USD stage as a URDF text, and the answer of the process that read the stage.
-
-    The remarks name parts of the stage that the tree does not contain, and probable mistakes.
-    """
+    """The tree of a USD stage as a URDF text, and the answer of the process that read the stage."""
 
     urdf: str
     remarks: tuple[Remark, ...]
@@ -80,11 +77,8 @@ def read_usd(
 ) -> UsdReading:
     """Read the robot of a USD file in a process with limits on time (s) and memory.
 
-    OpenUSD's readers also read the stage and the files to which it refers, for `check_usd_source`. `variants`
-    contains pairs (variant set, variant), and `articulation` a path or a name.
-
-    Raises SourceError if the file cannot be read. Raises InputError if OpenUSD is missing, rejects the file
-    or exceeds a limit, or if the robot has an unsupported joint.
+    `variants` contains pairs (variant set, variant). Raises SourceError if the file cannot be read. Raises
+    InputError if OpenUSD is missing, rejects the file or exceeds a limit, or for an unsupported joint.
     """
     version()
     path = at_home(source)
@@ -113,10 +107,9 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
-    """Compare a robot with the data that OpenUSD reads from the same stage.
+    """Compare a robot with OpenUSD's data of the stage; return a sentence and remarks about prims.
 
-    Returns a sentence for the certificate, and remarks about prims whose placements differ. Raises
-    OracleError if OpenUSD's parser and urdfkin disagree about a joint.
+    Raises OracleError if OpenUSD's parser and urdfkin disagree about a joint.
     """
     joints = read.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
@@ -174,7 +167,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint, by name: five numbers about rounding to single precision (`urdfkin.urdf.usd.Usd.single`).
+#: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 

@@ -83,7 +83,7 @@ def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        ends = own.get(free.lower())  # `ends` is None if several directions are free
+        ends = own.get(free.lower())  # `ends` is None if the joint has several free directions.
     factor = np.pi / 180.0 if free.startswith("rot") else read.unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)

@@ -184,7 +184,7 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check and record the results of a call; raise VerificationError if a difference exceeds the bound."""
+        """Check and record the results of a call; raise VerificationError for a too large difference."""
         ledger, policy = self.ledger, self.policy_of_call(verify)
         if policy is False:
             ledger.unchecked(quantity.name, call.results)

@@ -37,7 +37,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
-#: Decimal digits: at least 15, the precision of a double, and at most 10,000, to limit the computing time.
+#: A double has 15 decimal digits. The maximum of 10,000 digits limits the computing time.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])
@@ -66,12 +66,12 @@ class Enclosure:
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is inside; raise InputError if the shape of `x` is wrong."""
+        """Return whether each number of `x` is between `lower` and `upper`; a wrong shape raises InputError."""
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
-        """Return an upper bound on |x - true value|; raise InputError if the shape of `x` is wrong."""
+        """Return an upper bound on |x - true value|; a wrong shape raises InputError."""
         x = self._alike(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
         return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)

@@ -36,7 +36,7 @@ DIGITS = 50
 _TWO_DOUBLES = 30
 #: Number of bits for each decimal digit of an interval.
 _BITS = math.log2(10.0)
-#: Number of bits of an interval in addition to its digits; 15 digits, as in a double, give 55 bits.
+#: Number of bits in addition to the bits of an interval's decimal digits. 15 digits then have 55 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _MORE_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.

@@ -29,7 +29,7 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: For each joint velocity of a planar or floating joint: axis in the child link, and True for a rotation.
+#: Axis in the child link of each joint velocity, and whether the joint velocity is angular.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
