@@ -11,7 +11,8 @@ case. A configuration maps each independent joint to its value: one number (rad 
 planar joint (x, y, angle), or seven for a floating joint (x, y, z, qx, qy, qz, qw).
 
 An adapter passes all inputs that the library's documentation requires. An adapter passes no values for mimic
-joints, because the library can read the mimic rules from the file. Wrong poses are not corrected.
+joints, because the library can read the mimic rules from the file. If the library computes wrong poses, the
+adapter does not correct them.
 """
 
 from __future__ import annotations

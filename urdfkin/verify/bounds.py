@@ -340,11 +340,10 @@ def true_value_magnitudes(
     """Return the magnitudes for a comparison of one program's results with the true values.
 
     The true values, rounded to 17 digits, are computed from the decimals in the URDF and from the doubles q,
-    v and a. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One program makes
-    at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the
-    conversion of decimals to doubles: half an eps each for the offset, the axis and the true value. The error
-    of the axis counts twice, because two rotations use the axis. Two kinds of numbers need additional
-    roundings:
+    v and a. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One program makes at most 16.8
+    rounding errors for each joint (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the conversion of
+    decimals to doubles: half an eps each for the offset, the axis and the true value. The error of the axis
+    counts twice, because two rotations use the axis. Two kinds of numbers need additional roundings:
 
     - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
       rotate by at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -368,12 +367,7 @@ def true_value_magnitudes(
     displacement. Then 3/2 eps for each rule are enough. The same error bound holds for the velocity and the
     acceleration of the joint, which are rounded less often.
 
-    Args:
-        plan: The compiled tree of one frame.
-        q: (n, nq) rad, m.
-        v: (n, nv) or None.
-        a: (n, nv) or None.
-        errors: The errors of the conversions, for the same path and the same q.
+    `plan` is the compiled tree of one frame. `errors` belongs to the path of this frame and to q (n, nq).
     """
     size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
     more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
@@ -407,10 +401,9 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     of a position changes by at most the angle error times the length of the path. The scale is multiplied by
     1 + `angles` / k. This is twice the change of first order, so it also covers terms of second order.
 
-    Args:
-        bound: Bound of the tree's placements, (n, frames, 4, 4).
-        lengths: (n, frames) sum of the lengths of the vectors `pos` and `ref` on the path to the frame, m.
-        angles: (n, frames) sum of |q| + |ref| over the hinges with a reference value, rad.
+    `bound` is the bound of the tree's placements (n, frames, 4, 4). `lengths` (n, frames) is the sum of the
+    lengths (m) of the vectors `pos` and `ref` on the path to a frame. `angles` (n, frames) is the sum of |q|
+    + |ref| (rad) over the hinges with a reference value.
     """
     scale = bound.scale.copy()
     scale[..., :3, 3] = np.maximum(scale[..., :3, 3], lengths[..., None])
@@ -573,13 +566,10 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. The bound includes these errors, because
-    `Magnitudes.roundings` counts one joint more than the path contains. One joint counts more rounding
-    errors than these functions have.
+    `Magnitudes.roundings` counts one joint more than the path contains. One joint counts more rounding errors
+    than these functions have.
 
-    Args:
-        bound: Bound of the Jacobian.
-        size: Magnitudes of the frames.
-        apart: (n, frames) s of Pinocchio's rotation.
+    `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
     """
     s = apart - EPS * size.roundings
     # If s is below its rounding error, the scale becomes inf, and no result is accepted.

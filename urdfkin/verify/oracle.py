@@ -564,7 +564,6 @@ class Oracle:
 
     @property
     def data(self) -> Any:
-        """The library's data structure of this robot for the current thread."""
         if not hasattr(self._local, "data"):
             self._local.data = self.new_data()
         return self._local.data

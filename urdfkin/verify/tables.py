@@ -70,10 +70,8 @@ class TableCheck:
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
         shares: Ratios of the differences `units` to their bounds. A ratio above 1 is a disagreement, unless
             `loss` explains the difference.
-        snapped: True if snapping changed the table. The bound then includes the deviation that the table
-            states.
-        loss: Explanation of a difference above the bound that very large lengths in the table cause; else
-            None.
+        snapped: Whether snapping changed the table. The bound then includes the effect of snapping.
+        loss: Explanation of a difference above the bound that very large lengths in the table cause.
     """
 
     samples: int
