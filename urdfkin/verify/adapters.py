@@ -430,7 +430,7 @@ def version(name: str) -> str | None:
 
 
 def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the joints and the link poses that a library computes, or its error message."""
+    """Return the joints and link poses that a library computes, or the library's error message."""
     try:
         reading = LIBRARIES[name].read(case["text"])
         found = [reading.poses(values) for values in case["configurations"]]

@@ -28,8 +28,8 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     The derivative of each angle is the dot product of the angular velocity and a vector of the reciprocal
     basis of the three axes.
 
-    `name` is SciPy's name of the sequence: capital letters mean body axes, small letters fixed axes. R (...,
-    3, 3) rotates body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian in world axes.
+    `name` is SciPy's name of the sequence: capital letters mean body axes, small letters fixed axes. `R`
+    rotates body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian in world axes.
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)

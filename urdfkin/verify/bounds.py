@@ -159,7 +159,7 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _MovingJoint(NamedTuple):
-    """A moving joint; `multiplier` and `offset` are the absolute values in its mimic rule."""
+    """A moving joint; `multiplier` and `offset` are the absolute values in the joint's mimic rule."""
 
     kind: int
     q: int
@@ -323,8 +323,8 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rules: Number of mimic rules of the joints on the path. A joint that mimics a mimic joint counts as
-            two rules.
+        rules: Number of mimic rules of the joints on the path. A joint that mimics a mimic joint has two
+            rules.
         lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if offsets in
             a chain of mimic rules cancel, because the rounding errors of the offsets do not cancel.
     """
@@ -377,8 +377,8 @@ def true_value_magnitudes(
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
     """Return the scale (n, frames, 4, 4) of the bound on placements.
 
-    The scale of a position is the length of the path. The scale of a rotation is 1, and that of the last row
-    0.
+    The scale of a position is the length of the path, the scale of a rotation 1, and the scale of the last
+    row 0.
     """
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0

@@ -66,12 +66,14 @@ class Enclosure:
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is between `lower` and `upper`; a wrong shape raises InputError."""
+        """Return whether each number of `x` is between `lower` and `upper`; raise InputError for a wrong
+        shape.
+        """
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
-        """Return an upper bound on |x - true value|; a wrong shape raises InputError."""
+        """Return an upper bound on |x - true value|; raise InputError for a wrong shape."""
         x = self._alike(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
         return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)
