@@ -547,8 +547,9 @@ class Oracle:
         self.moving_base, self.root_joint, self._local = moving_base, root_joint, threading.local()
 
     def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
-        """Return the mimic rules of `joints`; raise OracleError if joints or their order differ from the
-        tree's.
+        """Return the mimic rules of `joints`, the library's moving joints.
+
+        Raises OracleError if the joints or their order differ from the tree's.
         """
         tree = self.tree
         rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}

@@ -66,9 +66,7 @@ class Enclosure:
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is between `lower` and `upper`; raise InputError for a wrong
-        shape.
-        """
+        """Return whether each number of `x` is inside its interval; raise InputError for a wrong shape."""
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
