@@ -95,7 +95,7 @@ def parse_answers(
     if status is None:
         return answers, f"{library} did not finish within {patience:g} s"
     if len(output) > MOST:
-        return answers, f"an answer of more than {MOST} bytes"
+        return answers, f"{library} returned more than {MOST} bytes"
     return answers, f"{library}'s process ended with status {status}: perhaps {_TOO_MUCH}"
 
 
@@ -186,7 +186,7 @@ def _pinocchio_placements(
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
         found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_NAMED])
-        raise OracleError("the reader finds other joints", found=found)
+        raise OracleError("the reader finds different joints", found=found)
     if missing := [name for name in bodies if not model.existFrame(name)]:
         raise OracleError("the reader does not find a body of the file", found=missing[0])
     data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))

@@ -559,9 +559,12 @@ class Oracle:
             ("coordinates", coordinates, [joint.name for joint in tree.joints if joint.nv]),
         ):
             if theirs != own:
-                found = ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED]) or "the same in another order"
+                found = (
+                    ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED])
+                    or "the same names in a different order"
+                )
                 raise OracleError(
-                    f"{self.title} finds other {what} in this robot", where=tree.name, found=found
+                    f"{self.title} finds different {what} in this robot", where=tree.name, found=found
                 )
         return rules
 

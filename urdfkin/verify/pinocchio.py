@@ -83,7 +83,11 @@ def _wrong_module(module: Any) -> InstallationError:
     file = module.__file__ or next(iter(module.__path__), "a folder without modules")
     project = _project_of(Path(file))
     cure = f"pip uninstall {project[0]}" if project else f"rename or remove {file}"
-    found = f"{project[0]} {project[1]}, another project" if project else "a file of no installed package"
+    found = (
+        f"{project[0]} {project[1]}, another project"
+        if project
+        else "a file that belongs to no installed package"
+    )
     return InstallationError(
         "the module `pinocchio` is not Pinocchio, the library that checks results",
         where=str(file),

@@ -76,7 +76,7 @@ def second_reading(
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
     # yourdfpy would read the files that a document type declaration names.
     if "<!DOCTYPE" in text:
-        return SecondReading(by, unread="the file has a document type")
+        return SecondReading(by, unread="the file has a document type declaration")
     try:
         robot = read(text)
     except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions.
@@ -185,7 +185,7 @@ def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[st
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:
-            yield f"{what} {name}: {found[name]} times, not {own[name]}"
+            yield f"{what} {name}: yourdfpy finds {found[name]}, urdfkin finds {own[name]}"
 
 
 def _shortened(differences: list[str]) -> list[str]:

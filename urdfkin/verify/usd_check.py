@@ -293,7 +293,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     )
     if remarks:
         words = (
-            f"UsdGeom places {len(remarks)} of the {len(prims)} prims elsewhere, by up to {worst[0]:.3g} m"
+            f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
+            f" by up to {worst[0]:.3g} m"
         )
         # An error of one body displaces all later bodies, so only the first difference is reported.
         return words, tuple(remarks[:1])
