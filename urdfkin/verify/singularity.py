@@ -157,7 +157,7 @@ class _Explanation:
             lost = lost * np.sign(np.take_along_axis(lost, first, axis=1)) + 0.0
         if self._rank == usual:
             reasons = [
-                "Random configurations have the same rank: the arm causes the low rank, not this configuration."
+                "Random configurations have the same rank, so the arm is the cause, not this configuration."
             ]
         else:
             reasons = [*self._directions(lost), *self._causes(lost, motions)]
