@@ -7,8 +7,8 @@ environment in which one library is installed:
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
 The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
-case. A configuration maps each independent joint to its value: one number (rad or m), three numbers for a
-planar joint (x, y, angle), or seven for a floating joint (x, y, z, qx, qy, qz, qw).
+case. A configuration maps each independent joint to its value. The value is one number (rad or m), three
+numbers for a planar joint (x, y, angle), or seven numbers for a floating joint (x, y, z, qx, qy, qz, qw).
 
 An adapter passes all inputs that the library's documentation requires. An adapter passes no values for mimic
 joints, because the library can read the mimic rules from the file. If the library computes wrong poses, the

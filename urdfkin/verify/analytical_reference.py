@@ -19,8 +19,8 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 
     An Euler sequence rotates about the coordinate axes i, j and k, in this order: R = R_i R_j R_k. The first
     rotation axis is e_i, and the third is R e_k. The middle axis is perpendicular to the first and the third
-    axis: it is n / |n| or -n / |n|, with n = e_i x R e_k. The range of the middle angle b determines the
-    sign:
+    axis. With n = e_i x R e_k, the middle axis is n / |n| or -n / |n|. The range of the middle angle b
+    determines the sign:
 
     - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
     - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.

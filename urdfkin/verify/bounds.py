@@ -34,9 +34,9 @@ robots can be compared.
 *Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
 vectors (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
 result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms differ
-by the cross product v_i^2 z x z, which is 0 except for rounding errors. These rounding errors are large for
-fast joints with an oblique axis. The bound on the angular acceleration alpha therefore uses w_i instead of
-w_{i-1}.
+by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this cross
+product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha therefore
+uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -214,7 +214,6 @@ def _columns(x: FloatArray, n: int) -> Any:
 
 
 def _norm(x: Any) -> Length:
-    """Return the length of a vector whose components are columns or Python numbers."""
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
@@ -399,7 +398,8 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
     all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
     of a position changes by at most the angle error times the length of the path. The scale is multiplied by
-    1 + `angles` / k. This is twice the change of first order, so it also covers terms of second order.
+    1 + `angles` / k. This factor allows twice the change of first order, and therefore also covers the terms
+    of second order.
 
     `bound` is the bound of the tree's placements (n, frames, 4, 4). `lengths` (n, frames) is the sum of the
     lengths (m) of the vectors `pos` and `ref` on the path to a frame. `angles` (n, frames) is the sum of |q|
@@ -565,9 +565,9 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
-    eps, and products and quotients about 10 eps. The bound includes these errors, because
-    `Magnitudes.roundings` counts one joint more than the path contains. One joint counts more rounding errors
-    than these functions have.
+    eps, and products and quotients about 10 eps. The bound includes these 13 eps, because
+    `Magnitudes.roundings` counts one joint more than the path contains. The additional joint counts at least
+    `ROUNDINGS` = 24 rounding errors.
 
     `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
     """
@@ -595,7 +595,7 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 
 
 def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the limit of a quaternion's |qw| below which rounding can change the sign of qw.
+    """Return the value of |qw| below which rounding can change the sign of a quaternion's qw.
 
     The limit 1.5 k eps equals 3 delta, and so exceeds the error 2.3 delta of `quaternion_jacobian_bound`.
     """
@@ -605,7 +605,7 @@ def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 def nearest_singularity(plan: CompiledTree) -> float:
     """Return four times the error of R, rad.
 
-    Within this distance of a singularity, no digit of an analytical Jacobian is correct.
+    At a smaller distance from a singularity, no digit of an analytical Jacobian is correct.
     """
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 

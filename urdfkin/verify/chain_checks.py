@@ -28,9 +28,8 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the child link. On the part of the chain that leads away from
-    the root, this frame comes after the joint's motion. On the part of the chain that leads to the root, this
-    frame comes before the joint's motion.
+    Pinocchio's frame of a joint is the frame of the child link. Relative to the base of the chain, the child
+    link moves with the joint only where the chain leads away from the root.
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
     computes along the chain, which is a part of the two paths. The bound counts all joints of both paths. The

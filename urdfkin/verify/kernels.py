@@ -70,7 +70,7 @@ def _largest(ours, theirs, scale, i, k):
 
 @helper()
 def _is_in_threes(scale, k):
-    """Return whether the scale has equal numbers in its three linear rows, and in its three angular rows."""
+    """Return whether the three linear rows of a scale are equal, and also the three angular rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -81,7 +81,7 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each group of three numbers with the same scale to `units`.
+    """Write the largest difference of every three numbers with a common scale to `units`.
 
     The difference is in multiples of eps * scale, and may be NaN or inf.
     """
@@ -245,8 +245,8 @@ def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
     - `ends`, for each frame: index of the last moving joint before the frame, and index of the frame in `out`
     - `tips`, for each frame: length of the path from the last moving joint
     - `free`, for each planar or floating joint: the lengths from `urdfkin.verify.bounds._free_lengths`
-    - `s`: working memory for a block of configurations, with one state more than the base and the moving
-      joints
+    - `s`: working memory for a block of configurations, with the states of the base and the moving joints,
+      and one additional state
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]
     n = len(out) // max(1, _STATE * frames)

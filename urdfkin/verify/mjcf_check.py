@@ -184,7 +184,6 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _placements(found: Mapping[str, Any]) -> FloatArray:
-    """Return placements (n, frames, 4, 4) from an array of the upper three rows."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0

@@ -289,7 +289,6 @@ class MujocoOracle(Oracle):
     # -- layout --------------------------------------------------------------------------------------
 
     def _states(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-        """Return MuJoCo's inputs qpos, qvel and qacc, each an array (n, ...)."""
         q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
         for joint in self._indices:

@@ -1,9 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo, and conversion of a call's arguments for an oracle.
 
 An oracle is a library whose results urdfkin compares with its own results. This module converts the arguments
-of a call for the oracle. Except for units and named poses, this conversion shares no code with the conversion
-for urdfkin's own computation. A wrong broadcast, order or name in one conversion therefore causes a
-disagreement.
+of a call for the oracle. The conversion for the oracle shares no code with the conversion for urdfkin's own
+computation, except for units and named poses. A wrong broadcast, order or name in one conversion therefore
+causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -19,7 +19,7 @@ therefore reads the mimic rules from the URDF text.
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
 planar joint three, a floating joint seven, and a mimic joint none.
 
-Moving base: the base's rotation is the rotation nearest to the user's matrix M. urdfkin computes this
+Moving base: the base's rotation is the rotation nearest to the user's matrix M. urdfkin computes the nearest
 rotation with a Newton step (`urdfkin.kinematics.rotation`). This module uses Davenport's q-method: among all
 unit quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest rotation. The quaternion of the
 nearest rotation is therefore the eigenvector of K for the largest eigenvalue.
@@ -323,7 +323,7 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Rotate both halves y of six-vectors by R^T.
+    """Rotate the linear part and the angular part y of each six-vector by R^T.
 
     For a quaternion with vector part u and scalar part w, R^T y = y + 2 w c + 2 (c x u) with c = y x u.
     """

@@ -38,7 +38,6 @@ class OracleLibrary:
 
     @property
     def words(self) -> str:
-        """Title and version, such as "Pinocchio 4.1.0"."""
         return f"{self.title} {self.version()}"
 
 

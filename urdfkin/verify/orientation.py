@@ -1,7 +1,7 @@
 """Check roll-pitch-yaw angles and quaternions by converting them back to rotation matrices with Pinocchio.
 
-Only the matrices can be compared: at gimbal lock, two correct programs may return different angles for a
-rotation, and two correct quaternions may have opposite signs.
+Only the matrices can be compared. At gimbal lock, two correct programs may return different angles for a
+rotation. Two correct quaternions may have opposite signs.
 """
 
 from __future__ import annotations

@@ -98,7 +98,6 @@ def _wrong_module(module: Any) -> InstallationError:
 
 
 def _project_of(file: Path) -> tuple[str, str] | None:
-    """Return the name and the version of the installed project that contains a file."""
     from importlib import metadata
 
     for project in metadata.distributions():

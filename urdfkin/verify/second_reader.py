@@ -3,9 +3,9 @@
 Pinocchio checks the computed results. This module checks the data of the robot: links, joint kinds, origins,
 axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-yourdfpy (0.0.60) has two known faults, which the report separates from other differences: yourdfpy ignores
-the attribute `quat_xyzw` of an origin, and does not normalise axes. For a missing number, yourdfpy returns
-None, which counts as the default value of the URDF specification.
+yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
+normalise axes. The report separates these faults from other differences. For a missing number, yourdfpy
+returns None, which counts as the default value of the URDF specification.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
 *Error of J and residual.* Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <=
-|E| in the spectral norm, and therefore also in the larger Frobenius norm, which this module uses. The matrix
-E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
+|E| in the spectral norm. This module uses the Frobenius norm of E, which is at least as large as the spectral
+norm. The matrix E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the
+decomposition.
 
 *Orthogonality.* The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b.
 By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor. The factor is

@@ -6,9 +6,10 @@
   joints of such columns cause the loss of rank.
 
 A geometric reason, such as parallel axes, is stated only if the columns satisfy the geometric condition, up
-to the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the axis,
-and a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if their
-columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column is 0.
+to the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the axis.
+The vector a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if
+their columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column
+is 0.
 """
 
 from __future__ import annotations
@@ -277,7 +278,6 @@ class _Explanation:
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return a sentence about a line that all joint axes intersect, if there is such a line."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -328,7 +328,6 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the span of `rows`, which are projections of orthonormal vectors."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
     # Each singular value is 1 or 0, except for rounding.
     return Vt[: int((s > 0.5).sum())]

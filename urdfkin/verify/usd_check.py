@@ -7,8 +7,8 @@ from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
   of freedom and limits for each joint. A difference is an error.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
   robot in one configuration, in which each link must have the placement of its prim. The file states the
-  prims' transforms separately from the joint frames. A difference means that the file contradicts itself, and
-  is only a warning.
+  prims' transforms separately from the joint frames. A difference means that the file contradicts itself;
+  `load` reports the difference as a warning.
 
 Both comparisons allow only rounding to single precision, in which a stage stores its numbers.
 """

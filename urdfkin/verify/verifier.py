@@ -278,7 +278,6 @@ class Verifier:
         )
 
     def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
-        """Return a shell command, or a line of Python, that computes sample `k` again."""
         inputs = (call.q, *call.rates)
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
         reference = call.reference.name.lower() if quantity.referred else None

@@ -61,7 +61,8 @@ class Enclosure:
     def width(self) -> FloatArray:
         """The difference `upper - lower`, which is 0 only if the true value is a double.
 
-        Any other width is at least the distance between two neighbouring doubles.
+        If the true value is not a double, the width is at least the distance between two neighbouring
+        doubles.
         """
         return self.upper - self.lower
 

@@ -144,7 +144,6 @@ def about(axis: Vector, angle: Number, kind: NumberType = BALLS) -> Matrix:
 
 
 def from_rpy(rpy: Vector, kind: NumberType = BALLS) -> Matrix:
-    """Return Rz(yaw) Ry(pitch) Rx(roll)."""
     x, y, z = ((*kind.sine_cosine(angle), 0, 1) for angle in rpy)
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
