@@ -38,7 +38,6 @@ import numpy as np
 #: Value of a joint; several numbers for a planar or floating joint.
 Value = Any
 Poses = dict[str, Any]
-#: A planar joint has 3 values, and a floating joint has 7.
 _PLANAR, _FLOATING = 3, 7
 #: Suffixes of the three joints that replace a planar joint in MuJoCo.
 _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")

@@ -30,7 +30,6 @@ from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bound, rebound
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 
-#: Bit pattern of inf.
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
 #: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.

@@ -40,7 +40,6 @@ from urdfkin.verify.verifier import Verifier
 _SAMPLES = 8
 #: Time limit for reading a file, seconds.
 PATIENCE = 60.0
-#: Maximum length of a quoted MuJoCo error.
 _QUOTED = 300
 
 

@@ -35,7 +35,6 @@ from urdfkin.verify.pinocchio import pinocchio
 
 #: Number of coordinates of a free joint.
 _CARTESIAN = 7
-#: Maximum number of names in an error message.
 _NAMED = 5
 #: Maximum size of the output of a process, bytes.
 MOST = 400_000_000

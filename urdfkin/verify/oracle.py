@@ -334,7 +334,6 @@ def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     return rotated.reshape(*rotated.shape[:-2], 6)
 
 
-#: Maximum number of names in an error.
 _NAMED = 5
 
 #: Names of the coordinates of a planar joint (3 joint velocities) and of a floating joint (6).

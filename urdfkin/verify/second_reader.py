@@ -40,9 +40,7 @@ _ROTATION = 9.0 * EPS
 _AXIS = 5.0 * EPS
 #: An axis is normalised if its length differs from 1 by at most this number.
 _UNIT = 1e-6
-#: Maximum number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
-#: Maximum length of a quoted yourdfpy error.
 _QUOTED = 200
 #: Kinds of joints that have position limits in the URDF specification.
 _BOUNDED = ("revolute", "prismatic")

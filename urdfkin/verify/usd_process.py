@@ -66,7 +66,7 @@ def _second_reading(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # A joint with PhysicsArticulationRootAPI also has an articulation's description.
+            # A joint with PhysicsArticulationRootAPI also has an articulation's description: skip it.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _described(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
