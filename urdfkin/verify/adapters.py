@@ -7,8 +7,9 @@ environment in which one library is installed:
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
 The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
-case. A configuration maps each independent joint to its value. The value is one number (rad or m), three
-numbers for a planar joint (x, y, angle), or seven numbers for a floating joint (x, y, z, qx, qy, qz, qw).
+case. A configuration maps each independent joint to its value. The value of a revolute or prismatic joint is
+one number (rad or m). The value of a planar joint is three numbers (x, y, angle). The value of a floating
+joint is seven numbers (x, y, z, qx, qy, qz, qw).
 
 An adapter passes all inputs that the library's documentation requires. An adapter passes no values for mimic
 joints, because the library can read the mimic rules from the file. If the library computes wrong poses, the
@@ -395,6 +396,7 @@ class Library:
     """A library that reads robot files.
 
     `package` is the name for pip, and `forms` lists the file formats that the adapter `read` accepts.
+    `single` is True if the library computes in single precision.
     """
 
     title: str

@@ -29,7 +29,8 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     basis of the three axes.
 
     `name` is SciPy's name of the sequence: capital letters mean body axes, small letters fixed axes. `R`
-    rotates body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian in world axes.
+    (..., 3, 3) is the rotation from body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian
+    [linear; angular] in world axes.
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)

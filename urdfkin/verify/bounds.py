@@ -97,8 +97,8 @@ def magnitudes(
 ) -> Magnitudes:
     """Return upper bounds on the terms of each frame's position, velocity and acceleration.
 
-    The inputs are q (n, nq), v and a (n, nv) or None, and the state `base` (1 or n, 24) of the moving base.
-    Without v, only `p` and `roundings` are valid.
+    `q` has the shape (n, nq); `v` and `a` have the shape (n, nv) or are None. `base` (1 or n, 24) is the
+    state of the moving base. Without v, only `p` and `roundings` are valid.
     """
     n, lengths = len(q), _lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
@@ -322,8 +322,8 @@ class DecimalErrors(NamedTuple):
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rules: Number of mimic rules of the joints on the path. A joint that mimics a mimic joint has two
-            rules.
+        rules: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint, the
+            rules of both joints count.
         lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if offsets in
             a chain of mimic rules cancel, because the rounding errors of the offsets do not cancel.
     """
@@ -338,11 +338,12 @@ def true_value_magnitudes(
 ) -> Magnitudes:
     """Return the magnitudes for a comparison of one program's results with the true values.
 
-    The true values, rounded to 17 digits, are computed from the decimals in the URDF and from the doubles q,
-    v and a. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One program makes at most 16.8
-    rounding errors for each joint (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the conversion of
-    decimals to doubles: half an eps each for the offset, the axis and the true value. The error of the axis
-    counts twice, because two rotations use the axis. Two kinds of numbers need additional roundings:
+    The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
+    values are rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One
+    program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The remaining
+    7.2 cover the conversion of decimals to doubles: half an eps each for the offset, the axis and the true
+    value. The error of the axis counts twice, because two rotations use the axis. Two kinds of numbers need
+    additional roundings:
 
     - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
       rotate by at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -376,8 +377,8 @@ def true_value_magnitudes(
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
     """Return the scale (n, frames, 4, 4) of the bound on placements.
 
-    The scale of a position is the length of the path, the scale of a rotation 1, and the scale of the last
-    row 0.
+    The scale of a position is the length of the path. The scale of a rotation is 1, and the scale of the last
+    row is 0.
     """
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
@@ -389,10 +390,10 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    *Lengths.* In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of the joints,
-    and a vector for the `ref` of a slide joint. urdfkin adds these vectors once, when reading the file.
-    MuJoCo adds the vectors for each configuration. A single vector can be longer than the sum. The scale of
-    positions is therefore the larger of the length of the path and `lengths`.
+    *Lengths.* In an MJCF file, the offset of a body is a sum of vectors. These vectors are the body's `pos`,
+    the `pos` of the joints, and a vector for the `ref` of a slide joint. urdfkin adds these vectors once,
+    when reading the file. MuJoCo adds the vectors for each configuration. A single vector can be longer than
+    the sum. The scale of positions is therefore the larger of the length of the path and `lengths`.
 
     *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref. urdfkin rotates the hinge by ref and by q
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
@@ -428,7 +429,8 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     includes the term w x vel.
 
     *Breakdown.* The scale is also valid for the sum of the contributions in an `AccelerationBreakdown`. Let
-    d_k be the vector from joint k to the frame, and w_k the sum of the joint velocities up to joint k.
+    d_k be the vector from joint k to the frame. Let w_k be the sum of the absolute values of the joint
+    velocities up to joint k.
 
     - The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) together have a length of at most (w_k^2 -
       w_{k-1}^2) |d_k|. The sum over all joints is the sum of w_k^2 times the length of link k, as in eq.
@@ -436,8 +438,8 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     - A vector d_k is the sum of the vectors between successive joint origins, with the rounding errors of the
       sums in eq. 7.77.
     - For n joints, the breakdown has 4 n terms. The sum of these terms has n + 3 rounding errors.
-    - The bound allows 2 eps for the sums at each joint, more than the rounding errors of d_k and of 4 n
-      terms.
+    - The bound allows 2 eps for the sums at each joint. This is more than the rounding errors of d_k and of
+      the sum of 4 n terms.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -519,8 +521,8 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     - two to move a column to p before the product: (v - p x w) x w
 
     urdfkin computes the single product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first
-    rotates the two columns by R, so each of the two products has the five factors R, z, R, z and d. The bound
-    allows three products of four factors each (12 in total), which covers the 10 factors of urdfkin.
+    rotates the two columns by R. Each of the two products then has the five factors R, z, R, z and d. The
+    bound allows three products of four factors each (12 in total), which covers the 10 factors of urdfkin.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -572,7 +574,7 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
     """
     s = apart - EPS * size.roundings
-    # If s is below its rounding error, the scale becomes inf, and no result is accepted.
+    # If s is not larger than its rounding error, the scale is not finite, and no result is accepted.
     s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
@@ -597,15 +599,16 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the value of |qw| below which rounding can change the sign of a quaternion's qw.
 
-    The limit 1.5 k eps equals 3 delta, and so exceeds the error 2.3 delta of `quaternion_jacobian_bound`.
+    Let delta be the error of R, as in `quaternion_jacobian_bound`. The limit 1.5 k eps is 3 delta, which is
+    larger than the error of qw, 2.3 delta.
     """
     return 1.5 * EPS * result_k(bound, leading)
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return four times the error of R, rad.
+    """Return four times the error of a frame's rotation, rad.
 
-    At a smaller distance from a singularity, no digit of an analytical Jacobian is correct.
+    At a smaller distance from a singularity of Euler angles, no digit of the analytical Jacobian is reliable.
     """
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
@@ -632,8 +635,8 @@ def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.b
     """Return an array (frames, 6, nv), False for Jacobian entries that are 0 for every q and every base.
 
     The linear rows of a revolute column are z x d. In WORLD, d leads from the joint to the root. Otherwise, d
-    leads from the joint to the frame. The vector d is 0 for every q if the path between its two ends has no
-    length and no prismatic joint.
+    leads from the joint to the frame. The vector d is 0 for every q if the path between the two ends of d has
+    no length and no prismatic joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns = plan.steps[:, StepField.KIND] == JointMotion.TURN

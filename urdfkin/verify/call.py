@@ -110,8 +110,9 @@ class Call:
     def flat(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
-        Raises InputError for an invalid `out`. Subclasses of NumPy's array are invalid: `reshape` of a NumPy
-        matrix may return an unexpected shape, and a kernel would then write past the end of the array.
+        Raises InputError for an invalid `out`. Subclasses of NumPy's array are invalid. For example,
+        `reshape` of a NumPy matrix may return an unexpected shape. A kernel would then write past the end of
+        the array.
         """
         if out is None:
             return None

@@ -77,7 +77,7 @@ class CertificateLine:
     """The line of a certificate about one quantity.
 
     `checked` counts the results that the oracle confirmed. `worst` is the largest difference in multiples of
-    eps * scale, and `share` the largest ratio of a difference to its bound.
+    eps * scale. `share` is the largest ratio of a difference to its bound.
     """
 
     quantity: str

@@ -28,8 +28,9 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the child link. Relative to the base of the chain, the child
-    link moves with the joint only where the chain leads away from the root.
+    Pinocchio's frame of a joint is the frame of the child link. If the chain leads from the parent link to
+    the child link, Pinocchio's frame includes the joint's motion. If the chain leads from the child link to
+    the parent link, Pinocchio's frame does not include the motion.
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
     computes along the chain, which is a part of the two paths. The bound counts all joints of both paths. The

@@ -38,6 +38,7 @@ _AHEAD = 4
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
+    # If a number is inf or NaN, the product of 0 and this number is NaN.
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -111,9 +112,10 @@ def _most(x, count):
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
 
-    The rows of `scale` are repeated if `scale` has fewer rows than `out`. `unit` (the size of `scale`) and
-    `units` (one row) are working memory. `out_bits` and `bits` are views of `out` and `units` as integers,
-    because the compiler can vectorize the maximum of integers but not of doubles.
+    The rows of `scale` are repeated if `scale` has fewer rows than `out`. Only then, the kernel uses `unit`
+    (the size of `scale`) and `units` (one row) as working memory. `out_bits` and `bits` are views of `out`
+    and `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum of
+    doubles.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):

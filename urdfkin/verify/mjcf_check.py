@@ -48,7 +48,7 @@ class MjcfReading:
     """The result of reading an MJCF file in a separate process, as plain data.
 
     `listed` contains elements of the file that the tree does not contain. `not_whole` is the reason why
-    MuJoCo compiled the file only without shapes and inertias, and `pinocchio` a report about Pinocchio's
+    MuJoCo compiled the file only without shapes and inertias. `pinocchio` is a report about Pinocchio's
     reader.
     """
 
@@ -65,8 +65,9 @@ def read_mjcf(
 ) -> MjcfReading:
     """Read a robot from an MJCF file, text or bytes, in a process with limits on time (s) and memory.
 
-    With `check`, MuJoCo also computes placements for `check_mjcf_source`. Raises InputError if MuJoCo is
-    missing, rejects the file or exceeds a limit, or if the robot has a ball joint.
+    MuJoCo also reads included files. With `check`, MuJoCo also computes placements for `check_mjcf_source`.
+    Raises InputError if MuJoCo is missing, rejects the file or exceeds a limit, or if the robot has a ball
+    joint.
     """
     version()
     name = name_of(source)
@@ -117,7 +118,8 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
 def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     """Compare a robot with MuJoCo's model of the MJCF file; return a line with the result.
 
-    Raises OracleError if placements or mimic rules differ by more than the bound.
+    Raises OracleError if placements or mimic rules differ by more than the bound. A missing or an additional
+    joint equality in MuJoCo's model also raises OracleError.
     """
     tree, answer = verifier.tree, read.answer
     q = unpacked(answer["q"])

@@ -175,7 +175,7 @@ def _pinocchio_placements(
 ) -> FloatArray:
     """Return Pinocchio's placements (n, bodies, 4, 4) for an MJCF file at MuJoCo's `qpos`.
 
-    `coordinates` maps a joint's name to an index in `qpos`.
+    `coordinates` maps a joint's name to the index of the joint's first number in `qpos`.
     """
     pin = pinocchio()
     try:

@@ -250,7 +250,8 @@ class MujocoOracle(Oracle):
     def _poses(self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]) -> FloatArray:
         """Return placements (n, frames, 4, 4); call `read(body, (k, f))` for each sample k and frame f.
 
-        `count` is the number of inputs among q, v and a. `read` can read further results from `self.data`.
+        MuJoCo receives the first `count` of the inputs q, v and a. `read` can read further results from
+        `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.index(name) for name in x.frames]
@@ -283,6 +284,7 @@ class MujocoOracle(Oracle):
     def _six(self, function: Callable[..., None], body: int) -> FloatArray:
         """Return the velocity or acceleration [linear; angular] (6,) of the body's origin in world axes."""
         six = np.empty(6)
+        # MuJoCo returns [angular; linear].
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
         return np.roll(six, 3)
 
@@ -356,7 +358,10 @@ class MujocoOracle(Oracle):
 
 
 def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return a floating (n, 3, 3) or planar (n, 2, 2) joint's rotation, and its number of slide joints."""
+    """Return a floating or planar joint's rotation, and the number of slide joints that replace the joint.
+
+    The rotation has the shape (n, 3, 3) for a floating joint, and (n, 2, 2) for a planar joint.
+    """
     coordinates = q[:, joint.q : joint.q + 7]
     if joint.kind == "floating":
         return _rotation(_unit_quaternion(coordinates)), 3

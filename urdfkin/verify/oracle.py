@@ -1,9 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo, and conversion of a call's arguments for an oracle.
 
 An oracle is a library whose results urdfkin compares with its own results. This module converts the arguments
-of a call for the oracle. The conversion for the oracle shares no code with the conversion for urdfkin's own
-computation, except for units and named poses. A wrong broadcast, order or name in one conversion therefore
-causes a disagreement.
+of a call for the oracle. Except for units and named poses, this conversion shares no code with the conversion
+for urdfkin's own computation. A wrong broadcast, order or name in one conversion therefore causes a
+disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -51,7 +51,7 @@ from urdfkin.verify.bounds import KERNELS
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return the mimic rule of each joint in `joints`, resolved to an independent joint."""
+    """Return the rule of each mimic joint in `joints`, as a function of an independent joint."""
     if "mimic" not in text:
         return {}
     rules = {
@@ -254,7 +254,7 @@ class Frames:
 
 
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
-    """Return the frames of a Pinocchio model; `stands_on_world`: frame 0 is the link `WORLD`."""
+    """Return the frames of a Pinocchio model; with `stands_on_world`, frame 0 is the link `WORLD`."""
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # Frame 0 is the world.
@@ -325,7 +325,8 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     """Rotate the linear part and the angular part y of each six-vector by R^T.
 
-    For a quaternion with vector part u and scalar part w, R^T y = y + 2 w c + 2 (c x u) with c = y x u.
+    Let u be the vector part and w the scalar part of the quaternion. With c = y x u,
+    R^T y = y + 2 w c + 2 (c x u).
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     y = six.reshape(*six.shape[:-1], 2, 3)
@@ -403,9 +404,9 @@ class BaseRows(NamedTuple):
 class QueryBatch(NamedTuple):
     """The arguments of a call for an oracle, with one batch axis: q (n, nq), v and a (n, nv) in `inputs`.
 
-    If `joints` is True, `frames` contains `JointFrame` objects. If `divided` is True, `frames` is a section
-    of a longer list. Even for one frame, the oracle then uses its function for several frames, because its
-    function for a single frame may round differently.
+    If `joints` is True, `frames` contains `JointFrame` objects, and Pinocchio uses its functions for joints.
+    If `divided` is True, `frames` is a section of a longer list. Pinocchio then uses its function for several
+    frames, even for one frame. Pinocchio's function for a single frame may round differently.
     """
 
     frames: Sequence[str]
@@ -520,7 +521,9 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 class Oracle:
     """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    A subclass builds the library's model in `__init__`. Results have the shape (n, frames, ...).
+    A subclass builds the library's model in `__init__`. From `tree`, an oracle takes no geometry, only names
+    and sizes. Results have the shape (n, frames, ...).
+
     `moving_base` connects the world and the root by a free-flyer. `root_joint` is the kind of a root joint
     that the tree contains, but not the text. `lock` contains the values (rad or m) of locked joints.
     `new_data` returns a new data structure of the library, for one thread.
@@ -609,8 +612,9 @@ class Oracle:
 def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
-    Each column of J_full has an index in v (`index`) and a nonzero element of G (`factor`). The kernel and
-    NumPy return identical results.
+    Column i of J_full is multiplied by `factor[i]`, an element of G, and added to column `index[i]` of the
+    product. Only the columns of J_full in `columns` are added, in this order. The kernel and NumPy return
+    identical results.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:

@@ -26,7 +26,8 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
 
     `numbers` contains roll, pitch, yaw (n, 3) in rad or quaternions (n, 4), scalar last. `again(k)` returns a
     command that computes sample k again. The bound includes the distance between `R` and the nearest rotation
-    matrix, because `R` has rounding errors. Raises VerificationError above the bound.
+    matrix, because `R` has rounding errors. Raises VerificationError if a rotation differs by more than the
+    bound.
     """
     pin = pinocchio()
     if numbers.shape[-1] == 3:

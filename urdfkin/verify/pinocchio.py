@@ -136,7 +136,7 @@ def build_model(
     """Return Pinocchio's model of a URDF text; raise OracleError if Pinocchio cannot build the model.
 
     Without enough memory or stack, Pinocchio would crash the process. A robot with too many joint velocities
-    is therefore rejected, and a long chain of links is parsed with a larger stack.
+    is therefore rejected. A long chain of links is parsed with a larger stack.
 
     `root_joint` is "floating" or "planar", or None for a fixed root. The values in `lock` are in rad or m.
     With `coupled`, the joints that mimic a locked joint are also locked.

@@ -122,7 +122,7 @@ def read(text: str) -> yourdf.Robot:
 def _differences(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield each difference of a joint, and the known fault of yourdfpy that explains the difference."""
+    """Yield each difference of a joint and the known fault of yourdfpy behind it, or an empty string."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""

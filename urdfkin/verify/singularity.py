@@ -46,8 +46,8 @@ class FrameColumns:
             for a column that does not belong to a single joint axis.
         active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
         samples: Function that returns Jacobians (n, 6, nv) at random configurations on a fixed base.
-        moving_base: Whether the base moves. The lost directions of a moving base cannot be compared with
-            `samples`.
+        moving_base: Whether the base moves. If the base moves, lost directions cannot be compared with
+            `samples`, which have a fixed base.
     """
 
     J: FloatArray

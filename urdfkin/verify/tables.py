@@ -12,13 +12,13 @@ motion of base b and of tip t in the world, and r = p_t - p_b:
 These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. The table's
 results come from `urdfkin.kinematics.equations`, so this module implements the equations independently.
 
-The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds angles of a table to
-multiples of 15 degrees. If snapping has changed a table, the bound also includes the deviation that the table
-states. The bound on rounding errors is proportional to the robot's reach. The reach is the length of the
-paths from the root to the table's base and to its tip, with prismatic displacements. If the sum of all
-lengths in the table is larger than the reach, the bound uses this sum, but at most `PROMISED` times the
-reach. Tables with Hayati rows never exceed this limit. The bound on a Jacobian column is multiplied by the
-multipliers of its mimic joints.
+The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
+that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
+deviation that the table states. The bound on rounding errors is proportional to the robot's reach. The reach
+is the length of the path from the root to the table's base plus the length of the path from the root to the
+tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
+reach, the bound uses this sum. The bound uses at most `PROMISED` times the reach. Tables with Hayati rows
+never exceed this limit. The bound on a Jacobian column is multiplied by the multipliers of its mimic joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this

@@ -77,8 +77,9 @@ def read_usd(
 ) -> UsdReading:
     """Read the robot of a USD file in a process with limits on time (s) and memory.
 
-    `variants` contains pairs (variant set, variant). Raises SourceError if the file cannot be read. Raises
-    InputError if OpenUSD is missing, rejects the file or exceeds a limit, or for an unsupported joint.
+    OpenUSD also reads the files to which the stage refers. `variants` contains pairs (variant set, variant).
+    Raises SourceError if the file cannot be read or is too large. Raises InputError if OpenUSD is missing,
+    rejects the file or exceeds a limit, or for an unsupported joint.
     """
     version()
     path = at_home(source)

@@ -112,7 +112,7 @@ class Verifier:
         return self._oracles[key]
 
     def model(self, *, mimic: bool) -> Any:
-        """Return a new `pinocchio.Model` of the robot; raise OracleError if Pinocchio rejects the robot."""
+        """Return a new `pinocchio.Model`; raise OracleError if Pinocchio cannot check the robot."""
         if self.unverifiable is not None:
             raise OracleError(self.unverifiable, where=self.tree.name)
         return build_model(
@@ -438,7 +438,7 @@ def as_verify(verify: object) -> Verify:
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
-    The sample is random, because every k-th configuration of an ordered batch may be biased.
+    The sample is random, because a sample of every k-th configuration may be biased in an ordered batch.
     """
     step = min(_MOST, max(1, _PART_SIZE // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

@@ -52,8 +52,8 @@ _ONE_THREAD = lock_over_forks()
 def enough_digits(joints: int) -> int:
     """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    Each joint on the path to the frame adds one digit, because a joint with an oblique axis loses only about
-    a third of a digit.
+    Each joint on the path to the frame adds one digit. One digit is enough, because a joint with an oblique
+    axis loses only about a third of a digit.
     """
     return _TWO_DOUBLES + joints
 
