@@ -147,7 +147,9 @@ def test_a_mimic_rule_that_urdfkin_misreads_is_not_verified(what: str) -> None:
     assert wrong != TEXT
     robot = misread(TEXT, wrong)
     if robot.nq > 1:
-        with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates .*: found j3"):
+        with pytest.warns(
+            urdfkin.NotVerifiedWarning, match="Pinocchio finds different coordinates .*: found j3"
+        ):
             robot.placement(robot.neutral(), "l4")
         assert not robot.certificate().verified
         return
@@ -159,7 +161,7 @@ def test_a_mimic_rule_that_urdfkin_misreads_is_not_verified(what: str) -> None:
 def test_a_parser_that_loses_all_mimic_rules_is_not_verified() -> None:
     # Only mimic=False of the user removes the rules; a tree without rules is not a request.
     robot = Robot(tree_of(TEXT.encode(), mimic=False), TEXT, origin=Origin("<text>"))
-    with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds other coordinates"):
+    with pytest.warns(urdfkin.NotVerifiedWarning, match="Pinocchio finds different coordinates"):
         robot.placement(robot.neutral(), "l4")
     free = urdfkin.load(TEXT, mimic=False)
     free.placement([0.1, 0.2, 0.3, 0.4], "l4")
@@ -174,7 +176,9 @@ def test_joints_in_a_different_order_and_coordinates_of_other_joints_are_detecte
             object.__setattr__(one, "name", "x")
     robot = Robot(tree, text, origin=Origin("<text>"))
     assert robot.joint_names == ("y", "x")
-    with pytest.warns(urdfkin.NotVerifiedWarning, match="other joints .* found the same in another order"):
+    with pytest.warns(
+        urdfkin.NotVerifiedWarning, match="different joints .* found the same names in a different order"
+    ):
         robot.placement([0.1, 0.2], "b")
     # Both sides once used the tree's assignment of the numbers in q to joints.
     robot = urdfkin.load("ur5")

@@ -204,7 +204,7 @@ def test_both_oracles_detect_a_wrongly_locked_tree(mistake: str, oracle: OracleL
     }[mistake]
     robot.tree = robot.verifier.tree = robot_of("panda").locked(other).tree
     if mistake == "free":
-        with pytest.raises(OracleError, match="finds other joints"):
+        with pytest.raises(OracleError, match="finds different joints"):
             robot.verifier.oracle(None, oracle)
         return
     with pytest.raises(VerificationError, match=r"--lock panda_joint7=0\.5 --lock panda_finger_joint1=0\.03"):

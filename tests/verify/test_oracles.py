@@ -290,7 +290,7 @@ PLANTED: dict[str, tuple[str, Callable[[Any], Any], str]] = {
     "rotation": ("origin", more(1e-14, 0, 0), "joint turn: rotation"),
     "limit": ("limit.upper", lambda _: 2.5, "joint turn: limit"),
     "parent": ("parent", lambda _: "c", "joint turn: from c to a"),
-    "name": ("name", lambda _: "other", "joint turn: 0 times, not 1"),
+    "name": ("name", lambda _: "other", "joint turn: yourdfpy finds 0, urdfkin finds 1"),
     "kind": ("type", lambda _: "continuous", "joint turn: type continuous, not revolute"),
 }
 
@@ -356,7 +356,7 @@ def test_a_file_that_yourdfpy_cannot_read_is_reported_and_is_no_failure(
 
 def test_a_file_with_a_document_type_is_not_passed_to_yourdfpy() -> None:
     found = second_reading("<!DOCTYPE robot>" + ARM, loaded(ARM, verify=False).tree)
-    assert found.unread == "the file has a document type"
+    assert found.unread == "the file has a document type declaration"
 
 
 def test_the_declared_encoding_of_a_file_causes_no_difference_between_the_readers() -> None:

@@ -387,7 +387,7 @@ def test_the_explanation_for_an_arm_that_is_singular_everywhere_is_the_arm() -> 
     one = found(robot, [0.1, 0.2, 0.3, 0.4, 0.5])
     assert (one.rank, one.full, len(one.lost), len(one.motions)) == (3, 5, 0, 2)
     assert one.reasons == (
-        "Random configurations have the same rank: the cause is the arm, not this configuration.",
+        "Random configurations have the same rank, so the arm is the cause, not this configuration.",
     )
     stretched = found(robot, np.zeros(5), "linear")
     assert stretched.lost.tolist() == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]

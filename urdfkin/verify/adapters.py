@@ -7,12 +7,13 @@ environment in which one library is installed:
     python -I urdfkin/verify/adapters.py kinpy < cases.json
 
 The program reads a list of cases `{"name", "text", "configurations"}` and prints one line of JSON for each
-case. A configuration maps each independent joint to its value: one number (rad or m), three numbers for a
-planar joint (x, y, angle), or seven for a floating joint (x, y, z, qx, qy, qz, qw).
+case. A configuration maps each independent joint to its value. The value of a revolute or prismatic joint is
+one number (rad or m). The value of a planar joint is three numbers (x, y, angle). The value of a floating
+joint is seven numbers (x, y, z, qx, qy, qz, qw).
 
-An adapter passes all inputs that the library's documentation requires. It passes no values for mimic joints,
-because the library can read the mimic rules from the file. The adapter does not correct poses that the
-library computes wrongly.
+An adapter passes all inputs that the library's documentation requires. An adapter passes no values for mimic
+joints, because the library can read the mimic rules from the file. If the library computes wrong poses, the
+adapter does not correct them.
 """
 
 from __future__ import annotations
@@ -38,7 +39,6 @@ import numpy as np
 #: Value of a joint; several numbers for a planar or floating joint.
 Value = Any
 Poses = dict[str, Any]
-#: A planar joint has 3 values, and a floating joint has 7.
 _PLANAR, _FLOATING = 3, 7
 #: Suffixes of the three joints that replace a planar joint in MuJoCo.
 _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
@@ -48,10 +48,8 @@ _MUJOCO_PLANAR = ("_TX", "_TY", "_RZ")
 class Reading:
     """A robot that a library has read from a file.
 
-    Attributes:
-        joints: Names of the joints that have a coordinate, in the library's order.
-        poses: Function of the joint values. It returns the pose (4, 4) of each link relative to the root
-            link; links that the library merges into other links are missing.
+    `joints` lists the joints with a coordinate, in the library's order. `poses` returns the pose (4, 4) of
+    each link relative to the root link. Links that the library merges into other links are missing.
     """
 
     joints: list[str]
@@ -62,7 +60,7 @@ class Reading:
 
 
 def _is_path(source: str) -> bool:
-    """Return whether a source is the path of an MJCF or USD file, and not a URDF text."""
+    """Return whether a source is the path of an MJCF or USD file, not a URDF text."""
     return not source.lstrip().startswith("<")
 
 
@@ -73,7 +71,6 @@ def _root(text: str) -> str:
 
 
 def _children(text: str) -> dict[str, str]:
-    """Return the child link of each joint."""
     return {
         joint.get("name", ""): child.get("link", "")
         for joint in ET.fromstring(text).iterfind("joint")
@@ -102,13 +99,12 @@ def _rigid(R: Any, p: Any) -> Any:
 
 
 def _relative(poses: Poses, root: str) -> Poses:
-    """Convert link poses from the world to the root link; a missing pose of the root is the identity."""
+    """Convert link poses from the world to the root; a missing root pose is the identity."""
     inverse = np.linalg.inv(poses.get(root, np.eye(4)))
     return {root: np.eye(4)} | {link: inverse @ T for link, T in poses.items()}
 
 
 def read_pinocchio(text: str) -> Reading:
-    """Read a URDF with Pinocchio; mimic joints follow their mimic rules."""
     import pinocchio as pin
 
     if _is_path(text):
@@ -124,7 +120,8 @@ def read_pinocchio(text: str) -> Reading:
                 continue
             joint = model.joints[model.getJointId(name)]
             at = joint.idx_q
-            if joint.nq == 2:  # a continuous joint has two coordinates
+            # In Pinocchio, a continuous joint has two coordinates.
+            if joint.nq == 2:
                 q[at : at + 2] = math.cos(value), math.sin(value)
             elif joint.nq == 4 and len(value) == _PLANAR:
                 q[at : at + 4] = value[0], value[1], math.cos(value[2]), math.sin(value[2])
@@ -135,13 +132,12 @@ def read_pinocchio(text: str) -> Reading:
             {f.name: data.oMf[i].homogeneous for i, f in enumerate(model.frames) if f.type == pin.BODY}, root
         )
 
-    # Joint 0 is the world.
+    # In Pinocchio, joint 0 is the world.
     moving = [model.names[i] for i in range(1, model.njoints) if model.joints[i].nq]
     return Reading(moving, poses)
 
 
 def read_mujoco(text: str) -> Reading:
-    """Read a URDF with MuJoCo; links at fixed joints are not merged, and each mass has a minimum."""
     import mujoco
 
     root = "world"
@@ -182,7 +178,7 @@ def read_mujoco(text: str) -> Reading:
 
 
 def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, Value]]:
-    """Yield the name and value of each MuJoCo joint that replaces a URDF joint: three for a planar joint."""
+    """Yield the name and value of each MuJoCo joint that replaces a URDF joint."""
     if name in names:
         yield name, value
     elif name + _MUJOCO_PLANAR[0] in names:
@@ -190,7 +186,7 @@ def _mujocos(name: str, value: Value, names: list[str]) -> Iterator[tuple[str, V
 
 
 def read_drake(text: str) -> Reading:
-    """Read a URDF with Drake; mimic joints require a discrete plant and the contact solver SAP."""
+    """Read a URDF with Drake; mimic joints require a discrete plant with the contact solver SAP."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
 
@@ -361,7 +357,6 @@ def read_skrobot(text: str) -> Reading:
 
 
 def read_newton(path: str) -> Reading:
-    """Read a USD stage with Newton, which computes in single precision."""
     import newton
 
     builder = newton.ModelBuilder()
@@ -400,13 +395,8 @@ def read_newton(path: str) -> Reading:
 class Library:
     """A library that reads robot files.
 
-    Attributes:
-        title: Name of the library in tables.
-        package: The name that pip installs.
-        module: The module that is imported.
-        read: The adapter.
-        forms: File formats that the adapter can read.
-        single: Whether the library computes in single precision.
+    `package` is the name for pip, and `forms` lists the file formats that the adapter `read` accepts.
+    `single` is True if the library computes in single precision.
     """
 
     title: str
@@ -435,18 +425,17 @@ LIBRARIES: dict[str, Library] = {
 
 
 def version(name: str) -> str | None:
-    """Return the version of a library in this environment; None if it is not installed."""
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         return importlib.metadata.version(LIBRARIES[name].package)
     return None
 
 
 def answer(name: str, case: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the joints and the link poses that a library computes, or the library's error message."""
+    """Return the joints and link poses that a library computes, or the library's error message."""
     try:
         reading = LIBRARIES[name].read(case["text"])
         found = [reading.poses(values) for values in case["configurations"]]
-    except Exception as error:  # the libraries raise many types of exceptions
+    except Exception as error:  # The libraries raise many types of exceptions.
         words = " ".join(str(error).split())
         return {"error": f"{type(error).__name__}: {words}" if words else type(error).__name__}
     poses = [{link: np.asarray(T, float).tolist() for link, T in one.items()} for one in found]
@@ -463,10 +452,11 @@ def _lines(name: str, cases: Iterable[Mapping[str, Any]]) -> Iterable[str]:
 
 
 def main() -> None:
-    """Read cases from standard input, and print the results of the library named by the first argument."""
+    """Read cases from standard input; print the results of the library named by the first argument."""
     logging.disable(logging.CRITICAL)
     warnings.simplefilter("ignore")
-    output = os.dup(1)  # texts that libraries print are redirected to standard error
+    # Texts that the libraries print go to standard error, so that the output contains only results.
+    output = os.dup(1)
     os.dup2(2, 1)
     for line in _lines(sys.argv[1], json.load(sys.stdin)):
         os.write(output, f"{line}\n".encode())

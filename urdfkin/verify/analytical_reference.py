@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: Arrays of floats, or of the fifty-digit numbers of the accuracy study.
 Numbers = NDArray[Any]
 
 
@@ -20,8 +19,8 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
 
     An Euler sequence rotates about the coordinate axes i, j and k, in this order: R = R_i R_j R_k. The first
     rotation axis is e_i, and the third is R e_k. The middle axis is perpendicular to the first and the third
-    axis: it is n / |n| or -n / |n|, with n = e_i x R e_k. The range of the middle angle b determines the
-    sign:
+    axis. With n = e_i x R e_k, the middle axis is n / |n| or -n / |n|. The range of the middle angle b
+    determines the sign:
 
     - k = i: b is in [0, pi], the sign is +1, and |n| = |sin b|.
     - k != i: b is in [-pi/2, pi/2], the sign is (e_j x e_i) . e_k, and |n| = |cos b|.
@@ -29,10 +28,9 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     The derivative of each angle is the dot product of the angular velocity and a vector of the reciprocal
     basis of the three axes.
 
-    Args:
-        name: SciPy's name of the sequence: capital letters mean body axes, small letters mean fixed axes.
-        R: (..., 3, 3) rotation from body axes to world axes.
-        J_v: (..., 6, n) velocity Jacobian, [linear; angular], in world axes.
+    `name` is SciPy's name of the sequence: capital letters mean body axes, small letters fixed axes. `R`
+    (..., 3, 3) is the rotation from body axes to world axes. `J_v` (..., 6, n) is the velocity Jacobian
+    [linear; angular] in world axes.
     """
     letters = name.lower()[::-1] if name.islower() else name.lower()
     i, j, k = ("xyz".index(letter) for letter in letters)
@@ -42,7 +40,7 @@ def euler_jacobian(name: str, R: Numbers, J_v: Numbers) -> tuple[Numbers, Number
     sign = 1.0 if k == i else float(np.linalg.det(np.eye(3)[[j, i, k]]))
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = sign * n / length
-        volume = -sign * length  # first . (middle x third)
+        volume = -sign * length  # The volume is first . (middle x third).
         reciprocal = [np.cross(middle, third) / volume, middle, np.cross(first, middle) / volume]
     rows = np.stack(reciprocal[::-1] if name.islower() else reciprocal, axis=-2)
     return np.concatenate((J_v[..., :3, :], rows @ J_v[..., 3:, :]), axis=-2), length[..., 0]

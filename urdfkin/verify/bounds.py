@@ -24,8 +24,8 @@ rounding error:
 | J-dot, linear rows | 3 | w, z, d |
 | Hessian, linear rows | 3 | z, z, d |
 
-The references LOCAL and WORLD need one more factor: a rotation into the frame's axes (LOCAL), or a cross
-product with p (WORLD).
+The reference frames LOCAL and WORLD need one more factor. For LOCAL, this factor is a rotation into the
+frame's axes. For WORLD, this factor is a cross product with the frame's position p.
 
 Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
 worst way. Reports state differences in multiples of eps * scale, so that differences of small and large
@@ -33,9 +33,10 @@ robots can be compared.
 
 *Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
 vectors (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
-result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The cross product
-v_i^2 z x z is 0 except for rounding errors, which are large for fast joints with an oblique axis. The bound
-on the angular acceleration alpha therefore uses w_i instead of w_{i-1}.
+result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms differ
+by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this cross
+product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha therefore
+uses w_i instead of w_{i-1}.
 """
 
 from __future__ import annotations
@@ -59,12 +60,11 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
-#: Module of the compiled functions that check results.
 KERNELS = "urdfkin.verify.kernels"
 _NO_ROTATION = np.eye(3).ravel()
-#: Indices of position, velocities and accelerations in the state of a moving base.
+#: First indices of position, velocities and accelerations in the state of a moving base.
 _OF_BASE = 9, 12, 15, 18, 21
-#: How many configurations the kernel `lengths` processes at once; their data fit into the first-level cache.
+#: Number of configurations that the kernel `lengths` processes at once; their data fit into the L1 cache.
 _BLOCK = 64
 
 
@@ -97,13 +97,8 @@ def magnitudes(
 ) -> Magnitudes:
     """Return upper bounds on the terms of each frame's position, velocity and acceleration.
 
-    Args:
-        plan: The compiled tree.
-        q: (n, nq) rad, m.
-        v: (n, nv) or None. Without v, only `p` and `roundings` are valid; placements and Jacobians need no
-            other bounds.
-        a: (n, nv) or None.
-        base: (1 or n, 24) state of the moving base.
+    `q` has the shape (n, nq); `v` and `a` have the shape (n, nv) or are None. `base` (1 or n, 24) is the
+    state of the moving base. Without v, only `p` and `roundings` are valid.
     """
     n, lengths = len(q), _lengths(plan)
     out = np.empty((6, n, len(lengths.ends)))
@@ -118,13 +113,12 @@ def magnitudes(
             preload.spend("lengths", time.thread_time() - begin)
     else:
         _by_kernel(kernel, lengths, inputs, out)
-    is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)  # a rotated base counts as one more joint
+    is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)
     out[5] = of_joints(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
 def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with NumPy, or with Python numbers for a single configuration."""
     q, base, *rates = (_columns(x, out.shape[1]) for x in inputs)
     states = [tuple(_norm(base[at : at + 3]) for at in _OF_BASE)]
     for link in lengths.links:
@@ -136,7 +130,7 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
 
 
 def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) -> None:
-    """Compute `out` with a compiled function; the result equals that of `_by_steps` bit for bit."""
+    """Fill `out` with the compiled kernel; the results equal those of `_by_steps` bit for bit."""
     links = lengths.links
     # The stride of an input is 0 if all configurations share one row.
     q, base, v, a = (x if x.strides[0] else x[:1] for x in inputs)
@@ -157,7 +151,7 @@ def _by_kernel(kernel: Any, lengths: _Lengths, inputs: Sequence[FloatArray], out
 
 
 def _rows(columns: Sequence[FloatArray]) -> FloatArray:
-    """Return an array with the given columns; a column of length 1 is repeated in every row."""
+    """Return an array with the given columns; a column of length 1 fills all rows."""
     rows = np.empty((max(map(len, columns), default=1), len(columns)))
     for row, column in zip(rows.T, columns, strict=True):
         row[:] = column
@@ -165,7 +159,7 @@ def _rows(columns: Sequence[FloatArray]) -> FloatArray:
 
 
 class _MovingJoint(NamedTuple):
-    """A moving joint of a compiled tree, with the absolute values of the mimic multiplier and offset."""
+    """A moving joint; `multiplier` and `offset` are the absolute values in the joint's mimic rule."""
 
     kind: int
     q: int
@@ -177,13 +171,7 @@ class _MovingJoint(NamedTuple):
 
 
 class _End(NamedTuple):
-    """A frame of a compiled tree.
-
-    Attributes:
-        step: Index of the last moving joint before the frame.
-        frame: Index of the frame in the output.
-        length: Length of the path from the joint `step` to the frame, m.
-    """
+    """A frame, its last moving joint `step`, and the path length (m) between the two."""
 
     step: int
     frame: int
@@ -191,7 +179,7 @@ class _End(NamedTuple):
 
 
 class _Lengths(NamedTuple):
-    """The moving joints and the frames of a compiled tree, as Python numbers and as NumPy arrays."""
+    """Moving joints and frames of a compiled tree, as Python numbers and as arrays."""
 
     links: list[_MovingJoint]
     ends: list[_End]
@@ -199,7 +187,6 @@ class _Lengths(NamedTuple):
 
 
 def _lengths(plan: CompiledTree) -> _Lengths:
-    """Return the moving joints and the frames of a compiled tree; `plan.cache` stores the result."""
     found: _Lengths | None = plan.cache.get("lengths")
     if found is None:
         lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
@@ -227,7 +214,6 @@ def _columns(x: FloatArray, n: int) -> Any:
 
 
 def _norm(x: Any) -> Length:
-    """Return the Euclidean length of a vector, whose components are columns or Python numbers."""
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
@@ -235,7 +221,7 @@ def _carried_place(state: State, d: Length) -> State:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
-#: Numbers of translations and of rotations of a planar joint and of a floating joint.
+#: Number of translations and number of rotations, for a planar and for a floating joint.
 _FREE_PARTS = {int(JointMotion.PLANAR): (2, 1), int(JointMotion.FLOATING): (3, 3)}
 
 
@@ -273,13 +259,13 @@ def _step(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 
-#: A scale above the range of doubles becomes inf, and `disagreement` then accepts no result.
+#: A scale above the range of doubles becomes inf, and no result is then accepted.
 _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The bound k * eps * scale of a quantity. NumPy broadcasting applies to `k`, `scale` and the results.
+    """The bound k * eps * scale of a quantity; `k` and `scale` can be broadcast to the shape of the results.
 
     Attributes:
         scale: Upper bound on the sum of the absolute values of the terms of a number, in the unit of this
@@ -292,10 +278,9 @@ class Bound:
 
 
 def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the factor `k` of the bound for each result, as an array of shape `leading`.
+    """Return the bound's `k` for each result, as an array of shape `leading`.
 
-    All numbers of a result have the same `k`. A `k` that is not finite and positive becomes NaN, so that no
-    result is within the bound.
+    A `k` that is not finite and positive becomes NaN, so that no result is within the bound.
     """
     k = bound.k.reshape(bound.k.shape[: len(leading)])
     k = np.where((k > 0.0) & (k < np.inf), k, np.nan)
@@ -303,10 +288,7 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with the given scale (n, frames, ...).
-
-    `k` is the number of factors times `size.roundings`. LOCAL and WORLD have one factor more than `factors`.
-    """
+    """Return the bound with `k` = `factors` * `size.roundings`; LOCAL and WORLD add one factor."""
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
@@ -316,12 +298,12 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
 def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     """Return the magnitudes for a comparison of urdfkin with MuJoCo.
 
-    MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass, which
-    `urdfkin.verify.mujoco` places at the root. At the end, MuJoCo converts the results to the frame's origin.
-    The distance of a joint or the frame from the centre of mass is at most the length p of the path. Lever
-    arms are therefore at most 2 p. The conversion to the centre of mass and back is a cross product with a
-    lever arm, which at most doubles the number of factors in a term. The bound allows `MUJOCO` rounding
-    errors for each joint instead of `ROUNDINGS`.
+    MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass.
+    `urdfkin.verify.mujoco` places the centre of mass at the root. At the end, MuJoCo converts the results to
+    the frame's origin. The distance of a joint or the frame from the centre of mass is at most the length p
+    of the path. Lever arms are therefore at most 2 p long. The conversion to the centre of mass and back is a
+    cross product with a lever arm. This cross product at most doubles the number of factors in a term. The
+    bound allows `MUJOCO` rounding errors for each joint instead of `ROUNDINGS`.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -336,12 +318,12 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
 
 
 class DecimalErrors(NamedTuple):
-    """The errors of converting a URDF's decimals to doubles (`urdfkin.verify.exact.numbers.conversion`).
+    """Errors of the conversion of a URDF's decimals to doubles.
 
     Attributes:
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
-        rules: Number of mimic rules of the joints on the path; a joint that mimics a mimic joint counts as
-            two rules.
+        rules: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint, the
+            rules of both joints count.
         lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if offsets in
             a chain of mimic rules cancel, because the rounding errors of the offsets do not cancel.
     """
@@ -356,40 +338,36 @@ def true_value_magnitudes(
 ) -> Magnitudes:
     """Return the magnitudes for a comparison of one program's results with the true values.
 
-    The true values are computed from the decimals in the URDF and from the doubles q, v and a, and are
-    rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One program makes
-    at most 16.8 rounding errors (`urdfkin.kinematics.roundings`). The remaining 7.2 cover the conversion of
-    decimals to doubles: half an eps each for the offset, the axis and the true value. The axis counts twice,
-    because it is used in two rotations. Two kinds of numbers need additional roundings:
+    The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
+    values are rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One
+    program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The remaining
+    7.2 cover the conversion of decimals to doubles: half an eps each for the offset, the axis and the true
+    value. The error of the axis counts twice, because two rotations use the axis. Two kinds of numbers need
+    additional roundings:
 
-    - Roll, pitch and yaw have an error of half an eps of their size, so all vectors after the joint rotate by
-      at most (|roll| + |pitch| + |yaw|) / 2 eps.
+    - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
+      rotate by at most (|roll| + |pitch| + |yaw|) / 2 eps.
     - A mimic joint's value is m x + c. The roundings of m, of the product and of the sum have an error of at
-      most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps, and the error of x
-      is multiplied by |m|.
+      most (3 |m x| + |c|) / 2 eps. The rounding of c has an error of at most |c| / 2 eps. The error of x is
+      multiplied by |m|.
 
     *Chains of mimic rules.* If a mimic joint mimics another mimic joint, r rules form a chain. Let X be the
-    value of the joint with all terms replaced by their absolute values: |q| for an independent joint, and |m|
-    X' + |c| for a joint that mimics a joint with X'. A program may combine the r rules to one rule M q + C.
-    The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum exceeds X, so the
-    combined rule adds an error of at most (r - 1) / 2 X eps; all other rounding errors are those of the
-    separate rules.
+    value of the joint with all terms replaced by their absolute values. For an independent joint, X is |q|.
+    For a joint that mimics a joint with the value X', X is |m| X' + |c|. A program may combine the r rules to
+    one rule M q + C. The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum
+    exceeds X, so the combined rule adds an error of at most (r - 1) / 2 X eps. All other rounding errors are
+    those of the separate rules.
 
     *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
     error of 1 eps rad changes a vector by at most eps times the length of the vector.
 
-    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement has therefore an
+    *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement therefore has an
     error of at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain
     cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
     displacement. Then 3/2 eps for each rule are enough. The same error bound holds for the velocity and the
     acceleration of the joint, which are rounded less often.
 
-    Args:
-        plan: The compiled tree of one frame.
-        q: (n, nq) rad, m.
-        v: (n, nv) or None.
-        a: (n, nv) or None.
-        errors: The errors of the conversions, for the same path and the same q.
+    `plan` is the compiled tree of one frame. `errors` belongs to the path of this frame and to q (n, nq).
     """
     size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
     more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
@@ -399,7 +377,8 @@ def true_value_magnitudes(
 def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
     """Return the scale (n, frames, 4, 4) of the bound on placements.
 
-    The scale is the length of the path for positions, 1 for rotations, and 0 for the last row.
+    The scale of a position is the length of the path. The scale of a rotation is 1, and the scale of the last
+    row is 0.
     """
     scale = np.zeros((*size.p.shape, 4, 4))
     scale[..., :3, :3] = 1.0
@@ -411,21 +390,21 @@ def placement_scale(plan: CompiledTree, size: Magnitudes) -> FloatArray:
 def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) -> Bound:
     """Return the bound on the difference between the tree's and MuJoCo's placements for an MJCF file.
 
-    *Lengths.* In an MJCF file, the offset of a body is the sum of the body's `pos`, the `pos` of the joints,
-    and a vector for the `ref` of a slide joint. urdfkin adds these vectors once, when reading the file.
-    MuJoCo adds the vectors for each configuration. A single vector can be longer than the sum, so the scale
-    of positions is the larger of the length of the path and `lengths`.
+    *Lengths.* In an MJCF file, the offset of a body is a sum of vectors. These vectors are the body's `pos`,
+    the `pos` of the joints, and a vector for the `ref` of a slide joint. urdfkin adds these vectors once,
+    when reading the file. MuJoCo adds the vectors for each configuration. A single vector can be longer than
+    the sum. The scale of positions is therefore the larger of the length of the path and `lengths`.
 
-    *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref; urdfkin rotates the hinge by ref and by q
+    *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref. urdfkin rotates the hinge by ref and by q
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
     all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
     of a position changes by at most the angle error times the length of the path. The scale is multiplied by
-    1 + `angles` / k. This is twice the change of first order, so it also covers terms of second order.
+    1 + `angles` / k. This factor allows twice the change of first order, and therefore also covers the terms
+    of second order.
 
-    Args:
-        bound: Bound of the tree's placements, (n, frames, 4, 4).
-        lengths: (n, frames) sum of the lengths of the vectors `pos` and `ref` on the path to the frame, m.
-        angles: (n, frames) sum of |q| + |ref| over the hinges with a reference value, rad.
+    `bound` is the bound of the tree's placements (n, frames, 4, 4). `lengths` (n, frames) is the sum of the
+    lengths (m) of the vectors `pos` and `ref` on the path to a frame. `angles` (n, frames) is the sum of |q|
+    + |ref| (rad) over the hinges with a reference value.
     """
     scale = bound.scale.copy()
     scale[..., :3, 3] = np.maximum(scale[..., :3, 3], lengths[..., None])
@@ -450,15 +429,17 @@ def acceleration_scale(plan: CompiledTree, size: Magnitudes, reference: Referenc
     includes the term w x vel.
 
     *Breakdown.* The scale is also valid for the sum of the contributions in an `AccelerationBreakdown`. Let
-    d_k be the vector from joint k to the frame, and w_k the sum of the joint velocities up to joint k.
+    d_k be the vector from joint k to the frame. Let w_k be the sum of the absolute values of the joint
+    velocities up to joint k.
 
-    - The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) have together at most the length (w_k^2 -
-      w_{k-1}^2) d_k. The sum over all joints is the sum of w_k^2 times the length of link k, as in eq. 7.130.
+    - The terms v_k z x (v_k z x d_k) and 2 w_{k-1} x (v_k z x d_k) together have a length of at most (w_k^2 -
+      w_{k-1}^2) |d_k|. The sum over all joints is the sum of w_k^2 times the length of link k, as in eq.
+      7.130.
     - A vector d_k is the sum of the vectors between successive joint origins, with the rounding errors of the
       sums in eq. 7.77.
-    - For n joints, the breakdown has 4 n terms, whose sum has n + 3 rounding errors.
-    - The bound allows 2 eps for the sums at each joint, more than the rounding errors of d_k and of 4 n
-      terms.
+    - For n joints, the breakdown has 4 n terms. The sum of these terms has n + 3 rounding errors.
+    - The bound allows 2 eps for the sums at each joint. This is more than the rounding errors of d_k and of
+      the sum of 4 n terms.
     """
     shared = eq.tangential(size.w, size.vel)
     linear = size.acc + shared
@@ -474,9 +455,9 @@ def imu_scale(size: Magnitudes, gravity: FloatArray) -> FloatArray:
 
 
 def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
-    """Return (n, frames, 6, ...) with `linear` (n, frames, ...) in three rows and `angular` in three rows."""
+    """Return (n, frames, 6, ...) with three rows of `linear` and three rows of `angular`."""
     scale = np.empty((*linear.shape[:2], 6, *linear.shape[2:]))
-    rows = scale.transpose(2, 0, 1, *range(3, scale.ndim))  # faster than `np.moveaxis`
+    rows = scale.transpose(2, 0, 1, *range(3, scale.ndim))  # `np.moveaxis` is slower.
     rows[:3], rows[3:] = linear, angular
     return scale
 
@@ -485,7 +466,7 @@ def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
 
-    In the linear rows, the scale of a revolute joint's column is the length of the path, and that of a
+    In the linear rows, the scale of a revolute joint's column is the length of the path. The scale of a
     prismatic joint's column is 1. For joints that are not on the path, the scale is 0.
     """
     turning, sliding = column_weights(plan)
@@ -513,9 +494,10 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
 
 
 #: Pinocchio's derivative of Jacobian column i by joint j is a sum of products (linear rows).
-#: The first pair applies if joint j is joint i or is nearer to the root than joint i; else the second.
-#: First number of the pair: number of products z x (z x d) in the sum for two revolute joints.
-#: Second number of the pair: number of products z x z in the sum for a revolute and a prismatic joint.
+#: The first pair applies if joint j is joint i or nearer to the root than joint i.
+#: The second pair applies to all other joints j.
+#: The first number of a pair counts the products z x (z x d) for two revolute joints.
+#: The second number of a pair counts the products z x z for a revolute and a prismatic joint.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -528,19 +510,19 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
     An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
-    column of the mimicked joint. An entry can therefore be a sum over several pairs, and so can its scale. A
-    lever arm d is never longer than the path.
+    column of the mimicked joint. An entry, and the scale of the entry, can therefore be a sum over several
+    pairs. A lever arm d is never longer than the path.
 
     Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
     contains the numbers of products that these steps add:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
-    - one to move the result to the frame's origin p, p x (w_1 x w_2)
-    - two to move a column to p before the product, (v - p x w) x w
+    - one to move the result to the frame's origin p: p x (w_1 x w_2)
+    - two to move a column to p before the product: (v - p x w) x w
 
     urdfkin computes the single product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first
-    rotates the two columns by R, so each of the two products has the five factors R, z, R, z and d. The bound
-    allows three products of four factors each (12 in total), which covers the 10 factors of urdfkin.
+    rotates the two columns by R. Each of the two products then has the five factors R, z, R, z and d. The
+    bound allows three products of four factors each (12 in total), which covers the 10 factors of urdfkin.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -567,8 +549,8 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 
     The position rows have the same bound as the rows of the velocity Jacobian. For the rows of angles, let w
     be the angular part of a column of the velocity Jacobian. The rotation axes of the three angles are e_i, u
-    and t = R e_k (`urdfkin.verify.analytical_reference`). With s = |e_i x t|, the sine or cosine of the
-    middle angle:
+    and t = R e_k (`urdfkin.verify.analytical_reference`). Let s = |e_i x t|, which is the sine or cosine of
+    the middle angle:
 
     | Row | Element | Length of the vector |
     |---|---|---|
@@ -576,8 +558,8 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     | first or last angle | r . w, r is the reciprocal basis vector of the axis | 1 / s |
 
     Let delta = k eps be the error of t, and also the relative error of w. The error of t rotates u by at most
-    delta / s. The error of t changes r by the vector -(r . du) u - (r . dt) r', which is at most 2 delta /
-    s^2 long; r' is the reciprocal vector of t. The errors of the rows are:
+    delta / s. Let r' be the reciprocal vector of t. The error of t changes r by the vector -(r . du) u - (r .
+    dt) r', which is at most 2 delta / s^2 long. The errors of the rows are:
 
     - first and last angle: 2 delta / s^2 + delta / s <= 3 delta / s^2
     - middle angle: delta / s + delta <= 2 delta / s
@@ -585,16 +567,15 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
-    eps, and products and quotients about 10 eps. The bound includes these errors, because
-    `Magnitudes.roundings` counts one joint more than the path contains, and a joint has more rounding errors.
+    eps, and products and quotients about 10 eps. The bound includes these 13 eps, because
+    `Magnitudes.roundings` counts one joint more than the path contains. The additional joint counts at least
+    `ROUNDINGS` = 24 rounding errors.
 
-    Args:
-        bound: Bound of the Jacobian.
-        size: Magnitudes of the frames.
-        apart: (n, frames) s of Pinocchio's rotation.
+    `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
     """
     s = apart - EPS * size.roundings
-    s = np.where(s > 0.0, s, 0.0)  # no result is accepted if s is below its rounding error
+    # If s is not larger than its rounding error, the scale is not finite, and no result is accepted.
+    s = np.where(s > 0.0, s, 0.0)
     scale = bound.scale.copy()
     with np.errstate(divide="ignore"):
         scale[..., [3, 5], :] *= (1.5 / (s * s))[..., None, None]
@@ -603,34 +584,39 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
 
 
 def quaternion_jacobian_bound(bound: Bound) -> Bound:
-    """Return the bound (n, frames, 7, nv) of analytical Jacobians with quaternions, which are never singular.
+    """Return the error bound (n, frames, 7, nv) of analytical Jacobians for quaternions.
 
-    The rows of positions have the bound of the velocity Jacobian. Let delta be the error of R. The elements
-    of the matrix 4 q q^T are linear functions of R. The longest row of this matrix has a length of at least 2
-    and an error below 4.6 delta, so the error of q is below 2.3 delta. The derivative of q is half the
-    quaternion product of w and q, with an error of (2.3 + 1) / 2 delta |w|. This error is below 2 delta |w|,
-    the bound on the angular velocity in the velocity Jacobian.
+    Analytical Jacobians for quaternions are never singular. The rows of positions have the bound of the
+    velocity Jacobian. Let delta be the error of R. The elements of the matrix 4 q q^T are linear functions of
+    R. The longest row of this matrix has a length of at least 2 and an error below 4.6 delta, so the error of
+    q is below 2.3 delta. The derivative of q is half the quaternion product of w and q, with an error of (2.3
+    + 1) / 2 delta |w|. This error is below 2 delta |w|, the bound on the angular velocity in the velocity
+    Jacobian.
     """
     return Bound(np.concatenate((bound.scale, bound.scale[..., 5:, :]), axis=-2), bound.k)
 
 
 def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
-    """Return the limit of |qw| below which rounding can change the sign of qw.
+    """Return the value of |qw| below which rounding can change the sign of a quaternion's qw.
 
-    The limit is 1.5 k eps = 3 delta, above the error 2.3 delta of `quaternion_jacobian_bound`.
+    Let delta be the error of R, as in `quaternion_jacobian_bound`. The limit 1.5 k eps is 3 delta, which is
+    larger than the error of qw, 2.3 delta.
     """
     return 1.5 * EPS * result_k(bound, leading)
 
 
 def nearest_singularity(plan: CompiledTree) -> float:
-    """Return four times the error of R (rad); within this distance of a singularity, no digit is correct."""
+    """Return four times the error of a frame's rotation, rad.
+
+    At a smaller distance from a singularity of Euler angles, no digit of the analytical Jacobian is reliable.
+    """
     return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
     """Return the sums (frames, nv) of |multiplier| over revolute joints and over prismatic joints.
 
-    An independent joint has the multiplier 1. `plan.cache` stores the result.
+    An independent joint has the multiplier 1.
     """
     weights: FloatArray | None = plan.cache.get("column weights")
     if weights is None:
@@ -640,23 +626,24 @@ def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:
                 kind = 0 if plan.columns[c, ColumnField.TURNS] else 1
                 weights[kind, frame, plan.columns[c, ColumnField.V]] += abs(plan.multipliers[c])
         weights.setflags(write=False)
-        plan.cache["column weights"] = weights  # stored only now, because other threads may read it
+        # The array is stored only when it is complete, because other threads may read the cache.
+        plan.cache["column weights"] = weights
     return weights[0], weights[1]
 
 
 def movable(plan: CompiledTree, reference: Reference = _ALIGNED) -> NDArray[np.bool_]:
     """Return an array (frames, 6, nv), False for Jacobian entries that are 0 for every q and every base.
 
-    The linear rows of a revolute column are z x d. In WORLD, d is the vector from the joint to the root;
-    otherwise, d is the vector from the joint to the frame. The vector d is 0 for every q if the path between
-    these two points has no length and no prismatic joint.
+    The linear rows of a revolute column are z x d. In WORLD, d leads from the joint to the root. Otherwise, d
+    leads from the joint to the frame. The vector d is 0 for every q if the path between the two ends of d has
+    no length and no prismatic joint.
     """
     found = np.zeros((len(plan.frames), 6, plan.nv), dtype=bool)
     turns = plan.steps[:, StepField.KIND] == JointMotion.TURN
     multipliers = plan.geometry[:, Geometry.MULTIPLIER :]
     extends = (plan.lengths[: len(turns)] > 0.0) | (~turns & (multipliers != 0.0).any(axis=1))
     for f, (end, frame) in enumerate(plan.frames):
-        path, step = list[int](), int(end)  # the path leads from the frame to the root
+        path, step = list[int](), int(end)
         while step >= 0:
             path.append(step)
             step = int(plan.parents[step])

@@ -29,14 +29,8 @@ _PLAIN = np.ndarray, np.memmap
 class Part(NamedTuple):
     """Some of the configurations of a call, converted for urdfkin and, independently, for the oracle.
 
-    Attributes:
-        plan: The compiled tree.
-        reference: Reference frame; without effect on placements.
-        q: (n, nq).
-        rates: Arrays (n, nv): () for a placement, (v,) for a velocity, (v, a) for an acceleration.
-        state: (n or 1, 24) state of the moving base.
-        query: The n configurations for the oracle, converted from the user's arguments.
-        options: Other arguments of the method, by name.
+    `rates` contains arrays (n, nv): () for a placement, (v,) for a velocity, (v, a) for an acceleration.
+    `state` (n or 1, 24) is the state of the moving base, and `query` the input of the oracle.
     """
 
     plan: CompiledTree
@@ -51,19 +45,9 @@ class Part(NamedTuple):
 class Call:
     """The inputs of one call as flat batches.
 
-    Args:
-        tree: The robot.
-        plan: Function that returns the compiled tree for a list of links.
-        frame: Name of a link or joint, or several names.
-        reference: A `Reference` or its name.
-        base: Motion of the root link; None: fixed at the world origin.
-        given: The inputs of the quantity: q, or q and v, or q, v and a.
-        also: Additional frames that are computed, but not returned to the user.
-        options: Other arguments of the method, by name.
+    `given` contains q, or q and v, or q, v and a. `also` names frames that are computed but not returned.
 
-    Raises:
-        InputError: a wrong length, batch shapes that do not broadcast, or a frame that is not a name.
-        UnknownNameError: the frame or reference does not exist.
+    Raises InputError for invalid lengths, batch shapes or frames, and UnknownNameError for an unknown name.
     """
 
     def __init__(
@@ -121,17 +105,14 @@ class Call:
 
     @property
     def results(self) -> int:
-        """Number of results of the call: the number of configurations times the number of frames."""
         return self.n * len(self.links)
 
     def flat(self, out: FloatArray | None, shape: tuple[int, ...]) -> FloatArray | None:
         """Return the caller's array `out`, reshaped to (n, frames, ...) for the compiled functions.
 
-        Subclasses of NumPy's array are rejected. For example, `reshape` of a NumPy matrix may return another
-        shape than requested, and a kernel would then write past the end of the array.
-
-        Raises:
-            InputError: `out` has a wrong type, dtype, layout or shape, or shares memory with an input.
+        Raises InputError for an invalid `out`. Subclasses of NumPy's array are invalid. For example,
+        `reshape` of a NumPy matrix may return an unexpected shape. A kernel would then write past the end of
+        the array.
         """
         if out is None:
             return None
@@ -164,7 +145,6 @@ class Call:
             raise
 
     def part(self, part: slice | IntArray) -> Part:
-        """Return the configurations with the indices `part`."""
         state = self.state if len(self.state) == 1 else self.state[part]
         rates = tuple(x[part] for x in self.rates)
         query = self.question.rows(part)
@@ -176,7 +156,6 @@ class Call:
 
 
 def _described(out: object) -> str:
-    """Describe an invalid argument `out`: the type, and for an array also shape, dtype and layout."""
     if not isinstance(out, np.ndarray):
         return type(out).__name__
     flags = {
@@ -189,11 +168,11 @@ def _described(out: object) -> str:
 
 
 def _frames(frame: str | Sequence[str]) -> tuple[bool, tuple[str, ...]]:
-    """Return True and the names for a list of names; False and the name for a single name."""
+    """Return whether `frame` is a list, and the names."""
     if isinstance(frame, str):
         return False, (frame,)
     try:
-        return True, tuple(frame)[: len(frame)]  # `len` raises TypeError for an iterator
+        return True, tuple(frame)[: len(frame)]  # `len` raises TypeError for an iterator.
     except TypeError:
         raise InputError(
             "a frame must be the name of a link or joint, or a list of such names",

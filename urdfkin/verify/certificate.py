@@ -22,7 +22,6 @@ from urdfkin.verify.quantities import QUANTITIES
 
 #: Reason why results of calls with verify=False are unchecked.
 CHECK_TURNED_OFF = "the check was turned off by verify=False"
-#: Lock for all ledgers.
 _ledger_lock = lock_over_forks()
 
 
@@ -37,7 +36,7 @@ class VerificationError(UrdfkinError):
         ours: urdfkin's result for the worst sample.
         theirs: The oracle's result for the worst sample.
         bound: Largest allowed difference between `ours` and `theirs`, for each number of the result.
-        units: The difference between `ours` and `theirs` in multiples of eps * scale.
+        units: Largest difference between `ours` and `theirs`, in multiples of eps * scale.
         reproduce: A shell command or a line of Python that computes the sample again.
 
     >>> import urdfkin
@@ -77,12 +76,8 @@ class VerificationError(UrdfkinError):
 class CertificateLine:
     """The line of a certificate about one quantity.
 
-    Attributes:
-        checked: Number of results that the oracle confirmed.
-        worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
-            scale.
-        share: Largest ratio of a difference to its bound.
-        unchecked: Number of results that were not checked.
+    `checked` counts the results that the oracle confirmed. `worst` is the largest difference in multiples of
+    eps * scale. `share` is the largest ratio of a difference to its bound.
     """
 
     quantity: str
@@ -93,8 +88,6 @@ class CertificateLine:
 
 
 class LineEntry(TypedDict):
-    """The line about one quantity in the JSON file of a certificate."""
-
     quantity: Annotated[str, says("Name of the quantity.")]
     checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
     worst: Annotated[
@@ -136,7 +129,7 @@ class Certificate(Displayable):
 
     Attributes:
         robot: The robot's name.
-        oracle: Name and version of the oracle: "Pinocchio 4.1.0".
+        oracle: Name and version of the oracle, such as "Pinocchio 4.1.0".
         lines: One line for each computed quantity.
         not_verified: Reasons why results were not checked; empty if all were checked.
         reading: Result of the check of the conversion to URDF from another format; empty for a URDF.
@@ -252,8 +245,8 @@ class Account:
     Attributes:
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         turned_off: Number of results of calls with verify=False.
-        counters: A pair (array, index) for each fast evaluator without checks: array[index] is the number of
-            results that the evaluator has returned.
+        counters: A pair (array, index) for each fast evaluator without checks. The number of results of this
+            evaluator is array[index].
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)
@@ -267,7 +260,6 @@ class Account:
         return CertificateLine(quantity, found.results, found.worst, found.share, unchecked)
 
     def turned_off_in_all(self) -> int:
-        """Return the number of results of calls with verify=False, and of fast evaluators without checks."""
         return self.turned_off + sum(int(counts[index]) for counts, index in self.counters)
 
 
@@ -279,7 +271,6 @@ class Ledger:
     _reasons: dict[str, None] = field(default_factory=dict)
 
     def account(self, quantity: str) -> Account:
-        """Return the counts of a quantity; later calls return the same object."""
         if (known := self._accounts.get(quantity)) is not None:
             return known
         with _ledger_lock:

@@ -28,17 +28,14 @@ from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
 def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
     """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
 
-    Pinocchio's frame of a joint is the frame of the child link. On the part of the chain from the root to a
-    tip, this frame comes after the joint's motion. On the part of the chain from a link up to the root, this
-    frame comes before the joint's motion.
+    Pinocchio's frame of a joint is the frame of the child link. If the chain leads from the parent link to
+    the child link, Pinocchio's frame includes the joint's motion. If the chain leads from the child link to
+    the parent link, Pinocchio's frame does not include the motion.
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
     computes along the chain, which is a part of the two paths. The bound counts all joints of both paths. The
     length in the bound is the distance of the first frame from the root plus the length of the chain, with
     prismatic displacements.
-
-    Raises:
-        TableError: the chain and Pinocchio differ by more than rounding.
     """
     if verifier.cannot() is not None:
         return None
@@ -76,7 +73,6 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
 
 
 def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
-    """Compare the forward kinematics of an OPW solver with Pinocchio."""
     if verifier.cannot() is not None:
         return None
     q, base, tip = _sampled_ends(verifier, path.base, path.tip)
@@ -89,11 +85,6 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
 
 
 def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
-    """Compare a product of exponentials with Pinocchio.
-
-    Raises:
-        TableError: the product of exponentials and Pinocchio differ by more than rounding.
-    """
     if verifier.cannot() is not None:
         return None
     q, base, tip = _sampled_ends(verifier, screws.base_frame, screws.tip_frame)

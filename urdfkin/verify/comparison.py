@@ -1,8 +1,8 @@
 """Compare results of urdfkin and an oracle, in multiples of eps * scale and as a fraction of the bound.
 
 `disagreement` defines the difference of two numbers. For large batches, a compiled kernel computes these
-differences in one pass, because the comparison with NumPy would take as long as Pinocchio's computation. The
-kernel and NumPy return equal numbers.
+differences, because NumPy would take as long as Pinocchio's computation. The kernel and NumPy return equal
+numbers.
 """
 
 from __future__ import annotations
@@ -25,13 +25,12 @@ _NO_BITS = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True, slots=True)
 class BatchComparison:
-    """Comparison of a batch of urdfkin's results (matrices or six-vectors) with the oracle's results.
+    """Comparison of a batch of results (matrices or six-vectors) with the oracle's results.
 
     Attributes:
-        results: Number of compared results.
         worst: Largest difference of two numbers, in multiples of eps * scale.
-        share: Largest ratio of a difference to its bound; above 1 is a failure.
-        index: Indices, in the batch, of the result that has this ratio.
+        share: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
+        index: Indices in the batch of the result with the ratio `share`.
     """
 
     results: int = 0
@@ -40,10 +39,7 @@ class BatchComparison:
     index: tuple[int, ...] = ()
 
     def __add__(self, other: BatchComparison) -> BatchComparison:
-        """Combine the comparisons of two batches; `index` comes from the batch with the larger `share`.
-
-        A `share` of NaN counts as larger than any number.
-        """
+        """Combine two batches; `index` comes from the batch with the larger `share`, where NaN is largest."""
         second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
         first, second = (other, self) if second_is_larger else (self, other)
         return BatchComparison(
@@ -59,12 +55,11 @@ class BatchComparison:
 
 
 def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> BatchComparison:
-    """Compare urdfkin's results with the oracle's; `axes` has the same meaning as in `worst_of_each`."""
     return comparison_of(worst_of_each(ours, theirs, bound.scale, axes), bound)
 
 
 def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare the largest difference of each result, in multiples of eps * scale, with the result's bound."""
+    """Compare differences `units`, in multiples of eps * scale, with the bound of each result."""
     if not units.size:
         return BatchComparison()
     share = units / result_k(bound, units.shape)
@@ -105,7 +100,8 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        if len(size) < n:  # if several results share a row of the scale, the kernel needs scratch memory
+        # If several results share a row of the scale, the kernel needs scratch memory.
+        if len(size) < n:
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)
         kernel(one, other, size, worst, out_bits, unit, units, bits)
@@ -113,7 +109,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
 
 
 def _rows(x: FloatArray, shape: tuple[int, ...], n: int, numbers: int) -> FloatArray:
-    if x.shape != shape:  # `broadcast_to` is slow
+    if x.shape != shape:  # `broadcast_to` is slow.
         x = np.broadcast_to(x, shape)
     return np.ascontiguousarray(x).reshape(n, numbers)
 

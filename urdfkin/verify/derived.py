@@ -94,7 +94,7 @@ def check_imu(oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary) -> t
     query = x.query._replace(reference=local)
     gravity = np.asarray(x.options["gravity"], dtype=np.float64)
     R = oracle.placements(query)[..., :3, :3]
-    proper_acceleration = oracle.accelerations(query)[..., :3] - gravity @ R  # gravity @ R equals R^T g
+    proper_acceleration = oracle.accelerations(query)[..., :3] - gravity @ R  # `gravity @ R` equals R^T g.
     w = oracle.velocities(query)[..., 3:]
     size = by.size(magnitudes(x.plan, x.q, v, a, x.state))
     bound = bound_of(imu_scale(size, gravity), 3, size, local)

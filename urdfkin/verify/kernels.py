@@ -30,7 +30,6 @@ from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bound, rebound
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
 
-#: Bit pattern of inf, as an integer.
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
 #: Prefetch distance: number of rows between the compared row and the row that is loaded into the cache.
@@ -39,7 +38,7 @@ _AHEAD = 4
 
 @helper(fastmath={"reassoc"})
 def _finite(x, i):
-    """Return whether all numbers of a row are finite: if x is inf or NaN, 0 * x is NaN."""
+    # If a number is inf or NaN, the product of 0 and this number is NaN.
     total = 0.0
     for j in range(x.shape[1]):
         total += 0.0 * x[i, j]
@@ -56,14 +55,13 @@ def _finite_difference(x, y, i):
 
 @helper(fastmath={"nnan", "nsz"})
 def _units(difference, size):
-    """Return a difference in multiples of eps * scale."""
     must_be_equal = math.inf if difference > 0.0 else 0.0
     return difference / max(EPS * size, LEAST_UNIT) if size > 0.0 else must_be_equal
 
 
 @helper(fastmath={"nnan", "nsz"})
 def _largest(ours, theirs, scale, i, k):
-    """Return the largest difference in row `i`, divided by row `k` of the scale, for finite numbers."""
+    """Return the largest difference in row `i`, in units of eps * `scale[k]`, for finite numbers."""
     largest = 0.0
     for j in range(ours.shape[1]):
         largest = max(largest, _units(abs(ours[i, j] - theirs[i, j]), scale[k, j]))
@@ -72,7 +70,7 @@ def _largest(ours, theirs, scale, i, k):
 
 @helper()
 def _is_in_threes(scale, k):
-    """Return whether the scale has equal numbers in its three linear rows, and in its three angular rows."""
+    """Return whether the three linear rows of a scale are equal, and also the three angular rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -83,7 +81,7 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of each group of three numbers with the same scale to `units`.
+    """Write the largest difference of every three numbers with a common scale to `units`.
 
     The difference is in multiples of eps * scale, and may be NaN or inf.
     """
@@ -112,20 +110,12 @@ def _most(x, count):
 
 @kernel(ROWS, ROWS, ROWS, SCRATCH, WHOLE, SCRATCH, SCRATCH, WHOLE)
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
-    """Write the largest difference in each row to `out`. If a row contains inf or NaN, write inf.
+    """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
 
-    `out_bits` and `bits` are views of `out` and `units` as integers, because the compiler can vectorize the
-    maximum of integers but not of doubles.
-
-    Args:
-        ours: urdfkin's results.
-        theirs: The oracle's results.
-        scale: Scale of the bound. Its rows are repeated if `scale` has fewer rows than `out`.
-        out: The largest difference in each row.
-        out_bits: View of `out` as 64-bit integers.
-        unit: Working memory in the shape of `scale`, used only if `scale` has fewer rows than `out`.
-        units: Working memory for one row.
-        bits: View of `units` as 64-bit integers.
+    The rows of `scale` are repeated if `scale` has fewer rows than `out`. Only then, the kernel uses `unit`
+    (the size of `scale`) and `units` (one row) as working memory. `out_bits` and `bits` are views of `out`
+    and `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum of
+    doubles.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
@@ -193,7 +183,8 @@ _LENGTHS = {
     "rotate": _unturned,
     **dict.fromkeys(("times", "dot", "cross"), _product),
 }
-_EQUATIONS: Any = ModuleType("length_equations")  # Numba can call functions that are attributes of a module
+# Numba can call functions that are attributes of a module.
+_EQUATIONS: Any = ModuleType("length_equations")
 vars(_EQUATIONS).update(vars(bound(decorate=helper(), **_LENGTHS)))
 _STEPS = rebound(steps, decorate=helper(), others={"eq": _EQUATIONS})
 _carried, _turned, _slid, _freed = (_STEPS[name] for name in ("carried", "turned", "slid", "freed"))
@@ -245,26 +236,18 @@ def _over_free(before, after, first, m, d, free, at):
 
 @kernel(TABLE, ROWS, TABLE, NUMBERS, ROWS, ROWS, ROWS, ROWS, ROWS, STATES, SCRATCH)
 def lengths(links, sizes, ends, tips, q, v, a, free, base, s, out):
-    """Compute the fields `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes`, and write them to `out`.
+    """Write the fields `p`, `w`, `vel`, `alpha` and `acc` of `Magnitudes` to `out`.
 
     Each of the arrays q, v, a, free and base has a row for each configuration, or one row for all.
 
-    Args:
-        links: For each moving joint: kind, index in q, index in v, and index of the previous moving joint.
-        sizes: For each moving joint: length of the path from the previous moving joint, mimic multiplier, and
-            mimic offset.
-        ends: For each frame: index of the last moving joint before the frame, and index of the frame in
-            `out`.
-        tips: Length of the path from the last moving joint to each frame.
-        q: Coordinates.
-        v: Joint velocities.
-        a: Joint accelerations.
-        free: For each planar and floating joint: lengths of the displacement, the velocities and the
-            accelerations (`urdfkin.verify.bounds._free_lengths`).
-        base: State of the base.
-        s: Working memory for a block of configurations: states of the base and of all moving joints, and one
-            more state.
-        out: The computed p, w, vel, alpha and acc.
+    - `links`, for each moving joint: kind, index in q, index in v, and index of the previous moving joint
+    - `sizes`, for each moving joint: length of the path from the previous moving joint, mimic multiplier,
+      offset
+    - `ends`, for each frame: index of the last moving joint before the frame, and index of the frame in `out`
+    - `tips`, for each frame: length of the path from the last moving joint
+    - `free`, for each planar or floating joint: the lengths from `urdfkin.verify.bounds._free_lengths`
+    - `s`: working memory for a block of configurations, with the states of the base and the moving joints,
+      and one additional state
     """
     frames, block, rates = len(ends), s.shape[2], s[len(links) + 1]
     n = len(out) // max(1, _STATE * frames)

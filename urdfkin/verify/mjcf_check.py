@@ -40,7 +40,6 @@ from urdfkin.verify.verifier import Verifier
 _SAMPLES = 8
 #: Time limit for reading a file, seconds.
 PATIENCE = 60.0
-#: Maximum number of quoted characters of a MuJoCo error.
 _QUOTED = 300
 
 
@@ -48,14 +47,9 @@ _QUOTED = 300
 class MjcfReading:
     """The result of reading an MJCF file in a separate process, as plain data.
 
-    Attributes:
-        urdf: The tree as a URDF text.
-        listed: Elements of the file that the tree does not contain.
-        path: The file; None for a text.
-        answer: Answer of the process: data of the robot, its frames, and MuJoCo's results.
-        not_whole: Reason why MuJoCo compiled the file only without shapes and inertias; None: MuJoCo compiled
-            the complete file.
-        pinocchio: Report of the process about Pinocchio's reader; None without a report.
+    `listed` contains elements of the file that the tree does not contain. `not_whole` is the reason why
+    MuJoCo compiled the file only without shapes and inertias. `pinocchio` is a report about Pinocchio's
+    reader.
     """
 
     urdf: str
@@ -71,11 +65,9 @@ def read_mjcf(
 ) -> MjcfReading:
     """Read a robot from an MJCF file, text or bytes, in a process with limits on time (s) and memory.
 
-    With `check`, MuJoCo also computes placements for `check_mjcf_source`. MuJoCo reads included files too.
-
-    Raises:
-        InputError: MuJoCo is not installed, does not accept the file, or takes too much time or memory; or
-            the robot has a ball joint.
+    MuJoCo also reads included files. With `check`, MuJoCo also computes placements for `check_mjcf_source`.
+    Raises InputError if MuJoCo is missing, rejects the file or exceeds a limit, or if the robot has a ball
+    joint.
     """
     version()
     name = name_of(source)
@@ -126,16 +118,15 @@ def _ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, An
 def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
     """Compare a robot with MuJoCo's model of the MJCF file; return a line with the result.
 
-    Raises:
-        OracleError: MuJoCo's placement of a body or site differs by more than the bound, or MuJoCo's model
-            has a joint equality that differs from the tree's mimic rule.
+    Raises OracleError if placements or mimic rules differ by more than the bound. A missing or an additional
+    joint equality in MuJoCo's model also raises OracleError.
     """
     tree, answer = verifier.tree, read.answer
     q = unpacked(answer["q"])
     frames = [LinkFrame.of(name) for name, _ in answer["frames"]]
     plan = compile_tree(tree, [tree.frame_link(frame) for frame in frames])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
-    # The factor 2 doubles the bound to allow for the rounded angles in the URDF text.
+    # The factor 2 allows for the rounded angles in the URDF text.
     size = mujoco_magnitudes(magnitudes(plan, q, None, None, STILL_STATE))
     bound = PLACEMENT.bound(plan, size, None)
     bound = Bound(bound.scale, 2.0 * bound.k)
@@ -159,10 +150,7 @@ def check_mjcf_source(verifier: Verifier, read: MjcfReading) -> str:
 
 
 def _check_rules(name: str, answer: Mapping[str, Any]) -> float | None:
-    """Compare the mimic rules with MuJoCo's joint equalities; return the largest ratio of error to bound.
-
-    The result is None if there are no mimic rules.
-    """
+    """Return the largest ratio of error to bound over all mimic rules; None without mimic rules."""
     rules = {int(i): str(joint) for i, joint in answer["rules"]}
     residuals, sizes = unpacked(answer["residuals"]), unpacked(answer["rule_sizes"])
     active = set(np.flatnonzero(~np.isnan(residuals).all(axis=0)).tolist())
@@ -197,7 +185,6 @@ def _error(where: str, found: str) -> OracleError:
 
 
 def _placements(found: Mapping[str, Any]) -> FloatArray:
-    """Return placements (n, frames, 4, 4) from an array of the upper three rows."""
     rows = unpacked(found)
     T = np.zeros((*rows.shape[:2], 4, 4))
     T[..., :3, :], T[..., 3, 3] = rows, 1.0
@@ -211,7 +198,6 @@ def _shares(ours: FloatArray, theirs: FloatArray, bound: Bound) -> FloatArray:
 
 
 def _pinocchios(read: MjcfReading, ours: FloatArray, bound: Bound) -> str:
-    """Compare the placements with those of Pinocchio's MJCF reader; return a phrase with the result."""
     if read.path is None:
         return "not compared with Pinocchio's MJCF reader, which needs a file"
     found = read.pinocchio or {"error": "the process of the reader ended"}

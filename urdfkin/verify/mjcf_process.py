@@ -35,7 +35,6 @@ from urdfkin.verify.pinocchio import pinocchio
 
 #: Number of coordinates of a free joint.
 _CARTESIAN = 7
-#: Maximum number of names in an error message.
 _NAMED = 5
 #: Maximum size of the output of a process, bytes.
 MOST = 400_000_000
@@ -44,10 +43,9 @@ _TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
-    """Read a request from standard input and write the answers to standard output."""
     request = json.load(sys.stdin)
     try:
-        # This function prevents MuJoCo from writing a log file.
+        # Without a warning function, MuJoCo writes a log file.
         library().set_mju_user_warning(lambda message: None)
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
@@ -57,7 +55,8 @@ def serve() -> None:
             write_answer(answer)
     except Exception as error:
         write_answer(error_answer(error, "MuJoCo cannot compile this MJCF"))
-    os._exit(0)  # skips the exit handlers of the libraries
+    # `os._exit` skips the exit handlers of the libraries.
+    os._exit(0)
 
 
 def error_answer(error: Exception, what: str) -> dict[str, Any]:
@@ -70,7 +69,6 @@ def error_answer(error: Exception, what: str) -> dict[str, Any]:
 
 
 def _with_memory_hint(found: str | None) -> str | None:
-    """Add a hint about memory to MuJoCo's message "unknown exception"."""
     return f"{found} Perhaps {_TOO_MUCH}" if found and found.endswith("unknown exception!") else found
 
 
@@ -84,17 +82,8 @@ def parse_answers(
 ) -> tuple[list[dict[str, Any]], str]:
     """Return the answers in the output of a process, and the reason why further answers are missing.
 
-    Lines that libraries print are skipped, and also a last line that is incomplete because of a crash.
-
-    Args:
-        output: Output of the process.
-        status: Exit status of the process; None: the process ran longer than `patience`.
-        library: Name of the library in messages.
-        name: Name of the file in messages.
-        patience: Time limit, s.
-
-    Raises:
-        InputError: the process reports an error.
+    Incomplete lines and lines that libraries print are skipped. A `status` of None means that the process ran
+    longer than `patience` (s). Raises InputError if the process reports an error.
     """
     lines = output.splitlines(keepends=True)
     answers = [json.loads(line) for line in lines if line.startswith(b"{") and line.endswith(b"}\n")]
@@ -105,7 +94,7 @@ def parse_answers(
     if status is None:
         return answers, f"{library} did not finish within {patience:g} s"
     if len(output) > MOST:
-        return answers, f"an answer of more than {MOST} bytes"
+        return answers, f"{library} returned more than {MOST} bytes"
     return answers, f"{library}'s process ended with status {status}: perhaps {_TOO_MUCH}"
 
 
@@ -127,7 +116,7 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             read = whole
         except (MemoryError, InputError, library().FatalError) as error:
             if isinstance(error, InputError) and error.remedy is not None:
-                raise  # MuJoCo compiles the file, but the result is not a tree
+                raise  # MuJoCo compiles the file, but the result is not a tree.
             found = error.found if isinstance(error, InputError) else str(error)
             yield {"not_whole": _with_memory_hint(found) or _TOO_MUCH}
     if samples and path is not None:
@@ -135,7 +124,6 @@ def answers(request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _configurations(read: Mjcf, samples: int) -> FloatArray:
-    """Return the zero configuration and `samples` random configurations (n, nq); `samples` = 0: none."""
     if not samples:
         return np.empty((0, read.tree.nq))
     drawn = sample(read.tree, samples, np.random.default_rng(0))
@@ -164,7 +152,6 @@ def _answer(read: Mjcf, q: FloatArray) -> dict[str, Any]:
 
 
 def packed(numbers: FloatArray) -> dict[str, Any]:
-    """Return an array as plain data for JSON."""
     data = np.ascontiguousarray(numbers, dtype="<f8")
     return {"shape": data.shape, "base64": base64.b64encode(data.tobytes()).decode("ascii")}
 
@@ -186,22 +173,19 @@ def _pinocchios(path: str, read: Mjcf, q: FloatArray) -> dict[str, Any]:
 def _pinocchio_placements(
     path: str, qpos: FloatArray, coordinates: Mapping[str, int], bodies: Sequence[str]
 ) -> FloatArray:
-    """Return the placements (n, bodies, 4, 4) that Pinocchio computes from an MJCF file at MuJoCo's `qpos`.
+    """Return Pinocchio's placements (n, bodies, 4, 4) for an MJCF file at MuJoCo's `qpos`.
 
-    `coordinates` maps each joint's name to the index of the joint's first number in `qpos`.
-
-    Raises:
-        OracleError: Pinocchio does not accept the file, or reads other joints or bodies from it.
+    `coordinates` maps a joint's name to the index of the joint's first number in `qpos`.
     """
     pin = pinocchio()
     try:
         model = pin.buildModelFromMJCF(path)
-    except Exception as error:  # Pinocchio's parsers raise many types of exceptions
+    except Exception as error:  # Pinocchio's parsers raise many types of exceptions.
         raise OracleError("the reader does not accept the file", found=str(error).strip()) from error
     joints = dict(_numbered(model, list(coordinates)))
     if joints.keys() != coordinates.keys():
         found = ", ".join(sorted(joints.keys() ^ coordinates.keys())[:_NAMED])
-        raise OracleError("the reader finds other joints", found=found)
+        raise OracleError("the reader finds different joints", found=found)
     if missing := [name for name in bodies if not model.existFrame(name)]:
         raise OracleError("the reader does not find a body of the file", found=missing[0])
     data, out = model.createData(), np.empty((len(qpos), len(bodies), 4, 4))
@@ -214,7 +198,7 @@ def _pinocchio_placements(
                 q[first : first + 7] = [*numbers[at : at + 3], *np.roll(numbers[at + 3 : at + 7], -1)]
             elif count == 1:
                 q[first] = x
-            else:  # a revolute joint without limits has two coordinates, the cosine and sine of its angle
+            else:  # A revolute joint without limits has two coordinates: the cosine and sine of its angle.
                 q[first : first + 2] = np.cos(x), np.sin(x)
         pin.framesForwardKinematics(model, data, q)
         out[k] = [data.oMf[i].homogeneous for i in ids]

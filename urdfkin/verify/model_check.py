@@ -37,22 +37,19 @@ _SAMPLES = 8
 
 
 def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
-    """Compare a robot with the Pinocchio model from which urdfkin made the robot; return the result as text.
+    """Compare a robot with its source, a Pinocchio model or a RobotWrapper; return the result as text.
 
-    `source` is the model, or a RobotWrapper that contains the model.
-
-    Raises:
-        OracleError: a placement differs by more than the bound.
+    Raises OracleError if a placement differs by more than the bound.
     """
     model, tree = getattr(source, "model", source), verifier.tree
-    if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv
+    if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv.
         return f"not compared with the model itself: nv is {model.nv}, more than {MOST_RATES}"
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
-    # The factor 2 doubles the bound to allow for the rounded angles in the URDF text.
+    # The factor 2 in the bound allows for the rounded angles in the URDF text.
     bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
@@ -98,11 +95,7 @@ def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArra
 
 
 def check_table_source(verifier: Verifier, table: DHTable) -> None:
-    """Compare Pinocchio's placements of the tip with those of the table from which urdfkin made the URDF.
-
-    Raises:
-        TableError: the placements of the tip differ by more than rounding.
-    """
+    """Compare Pinocchio's placements of the tip with those of the table, the source of the robot."""
     if verifier.cannot() is not None:
         return
     q = sample(verifier.tree, _SAMPLES, np.random.default_rng(0))
@@ -123,6 +116,6 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
 
 
 def _defect(table: DHTable) -> float:
-    """Return the sum of |R^T R - 1| over the rotations R of base and tool."""
+    """Return the sum of the Frobenius norms of R^T R - I over the rotations R of base and tool."""
     rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
     return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)

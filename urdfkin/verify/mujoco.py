@@ -9,8 +9,8 @@ changes the text before MuJoCo reads it:
 - Links and joints get numbers as names, because MuJoCo reserves some names.
 - A floating joint becomes three slide joints and a ball joint, because MuJoCo's free joint can only connect a
   body to the world. A planar joint becomes two slide joints and a hinge.
-- The mimic joints follow the rules from `rules_of_text`. MuJoCo would turn the mimic rules into constraints,
-  which its kinematics ignores.
+- Mimic rules are removed, because MuJoCo would turn them into constraints, which its kinematics ignores. This
+  module computes the values of mimic joints with the rules from `rules_of_text`.
 
 MuJoCo's inputs are qpos(q), qvel = S v and qacc = S a + S' v, with the time derivative S' of S. The robot's
 Jacobian is J S, where J is MuJoCo's Jacobian. The matrix S contains the multipliers of mimic joints. For a
@@ -44,15 +44,15 @@ from urdfkin.verify.oracle import (
 )
 from urdfkin.verify.pinocchio import depth_of
 
-#: Placeholder mass (kg) and moments of inertia (kg m^2) of each link, with which MuJoCo loads the text.
+#: Placeholder for the mass (kg) and the moments of inertia (kg m^2) of each link.
 _MASS = "1"
-#: Maximum number of links in a chain, because MuJoCo's time grows with the square of this number.
-#: MuJoCo rejects chains of more than 1,023 links, but only after this time.
+#: Maximum number of links in a chain; MuJoCo's loading time grows with the square of this number.
+#: MuJoCo itself rejects chains of more than 1,023 links, but only after the loading time.
 _DEEPEST = 1_000
 #: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Numbers of coordinates and of joint velocities of a joint in urdfkin; (1, 1) for all other kinds of joints.
+#: Number of coordinates and of joint velocities in urdfkin; (1, 1) for kinds that are not listed.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -67,10 +67,10 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _MujocoIndices:
-    """Indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
+    """First indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
 
-    The joint of a moving base is not part of urdfkin's q and v, so its indices are q = v = -1. For a locked
-    joint, the index in v is -1, and the offset is the value at which the joint is locked.
+    For the joint of a moving base, q and v are -1. For a locked joint, v is -1, and the offset is the locked
+    value.
     """
 
     kind: str
@@ -83,8 +83,6 @@ class _MujocoIndices:
 
 
 class MujocoOracle(Oracle):
-    """MuJoCo's results for one robot; raise OracleError if MuJoCo does not support the URDF text."""
-
     title = "MuJoCo"
 
     def __init__(self, text: str, tree: KinematicTree, **how: Any) -> None:
@@ -102,7 +100,7 @@ class MujocoOracle(Oracle):
             raise OracleError("the oracle cannot read the text", where=tree.name, found=str(error)) from error
         moving = [joint.name for joint in joints if joint.kind != "fixed"]
         coupled = mimic_rules(text, moving, tree.name) if self.mimic else {}
-        locked = locked_by_rules(self.lock, coupled)  # locked joints stay in MuJoCo's model
+        locked = locked_by_rules(self.lock, coupled)  # Locked joints stay in MuJoCo's model.
         rules = self.rules([name for name in moving if name not in locked])
         base = [_Joint("", "floating", "", links[0])] if self.moving_base else []
         self._bodies = {link: f"l{i}" for i, link in enumerate([*([""] if base else []), *links])}
@@ -145,7 +143,6 @@ class MujocoOracle(Oracle):
             ) from error
 
     def _joint(self, i: int, joint: _Joint) -> Element:
-        """Return a joint element for MuJoCo, with the origin and the axis of the URDF text."""
         kind = "fixed" if joint.kind in _PARTS else joint.kind
         element = Element("joint", name=f"j{i}", type="continuous" if kind == "revolute" else kind)
         SubElement(element, "parent", link=self._bodies[joint.parent])
@@ -156,7 +153,8 @@ class MujocoOracle(Oracle):
                 raise OracleError("MuJoCo does not read the attribute quat_xyzw", where=f"joint {joint.name}")
             if found is not None and (tag == "origin" or kind != "fixed"):
                 SubElement(element, tag, {name: x for name in names if (x := found.get(name)) is not None})
-        if kind == "prismatic":  # MuJoCo requires limits, but ignores limits in its kinematics
+        # MuJoCo requires limits of a prismatic joint, but its kinematics ignores the limits.
+        if kind == "prismatic":
             SubElement(element, "limit", lower="-1", upper="1")
         return element
 
@@ -183,22 +181,19 @@ class MujocoOracle(Oracle):
                 raise OracleError(
                     "the mimicked joint does not exist", where=f"joint {joint.name}", found=rule.leader
                 )
-            ours = leaders.get(rule.leader, (-1, -1))  # the motion of the base is not part of q
+            ours = leaders.get(rule.leader, (-1, -1))
             yield _MujocoIndices(joint.kind, *indices, *ours, rule.multiplier, rule.offset)
 
     # -- quantities ----------------------------------------------------------------------------------
 
     def placements(self, x: QueryBatch) -> FloatArray:
-        """Return T_world_frame (n, frames, 4, 4) by `mj_kinematics`: `xpos` and `xmat` of the bodies."""
         return self._poses(x, 1, lambda body, at: None)
 
     def velocities(self, x: QueryBatch) -> FloatArray:
-        """Return velocities (n, frames, 6) by `mj_objectVelocity`, which returns [angular; linear]."""
         poses, velocity, _ = self._moved(x, 2)
         return _referred(x.reference, poses, velocity)
 
     def accelerations(self, x: QueryBatch) -> FloatArray:
-        """Return classical accelerations (n, frames, 6) by `mj_objectAcceleration` without gravity."""
         poses, velocity, acceleration = self._moved(x, 3)
         if not Reference.of(x.reference).at_world:
             return _referred(x.reference, poses, acceleration)
@@ -210,7 +205,6 @@ class MujocoOracle(Oracle):
         return out
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
-        """Return Jacobians (n, frames, 6, nv) by `mj_jac` at the body's origin."""
         J = np.empty((len(x.q), len(x.frames), 6, self.nv))
         spread = self._spread(x.q)
 
@@ -221,7 +215,6 @@ class MujocoOracle(Oracle):
         return _referred(x.reference, poses, J, columns=True)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
-        """Return J-dot (n, frames, 6, nv) by `mj_jacDot` at the body's origin, the derivative of `mj_jac`."""
         J, rate = np.empty((2, len(x.q), len(x.frames), 6, self.nv))
         velocity = np.empty((len(x.q), len(x.frames), 6))
         spread, spread_rate = self._spread(x.q), self._spread_rate(x.q, x.v)
@@ -236,16 +229,15 @@ class MujocoOracle(Oracle):
         poses = self._poses(x, 2, read)
         vel, w = velocity[..., None, :3], velocity[..., None, 3:]
         which = Reference.of(x.reference)
-        if which.own_axes:  # in rotating axes, the derivative of J has the additional term -w x J
+        if which.own_axes:  # In rotating axes, the derivative of J has the additional term -w x J.
             for rows in (slice(0, 3), slice(3, 6)):
                 rate[..., rows, :] -= np.cross(w, J[..., rows, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         out = _referred(which, poses, rate, columns=True)
-        if which.at_world:  # the time derivative of p x J_angular contains vel x J_angular
+        if which.at_world:  # The time derivative of p x J_angular contains vel x J_angular.
             out[..., :3, :] += np.cross(vel, J[..., 3:, :].swapaxes(-1, -2)).swapaxes(-1, -2)
         return out
 
     def _moved(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return placements, velocities and classical accelerations (n, frames, ...), LOCAL_WORLD_ALIGNED."""
         velocity, acceleration = np.empty((2, len(x.q), len(x.frames), 6))
 
         def read(body: int, at: tuple[int, int]) -> None:
@@ -256,10 +248,10 @@ class MujocoOracle(Oracle):
         return self._poses(x, count, read), velocity, acceleration
 
     def _poses(self, x: QueryBatch, count: int, read: Callable[[int, tuple[int, int]], None]) -> FloatArray:
-        """Return placements (n, frames, 4, 4); call `read` for each sample k and frame f.
+        """Return placements (n, frames, 4, 4); call `read(body, (k, f))` for each sample k and frame f.
 
-        MuJoCo receives the first `count` of the inputs q, v and a. The function `read(body, (k, f))` can then
-        read further results from `self.data`.
+        MuJoCo receives the first `count` of the inputs q, v and a. `read` can read further results from
+        `self.data`.
         """
         mujoco, model, data = self._mujoco, self._model, self.data
         bodies = [self._frames.index(name) for name in x.frames]
@@ -292,13 +284,13 @@ class MujocoOracle(Oracle):
     def _six(self, function: Callable[..., None], body: int) -> FloatArray:
         """Return the velocity or acceleration [linear; angular] (6,) of the body's origin in world axes."""
         six = np.empty(6)
+        # MuJoCo returns [angular; linear].
         function(self._model, self.data, self._mujoco.mjtObj.mjOBJ_XBODY, body, six, 0)
         return np.roll(six, 3)
 
     # -- layout --------------------------------------------------------------------------------------
 
     def _states(self, x: QueryBatch, count: int) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-        """Return MuJoCo's inputs qpos, qvel and qacc, each an array (n, ...)."""
         q, base, n = x.q, x.base, len(x.q)
         qpos = np.zeros((n, self._model.nq))
         for joint in self._indices:
@@ -378,7 +370,6 @@ def _rotation_of_joint(joint: _MujocoIndices, q: FloatArray) -> tuple[FloatArray
 
 
 def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
-    """Return the unit quaternion (w, x, y, z) of a floating joint's coordinates (n, 7)."""
     quaternion = coordinates[:, 3:]
     return _scalar_first(quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True))
 
@@ -386,8 +377,8 @@ def _unit_quaternion(coordinates: FloatArray) -> FloatArray:
 def _with_mass_at_root(model: Any, root: str) -> Any:
     """Set all masses except the root's to zero, so that the centre of mass is at the root's origin.
 
-    MuJoCo computes velocities at the centre of mass. With the centre at the root's origin, MuJoCo computes
-    lever arms of length zero exactly.
+    MuJoCo computes velocities at the centre of mass. With the centre of mass at the root's origin, MuJoCo
+    computes lever arms of length zero exactly.
     """
     body = model.body(root).id
     for mass in (model.body_mass, model.body_subtreemass):
@@ -434,7 +425,6 @@ def _ordered(text: str, root_joint: str | None) -> tuple[list[_Joint], list[str]
 
 
 def _scalar_first(quaternion: FloatArray) -> FloatArray:
-    """Return quaternions in MuJoCo's order (w, x, y, z)."""
     return np.roll(quaternion, 1, axis=-1)
 
 

@@ -1,9 +1,9 @@
 """Base class of the oracles Pinocchio and MuJoCo, and conversion of a call's arguments for an oracle.
 
-An oracle is a library whose results urdfkin compares with its own results. urdfkin converts the arguments of
-a call for its own computation, and this module converts them a second time for the oracle. Except for units
-and named poses, the two conversions share no code. A wrong broadcast, order or name in one of them therefore
-causes a disagreement.
+An oracle is a library whose results urdfkin compares with its own results. This module converts the arguments
+of a call for the oracle. Except for units and named poses, this conversion shares no code with the conversion
+for urdfkin's own computation. A wrong broadcast, order or name in one conversion therefore causes a
+disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -13,16 +13,13 @@ causes a disagreement.
 | frame of a name | `Frames` | `KinematicTree.frame_link` |
 | moving base | `free_flyer` and others | `BaseMotion` |
 
-Both conversions parse units with `urdfkin.errors.numbers`, and use the same values of named poses.
-
-Mimic rules: the Pinocchio model is built without mimic joints (`urdfkin.verify.pinocchio`). This module
-therefore parses the URDF text again and reads the mimic rules, when the first result is checked.
+Mimic rules: Pinocchio's model is built without mimic joints (`urdfkin.verify.pinocchio`). This module
+therefore reads the mimic rules from the URDF text.
 
 Layout of q: the joints are in Pinocchio's order. A revolute, continuous or prismatic joint has one number, a
-planar joint three, a floating joint seven, and a mimic joint none. `Oracle.rules` compares this order with
-the order of joints in the oracle's model.
+planar joint three, a floating joint seven, and a mimic joint none.
 
-Moving base: the base's rotation is the rotation nearest to the user's matrix M. urdfkin computes this
+Moving base: the base's rotation is the rotation nearest to the user's matrix M. urdfkin computes the nearest
 rotation with a Newton step (`urdfkin.kinematics.rotation`). This module uses Davenport's q-method: among all
 unit quaternions q, q^T K q = trace(R(q)^T M) is largest for the nearest rotation. The quaternion of the
 nearest rotation is therefore the eigenvector of K for the largest eigenvalue.
@@ -54,12 +51,7 @@ from urdfkin.verify.bounds import KERNELS
 
 
 def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
-    """Return the rule of each mimic joint in `joints` as a function of an independent joint.
-
-    Raises:
-        ValueError: a multiplier or offset is not a number.
-        expat.ExpatError: the text is not well-formed XML.
-    """
+    """Return the rule of each mimic joint in `joints`, as a function of an independent joint."""
     if "mimic" not in text:
         return {}
     rules = {
@@ -73,14 +65,14 @@ def rules_of_text(text: str, joints: Collection[str]) -> dict[str, Mimic]:
 def resolved_rules(rules: dict[str, Mimic]) -> dict[str, Mimic]:
     """Resolve chains of mimic rules, so that each rule refers to an independent joint.
 
-    The rules of a chain are combined to q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1, beginning at
-    the independent joint. Each rule is resolved only once.
+    A chain of rules gives q_mimic = m_1 (m_2 (... q_independent ...) + o_2) + o_1.
     """
     known: dict[str, Mimic] = {}
     for joint in rules:
         chain = [joint]
         while (leader := rules[chain[-1]].leader) in rules and leader not in known:
-            if len(chain) > len(rules):  # the rules form a cycle
+            # A longer chain contains a cycle.
+            if len(chain) > len(rules):
                 break
             chain.append(leader)
         for name in reversed(chain):
@@ -105,21 +97,13 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
     return {**lock, **moved}
 
 
-#: Maps (nq, nv), the size of a joint in Pinocchio, to the joint's number of coordinates in urdfkin.
+#: Number of coordinates in urdfkin, by a joint's size (nq, nv) in Pinocchio.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
 
 class _JointIndices(NamedTuple):
-    """Indices of a joint's first coordinate and first joint velocity, and the joint's mimic rule.
-
-    Attributes:
-        sizes: The pair (nq, nv) of the joint in Pinocchio.
-        full_q: Index of the first coordinate in Pinocchio's vector.
-        full_v: Index of the first joint velocity in Pinocchio's vector.
-        q: Index of the first coordinate in urdfkin's q.
-        v: Index of the first joint velocity in urdfkin's v.
-    """
+    """First indices of a joint in q and v, in Pinocchio (`full_q`, `full_v`) and in urdfkin."""
 
     sizes: tuple[int, int]
     full_q: int
@@ -133,16 +117,8 @@ class _JointIndices(NamedTuple):
 class PinocchioLayout:
     """Convert q, v and a to Pinocchio's vectors, and Pinocchio's Jacobian columns to urdfkin's.
 
-    Args:
-        model: Pinocchio's model.
-        joints: Pinocchio's indices of the robot's joints, in order.
-        names: Names of the joints, in the order of `joints`.
-        rules: The resolved rule of each mimic joint.
-
-    Attributes:
-        nq: Length of q.
-        nv: Length of v.
-        rate_columns: Indices of the columns of Pinocchio's Jacobian for moving joints, mimic joints included.
+    `joints` contains Pinocchio's joint indices, and `rules` the resolved mimic rules. `rate_columns` lists
+    the columns of Pinocchio's Jacobian for moving joints, mimic joints included.
     """
 
     def __init__(
@@ -165,7 +141,7 @@ class PinocchioLayout:
             full = int(model.joints[j].idx_q), int(model.joints[j].idx_v)
             self._joints.append(_JointIndices(size, *full, *at[rule.leader], rule.multiplier, rule.offset))
         self.rate_columns = [joint.full_v + c for joint in self._joints for c in range(joint.sizes[1])]
-        #: For each of Pinocchio's joint velocities: index in v and factor in G (both 0 for the base).
+        #: Pinocchio's joint velocity i is `_factor[i] * v[_index[i]]`; the factor is 0 for the base.
         self._index, self._factor = np.zeros(model.nv, dtype=np.int64), np.zeros(model.nv)
         for joint in self._joints:
             for c in range(joint.sizes[1]):
@@ -174,7 +150,7 @@ class PinocchioLayout:
         self._columns = np.array(self.rate_columns, dtype=np.int64)
         self._free = [joint for joint in self._joints if joint.sizes in (_PLANAR, _FLOATING)]
         self._single, self._angles = (self._of_sizes(sizes) for sizes in ((1, 1), _CONTINUOUS))
-        #: True if Pinocchio's configuration is equal to q without conversion; `_same_v`: the same for v.
+        #: `_same_q` and `_same_v` are True if q and v are valid inputs of Pinocchio without conversion.
         self._same_q = model.nq == self.nq and all(
             (joint.q, (1, 1), 1.0, 0.0) == (joint.full_q, joint.sizes, joint.multiplier, joint.offset)
             for joint in self._joints
@@ -183,7 +159,6 @@ class PinocchioLayout:
         self._same_v &= bool((self._index == np.arange(model.nv)).all())
 
     def _of_sizes(self, sizes: tuple[int, int]) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
-        """Return Pinocchio's and urdfkin's indices, multipliers and offsets of joints of size (nq, nv)."""
         joints = [joint for joint in self._joints if joint.sizes == sizes]
         return (
             np.array([joint.full_q for joint in joints], dtype=np.int64),
@@ -223,7 +198,7 @@ class PinocchioLayout:
         return full
 
     def couple(self, full: FloatArray) -> FloatArray:
-        """Return J_full G without the base's columns; G adds mimic joints' columns to mimicked joints."""
+        """Return the Jacobian J_full G for urdfkin's v, without the base's columns."""
         if self._same_v:
             return full
         return coupled(full, self._columns, self._index, self._factor, self.nv)
@@ -237,13 +212,8 @@ _PREFIXED = re.compile(r"(link|joint):(.*)", re.DOTALL)
 class Frames:
     """An oracle's frames by name.
 
-    Args:
-        oracle: Title of the oracle.
-        robot: Name of the robot, for errors.
-        bodies: Index of the frame of each link.
-        joints: Index of the frame of each joint.
-        parents: Index of the frame of a link's parent joint, by the index of the link's frame. A missing
-            entry means that the two frames have the same index.
+    `bodies` and `joints` map names to frame indices. `parents` maps the frame of a link to the frame of the
+    link's parent joint. A missing entry in `parents` means that both frames have the same index.
     """
 
     def __init__(
@@ -258,11 +228,7 @@ class Frames:
         self._bodies, self._joints, self._parents = bodies, joints, parents
 
     def index(self, name: str) -> int:
-        """Return the index of the frame with a name.
-
-        Raises:
-            OracleError: no frame has this name, or a body and an unrelated joint have this name.
-        """
+        """Return the index of a frame; raise OracleError for an unknown or ambiguous name."""
         if isinstance(name, LinkFrame):
             return self._index_in(self._bodies, name, str(name)[5:])
         if isinstance(name, JointFrame):
@@ -288,13 +254,10 @@ class Frames:
 
 
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
-    """Return the frames of a model from Pinocchio's URDF parser.
-
-    If `stands_on_world` is True, the first frame is that of the link `WORLD`, the parent of a root joint.
-    """
+    """Return the frames of a Pinocchio model; with `stands_on_world`, frame 0 is the link `WORLD`."""
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
-        if index:  # the first frame is the world
+        if index:  # Frame 0 is the world.
             (bodies if frame.type == pin.FrameType.BODY else joints)[frame.name] = index
     if stands_on_world:
         bodies[WORLD] = 0
@@ -360,9 +323,10 @@ def davenport(M: NDArray[Any]) -> NDArray[Any]:
 
 
 def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
-    """Rotate both halves y of six-vectors by R^T: R^T y = y + 2 w c + 2 (c x u), with c = y x u.
+    """Rotate the linear part and the angular part y of each six-vector by R^T.
 
-    The vector part of the quaternion is u, and the scalar part is w.
+    Let u be the vector part and w the scalar part of the quaternion. With c = y x u,
+    R^T y = y + 2 w c + 2 (c x u).
     """
     u, w = quaternion[..., np.newaxis, :3], quaternion[..., np.newaxis, 3:]
     y = six.reshape(*six.shape[:-1], 2, 3)
@@ -371,21 +335,16 @@ def _in_own_axes(quaternion: FloatArray, six: FloatArray) -> FloatArray:
     return rotated.reshape(*rotated.shape[:-2], 6)
 
 
-#: Maximum number of names in an error.
 _NAMED = 5
 
-#: Names of the coordinates of a joint with 3 joint velocities (planar) or 6 (floating).
+#: Names of the coordinates of a planar joint (3 joint velocities) and of a floating joint (6).
 _OF_Q = {3: ("x", "y", "angle"), 6: ("x", "y", "z", "qx", "qy", "qz", "qw")}
 #: Names of the joint velocities of a planar joint (3) or a floating joint (6).
 _OF_RATES = {3: ("vx", "vy", "wz"), 6: ("vx", "vy", "vz", "wx", "wy", "wz")}
 
 
 class _CoordinateNames:
-    """Map from the names of joints and coordinates to indices in q or v.
-
-    Args:
-        joints: Name and number of joint velocities of each joint, in order.
-        suffixes: `_OF_Q` or `_OF_RATES`.
+    """Map names of joints and coordinates to indices in q or v.
 
     >>> names = _CoordinateNames([("base", 3), ("elbow", 1)], _OF_Q)
     >>> names.place("base.y"), names.place("base"), names.place("elbow")
@@ -401,7 +360,7 @@ class _CoordinateNames:
             at += len(suffixes.get(rates, "1"))
 
     def place(self, name: str) -> int | slice:
-        """Return the index of a coordinate or the slice of a joint; raise OracleError for an unknown name."""
+        """Return a coordinate's index or a joint's slice; raise OracleError for an unknown name."""
         if name in self._joints:
             at, suffixes = self._joints[name]
             return slice(at, at + len(suffixes)) if suffixes else at
@@ -443,21 +402,11 @@ class BaseRows(NamedTuple):
 
 
 class QueryBatch(NamedTuple):
-    """The arguments of a call for an oracle: configurations with one batch axis, frames, and a base.
+    """The arguments of a call for an oracle, with one batch axis: q (n, nq), v and a (n, nv) in `inputs`.
 
-    Attributes:
-        frames: Names of the frames, as the user gave them. If `joints` is True, the frames are `JointFrame`
-            objects.
-        inputs: q (n, nq), or q and v (n, nv), or q, v and a (n, nv).
-        reference: Reference frame, as the user gave it; without effect on placements.
-        base: Motion of the base; None: fixed at the world origin.
-        joints: True: use the library's functions for joints, if there are any.
-        divided: True: `frames` is a section of a longer list. Then, even for one frame, the oracle uses its
-            function for several frames, because its function for a single frame may round differently.
-
-    >>> x = QueryBatch(["tool0"], (np.zeros((1, 6)), np.ones((1, 6))))
-    >>> x.q.shape, x.v.shape, x.reference.name
-    ((1, 6), (1, 6), 'LOCAL_WORLD_ALIGNED')
+    If `joints` is True, `frames` contains `JointFrame` objects, and Pinocchio uses its functions for joints.
+    If `divided` is True, `frames` is a section of a longer list. Pinocchio then uses its function for several
+    frames, even for one frame. Pinocchio's function for a single frame may round differently.
     """
 
     frames: Sequence[str]
@@ -481,15 +430,10 @@ class QueryBatch(NamedTuple):
 
 
 class OracleQuery:
-    """The arguments of one call.
+    """The arguments of one call, before an oracle receives them.
 
-    Args:
-        frame: Name of a frame, or several names.
-        reference: A `Reference` or its name.
-        base: Motion of the base; None: fixed at the world origin.
-        inputs: q, or q and v, or q, v and a, as arrays of numbers that can be broadcast.
-        named: The user's argument for each input, if this argument contains names; otherwise None.
-        joints: Name and number of joint velocities of each joint with coordinates, in order.
+    `named` contains the user's argument for each input that contains names, and None for other inputs.
+    `joints` lists name and number of joint velocities of each joint with coordinates.
     """
 
     def __init__(
@@ -522,7 +466,6 @@ class OracleQuery:
     def _with_named(
         self, x: FloatArray, named: str | Mapping[str, ArrayLike], suffixes: Mapping[int, tuple[str, ...]]
     ) -> FloatArray:
-        """Return `x` with the numbers that the user gave by name."""
         names = _CoordinateNames(self._joints, suffixes)
         for name, value in named.items() if isinstance(named, Mapping) else names.pairs(named):
             x[..., names.place(name)] = _number(value) if isinstance(value, str) else np.asarray(value, float)
@@ -557,7 +500,7 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """Reshape results to (n, frames, ...), with `axes` axes for one result; other shapes: OracleError."""
+        """Reshape results with `axes` axes each to (n, frames, ...); raise OracleError for other shapes."""
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
             raise OracleError(
@@ -567,7 +510,6 @@ class OracleQuery:
 
 
 def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic]:
-    """Return the mimic rules of some joints; raise OracleError if a rule cannot be read."""
     try:
         return rules_of_text(text, set(joints))
     except (ValueError, ExpatError) as error:
@@ -579,27 +521,14 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 class Oracle:
     """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    A subclass builds the library's model in `__init__`, and implements the methods `placements`,
-    `velocities`, `accelerations`, `jacobians` and `jacobian_rates`. Each method takes a `QueryBatch` and
-    returns an array (n, frames, ...).
+    A subclass builds the library's model in `__init__`. From `tree`, an oracle takes no geometry, only names
+    and sizes. Results have the shape (n, frames, ...).
 
-    Args:
-        text: The URDF text.
-        tree: urdfkin's tree of the text. An oracle uses only the tree's joints, to compare them with the
-            joints in its own model.
-        mimic: True: couple mimic joints. False: every mimic joint moves freely.
-        moving_base: Whether a free-flyer with the base's motion connects the world and the root.
-        root_joint: Kind ("floating" or "planar") of the root joint that urdfkin has added to the tree; the
-            text does not contain this joint. None: urdfkin has added no joint.
-        lock: Value (rad or m) of each locked joint, which is a fixed joint in the tree.
+    `moving_base` connects the world and the root by a free-flyer. `root_joint` is the kind of a root joint
+    that the tree contains, but not the text. `lock` contains the values (rad or m) of locked joints.
+    `new_data` returns a new data structure of the library, for one thread.
 
-    Attributes:
-        title: Name of the library.
-        new_data: Function that returns a new data structure of the library, for one thread.
-
-    Raises:
-        OracleError: the library does not accept the text, or reads other joints from it.
-        InstallationError: the library is missing.
+    Raises OracleError if the library does not accept the text, or reads other joints from the text.
     """
 
     title: ClassVar[str]
@@ -622,8 +551,7 @@ class Oracle:
     def rules(self, joints: Sequence[str]) -> dict[str, Mimic]:
         """Return the mimic rules of `joints`, the library's moving joints.
 
-        Raises:
-            OracleError: the rules cannot be read, or the joints or their order differ from the tree's.
+        Raises OracleError if the joints or their order differ from the tree's.
         """
         tree = self.tree
         rules = mimic_rules(self.text, joints, tree.name) if self.mimic else {}
@@ -633,15 +561,17 @@ class Oracle:
             ("coordinates", coordinates, [joint.name for joint in tree.joints if joint.nv]),
         ):
             if theirs != own:
-                found = ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED]) or "the same in another order"
+                found = (
+                    ", ".join(sorted(set(theirs) ^ set(own))[:_NAMED])
+                    or "the same names in a different order"
+                )
                 raise OracleError(
-                    f"{self.title} finds other {what} in this robot", where=tree.name, found=found
+                    f"{self.title} finds different {what} in this robot", where=tree.name, found=found
                 )
         return rules
 
     @property
     def data(self) -> Any:
-        """The library's data structure of this robot for the current thread."""
         if not hasattr(self._local, "data"):
             self._local.data = self.new_data()
         return self._local.data
@@ -651,7 +581,6 @@ class Oracle:
         raise NotImplementedError
 
     def velocities(self, x: QueryBatch) -> FloatArray:
-        """Return velocities (n, frames, 6)."""
         raise NotImplementedError
 
     def accelerations(self, x: QueryBatch) -> FloatArray:
@@ -659,7 +588,6 @@ class Oracle:
         raise NotImplementedError
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
-        """Return Jacobians (n, frames, 6, nv)."""
         raise NotImplementedError
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
@@ -667,7 +595,6 @@ class Oracle:
         yield self.jacobians(x)
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
-        """Return J-dot (n, frames, 6, nv)."""
         raise NotImplementedError
 
     def hessians(self, x: QueryBatch) -> FloatArray:
@@ -685,15 +612,9 @@ class Oracle:
 def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatArray, nv: int) -> FloatArray:
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
-    A compiled kernel computes large batches, because NumPy would take longer than Pinocchio takes for the
-    Jacobians. The results of the kernel and of NumPy are identical.
-
-    Args:
-        full: J_full (..., columns).
-        columns: Columns of J_full to add, in this order.
-        index: Index in v of each column of J_full.
-        factor: Nonzero element of G for each column of J_full.
-        nv: Length of v.
+    Column i of J_full is multiplied by `factor[i]`, an element of G, and added to column `index[i]` of the
+    product. Only the columns of J_full in `columns` are added, in this order. The kernel and NumPy return
+    identical results.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:

@@ -22,15 +22,8 @@ OracleName = Literal["pinocchio", "mujoco"]
 class OracleLibrary:
     """An oracle: a library that reads the URDF text and computes the quantities that urdfkin computes.
 
-    Attributes:
-        name: Name of the oracle in arguments.
-        title: Name of the oracle in sentences.
-        package: Name of the library's Python package.
-        version: Function that returns the installed version without importing the library.
-        oracle: Function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the oracle's
-            model of a robot.
-        size: Function that converts Pinocchio's `Magnitudes` (`urdfkin.verify.bounds`) to those of this
-            oracle.
+    `oracle` is a function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the model of a
+    robot. `size` converts the `Magnitudes` of a comparison with Pinocchio to those for this library.
     """
 
     name: OracleName
@@ -45,7 +38,6 @@ class OracleLibrary:
 
     @property
     def words(self) -> str:
-        """Title and version, such as "Pinocchio 4.1.0"."""
         return f"{self.title} {self.version()}"
 
 
@@ -73,12 +65,12 @@ def _library(name: str) -> OracleLibrary:
 
 
 def oracle_library(name: object) -> OracleLibrary:
-    """Return the oracle with the given name; raise UnknownNameError, or InputError for a missing library."""
+    """Return the oracle with a name; raise UnknownNameError, or InputError for a missing library."""
     wanted = as_str(name, "oracle")
     if (oracle := ORACLES.get(wanted)) is None:
         raise UnknownNameError("oracle", wanted, ORACLES)
     if oracle is not PINOCCHIO:
-        oracle.version()  # raises an error if the library is missing
+        oracle.version()  # `version` raises an error if the library is missing.
     return oracle
 
 

@@ -1,7 +1,7 @@
 """Check roll-pitch-yaw angles and quaternions by converting them back to rotation matrices with Pinocchio.
 
-Only the matrices can be compared: at gimbal lock, two correct programs may return different angles for a
-rotation, and two correct quaternions may have opposite signs.
+Only the matrices can be compared. At gimbal lock, two correct programs may return different angles for a
+rotation. Two correct quaternions may have opposite signs.
 """
 
 from __future__ import annotations
@@ -22,19 +22,12 @@ _ROUNDINGS = 16.0
 
 
 def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
-    """Compare rotations that Pinocchio computes from angles or quaternions with the original rotations.
+    """Compare rotations that Pinocchio computes from angles or quaternions with the verified rotations `R`.
 
-    Angles and quaternions represent exact rotations, but `R` has rounding errors. The bound therefore
-    includes the distance between `R` and the nearest rotation matrix.
-
-    Args:
-        numbers: (n, 3) roll, pitch, yaw in rad, or (n, 4) quaternions, scalar last.
-        R: (n, 3, 3) verified rotations from which the angles or quaternions were computed.
-        frame: Name of the frame, for the message.
-        again: Function that returns a shell command, or lines of Python, to compute a sample again.
-
-    Raises:
-        VerificationError: a rotation differs by more than the bound.
+    `numbers` contains roll, pitch, yaw (n, 3) in rad or quaternions (n, 4), scalar last. `again(k)` returns a
+    command that computes sample k again. The bound includes the distance between `R` and the nearest rotation
+    matrix, because `R` has rounding errors. Raises VerificationError if a rotation differs by more than the
+    bound.
     """
     pin = pinocchio()
     if numbers.shape[-1] == 3:

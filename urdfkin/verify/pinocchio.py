@@ -46,12 +46,7 @@ _REQUIREMENT = "'pin>=4,<5'"
 
 
 def pinocchio() -> Any:
-    """Return the module of Pinocchio.
-
-    Raises:
-        InstallationError: Pinocchio is not installed, has an unsupported version, or is a different project
-            of the same name.
-    """
+    """Return Pinocchio's module; raise InstallationError if Pinocchio is missing or unsupported."""
     try:
         import pinocchio as module
     except ImportError as error:
@@ -88,7 +83,11 @@ def _wrong_module(module: Any) -> InstallationError:
     file = module.__file__ or next(iter(module.__path__), "a folder without modules")
     project = _project_of(Path(file))
     cure = f"pip uninstall {project[0]}" if project else f"rename or remove {file}"
-    found = f"{project[0]} {project[1]}, another project" if project else "a file of no installed package"
+    found = (
+        f"{project[0]} {project[1]}, another project"
+        if project
+        else "a file that belongs to no installed package"
+    )
     return InstallationError(
         "the module `pinocchio` is not Pinocchio, the library that checks results",
         where=str(file),
@@ -99,7 +98,6 @@ def _wrong_module(module: Any) -> InstallationError:
 
 
 def _project_of(file: Path) -> tuple[str, str] | None:
-    """Return the name and the version of the installed project that contains a file."""
     from importlib import metadata
 
     for project in metadata.distributions():
@@ -109,21 +107,20 @@ def _project_of(file: Path) -> tuple[str, str] | None:
     return None
 
 
-#: Bytes of stack for each link; Pinocchio 4.1.0, which is recursive, needs less than 4 kB for each link.
+#: Bytes of stack for each link; the recursive parser of Pinocchio 4.1.0 needs less than 4 kB for each link.
 _STACK_FOR_A_LINK = 16_384
 #: Pinocchio reads chains with fewer links than this number without a stack overflow, in any thread.
 _SHALLOW = 100
 #: Maximum nv of a robot. Pinocchio 4.1.0 needs about 64 nv^3 bytes (measured), which is 2 GB at this limit.
 MOST_RATES = 315
 
-#: Number of floating-point values in a block of results; such a block fits into the processor's cache.
+#: Number of floating-point values in a block of results that fits into the processor's cache.
 _BLOCK_SIZE = 16384
-#: Function (n) that returns the results for the next n configurations.
+#: Function of n that returns the results for the next n configurations.
 _Next = Callable[[int], list[FloatArray]]
-#: Name of the free-flyer of a moving base.
 _BASE = "base"
 
-#: Character before link names while Pinocchio reduces a model; XML does not allow it in names.
+#: Prefix of link names while Pinocchio reduces a model; XML does not allow this character in names.
 _LINK_MARK = "\x01"
 
 
@@ -136,22 +133,13 @@ def build_model(
     lock: Mapping[str, float] = MappingProxyType({}),
     coupled: bool = True,
 ) -> Any:
-    """Return Pinocchio's model of a URDF text.
+    """Return Pinocchio's model of a URDF text; raise OracleError if Pinocchio cannot build the model.
 
-    Pinocchio would crash the process in two cases. A robot that needs too much memory is rejected. A long
-    chain of links is parsed with a larger stack.
+    Without enough memory or stack, Pinocchio would crash the process. A robot with too many joint velocities
+    is therefore rejected. A long chain of links is parsed with a larger stack.
 
-    Args:
-        text: The URDF text.
-        tree: urdfkin's tree of the text, from which the size of the model is computed.
-        root_joint: Kind of the joint between the world and the root: "floating" or "planar"; None: fixed.
-        mimic: True: the mimic joints follow their mimic rules. False: each mimic joint is independent.
-        lock: Value (rad or m) of each locked joint, which `buildReducedModel` removes from the model.
-        coupled: Whether a locked joint also locks the joints that mimic the locked joint.
-
-    Raises:
-        OracleError: Pinocchio does not accept the text, or the robot is too large.
-        InstallationError: Pinocchio is missing, or the module `pinocchio` belongs to a different project.
+    `root_joint` is "floating" or "planar", or None for a fixed root. The values in `lock` are in rad or m.
+    With `coupled`, the joints that mimic a locked joint are also locked.
     """
     rates = sum(joint.kind.nv for joint in tree.joints)
     if rates > MOST_RATES:
@@ -169,7 +157,6 @@ def build_model(
 
 
 def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool) -> Any:
-    """Return a model without the locked joints, by `buildReducedModel`."""
     pin, q = pinocchio(), pinocchio().neutral(model)
     rules = mimic_rules(text, list(model.names)[1:], str(model.name)) if coupled else {}
     locked = locked_by_rules(lock, rules)
@@ -180,7 +167,7 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
-    # `buildReducedModel` confuses a link with a joint of the same name; a prefix of link names avoids this.
+    # `buildReducedModel` confuses a link with a joint of the same name, so link names get a prefix.
     bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for frame in bodies:
         frame.name = _LINK_MARK + frame.name
@@ -226,14 +213,9 @@ class PinocchioOracle(Oracle):
         self.new_data = self._model.createData
 
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
-        """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames.
-
-        The base's frame takes the place of the world's frame in the list of frames. A root joint of the robot
-        stays in the model.
-        """
+        """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects a link with the name of a joint or of the free-flyer.
-        # Numbers as names avoid this error.
+        # `appendModel` rejects a link with the name of a joint or of the free-flyer, so all names change.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -274,7 +256,6 @@ class PinocchioOracle(Oracle):
     # -- quantities ----------------------------------------------------------------------------------
 
     def placements(self, x: QueryBatch) -> FloatArray:
-        """Return T_world_frame (n, frames, 4, 4) by `updateFramePlacement`."""
         pin = self._pin
         return self._collected(
             (4, 4),
@@ -285,11 +266,9 @@ class PinocchioOracle(Oracle):
         )
 
     def velocities(self, x: QueryBatch) -> FloatArray:
-        """Return velocities (n, frames, 6) by `getFrameVelocity`."""
         return self._six(x, 2, self._pin.getFrameVelocity)
 
     def accelerations(self, x: QueryBatch) -> FloatArray:
-        """Return classical accelerations (n, frames, 6) by `getFrameClassicalAcceleration`."""
         return self._six(x, 3, self._pin.getFrameClassicalAcceleration)
 
     def _six(self, x: QueryBatch, count: int, get: Callable[..., Any]) -> FloatArray:
@@ -303,11 +282,6 @@ class PinocchioOracle(Oracle):
         )
 
     def jacobians(self, x: QueryBatch) -> FloatArray:
-        """Return Jacobians (n, frames, 6, nv).
-
-        `computeFrameJacobian` computes the Jacobian of a single frame, `getFrameJacobian` the Jacobians of
-        several frames, and `getJointJacobian` the Jacobians of joints.
-        """
         pin = self._pin
         if len(x.frames) == 1 and not (x.joints or x.divided):
             shape = len(x.inputs[0]), 1, 6, self._model.nv
@@ -316,7 +290,6 @@ class PinocchioOracle(Oracle):
         return self._columns(x, 1, pin.computeJointJacobians, get)
 
     def jacobian_blocks(self, x: QueryBatch) -> Iterator[FloatArray]:
-        """Yield the Jacobians; for a single frame, in blocks of configurations that fit into the cache."""
         if len(x.frames) != 1 or x.joints or x.divided or not self._model.nv:
             yield self.jacobians(x)
             return
@@ -330,7 +303,6 @@ class PinocchioOracle(Oracle):
         return lambda n: list(islice(found, n))
 
     def jacobian_rates(self, x: QueryBatch) -> FloatArray:
-        """Return J-dot (n, frames, 6, nv) by Pinocchio's functions for frames or for joints."""
         pin = self._pin
         get = pin.getJointJacobianTimeVariation if x.joints else pin.getFrameJacobianTimeVariation
         return self._columns(x, 2, pin.computeJointJacobiansTimeVariation, get)
@@ -372,7 +344,8 @@ class PinocchioOracle(Oracle):
         """Return the columns (n, 6, columns) of Pinocchio's joint Jacobian, mimic joints included."""
         columns, model = self._layout.rate_columns, self._model
         out = np.empty((len(x.q), 6, len(columns)))
-        # Pinocchio 4.1 crashes the process if nv is 0, and returns a vector if nv is 1.
+        # Pinocchio 4.1 crashes the process for a Jacobian without columns.
+        # For a Jacobian with one column, Pinocchio 4.1 returns a vector.
         for k, q_k in enumerate(self._inputs(x, 1)[0] if columns else ()):
             J = self._pin.computeJointJacobians(model, self.data, q_k)
             out[k] = J.reshape(6, model.nv)[:, columns]
@@ -401,7 +374,6 @@ class PinocchioOracle(Oracle):
 
 
 def _stacked(compute: _Next, *shape: int) -> FloatArray:
-    """Return all results of `compute` in one array of the given shape (n, frames, ...)."""
     out = np.empty(shape)
     for _ in _blocks(compute, shape[0], out):
         pass

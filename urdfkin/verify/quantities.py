@@ -39,7 +39,6 @@ SIX = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 def oracle_method(name: str) -> Callable[[Oracle, QueryBatch], Any]:
-    """Return a function (oracle, query) that calls the oracle's method `name`."""
     return lambda oracle, query: getattr(oracle, name)(query)
 
 
@@ -51,36 +50,24 @@ class Quantity:
     """A quantity, such as the velocity of a frame: a row of the table.
 
     Attributes:
-        name: Name in certificates, errors and reports.
-        title: Name in sentences.
         inputs: The inputs of the quantity: "q", "qv" or "qva".
         shape: Shape of one result; "nv" stands for the robot's number of joint velocities.
-        equations: Equations of the textbook.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
             frames, ...). If `recursive` is False, the function has other arguments.
         ask: Function (oracle, query) that returns the oracle's results (n, frames, ...).
-        blocks: Generator (oracle, query) that yields the oracle's results in blocks of configurations, for
-            large results.
-        scale: Function (plan, magnitudes, reference) that returns the scale of the bound
-            (`urdfkin.verify.bounds`).
+        blocks: Generator (oracle, query) of the oracle's results in blocks of configurations.
+        scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
         factors: Number of factors in the bound (`urdfkin.verify.bounds`) for LOCAL_WORLD_ALIGNED.
         against: Function (oracle, part, ours, by) that returns the oracle's results and the bound; used
             instead of `ask` and `scale`.
-        exact: Function (motion, link, reference) that returns intervals around the true values, for the
-            accuracy study and `Robot.enclose`.
+        exact: Function (motion, link, reference) that returns intervals around the true values.
         recursive: True if the forward recursion computes the quantity for any frames.
         validated: True if `validate`, the accuracy study and plots include the quantity. False for the
             Hessian, which has nv times as many numbers as a Jacobian.
-        referred: True if the quantity depends on a reference frame. If False, as for the placement, `compute`
-            has no argument `reference`.
+        referred: True if the quantity depends on a reference frame.
         of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
         head: Heading of the column in reports; several quantities may share a column.
-        labels: Names of the rows of a result.
-        units: Unit of each group of three numbers, by the name of the group.
-        command: Name of the urdfkin command that computes the quantity; empty without a command.
-        summary: Line in the list of commands.
         page: Help text of the command, without the summary.
-        example: Example command line.
     """
 
     name: str
@@ -114,7 +101,6 @@ class Quantity:
 
     @property
     def axes(self) -> int:
-        """Number of axes of one result: 1 for a six-vector, 2 for a matrix, 3 for a Hessian."""
         return len(self.shape)
 
     @property
@@ -123,19 +109,16 @@ class Quantity:
 
     @property
     def references(self) -> tuple[Reference | None, ...]:
-        """Reference frames in which the validation and the accuracy study compare the quantity."""
         from urdfkin.model.reference import Reference
 
         return tuple(Reference) if self.referred else (None,)
 
     def own_shape(self, rates: int) -> tuple[int, ...]:
-        """Return the shape of one result for a robot with nv = `rates`."""
         return tuple(rates if size == "nv" else size for size in self.shape)
 
     def ours(
         self, plan: CompiledTree, inputs: Sequence[FloatArray], reference: Reference | None, **how: Any
     ) -> FloatArray:
-        """Return urdfkin's results (n, frames, ...) for the inputs q, v and a that the quantity needs."""
         results: FloatArray = self.compute(plan, *inputs[: len(self.inputs)], *self._in(reference), **how)
         return results
 
@@ -145,7 +128,6 @@ class Quantity:
         return bound
 
     def truth(self, motion: Any, link: int, reference: Reference | None) -> NDArray[Any]:
-        """Return the intervals that contain the true values of the quantity for one link."""
         assert self.exact is not None
         values: NDArray[Any] = self.exact(motion, link, *self._in(reference))
         return values
@@ -347,7 +329,6 @@ QUANTITIES = {
 
 
 def recursive_quantities(of: str = "frames") -> list[Quantity]:
-    """Return the quantities that the forward recursion computes for all frames, or for all joints."""
     return [row for row in QUANTITIES.values() if row.recursive and row.of == of]
 
 
@@ -356,12 +337,10 @@ def validated(of: str = "frames") -> list[Quantity]:
 
 
 def compared() -> str:
-    """Return the titles of the quantities that a validation compares, such as "placement and velocity"."""
     return _listed([row.title for row in validated()])
 
 
 def not_compared() -> str:
-    """Return the titles of the quantities of frames that a validation does not compare."""
     return _listed(
         [row.title for row in QUANTITIES.values() if row.of == "frames" and row not in validated()]
     )
@@ -372,7 +351,6 @@ def _listed(titles: Sequence[str]) -> str:
 
 
 def by_command() -> dict[str, Quantity]:
-    """Return the quantities that have a command, by the name of the command."""
     return {row.command: row for row in recursive_quantities() if row.command}
 
 

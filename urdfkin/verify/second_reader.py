@@ -3,9 +3,9 @@
 Pinocchio checks the computed results. This module checks the data of the robot: links, joint kinds, origins,
 axes, limits and mimic rules. The readers of yourdfpy and urdfkin share no code.
 
-yourdfpy (0.0.60) has two known faults, which the report separates from other differences: yourdfpy ignores
-the attribute `quat_xyzw` of an origin, and does not normalise axes. For a missing number, yourdfpy returns
-None, which counts as the default value of the URDF specification.
+yourdfpy 0.0.60 has two known faults: it ignores the attribute `quat_xyzw` of an origin, and does not
+normalise axes. The report separates these faults from other differences. For a missing number, yourdfpy
+returns None, which counts as the default value of the URDF specification.
 """
 
 from __future__ import annotations
@@ -31,19 +31,18 @@ from urdfkin.verify.oracle import resolved_rules
 if TYPE_CHECKING:
     from yourdfpy import urdf as yourdf
 
-#: Two programs compute a rotation matrix from the same angles: bound on the difference of two entries.
-#: A sine and a cosine have an error of one eps each; two products and a sum (at most 1), half an eps each.
+#: Bound on the difference of an entry of two rotation matrices that were computed from the same angles.
+#: A sine and a cosine have an error of one eps each.
+#: Two products and a sum of at most 1 have an error of half an eps each.
 _ROTATION = 9.0 * EPS
-#: Two programs normalise the same axis: bound on the difference of two components.
+#: Bound on the difference of a component of an axis that two programs normalise.
 #: The length has an error of 2 eps, and the quotient is rounded once.
 _AXIS = 5.0 * EPS
 #: An axis is normalised if its length differs from 1 by at most this number.
 _UNIT = 1e-6
-#: Maximum number of differences, or of joints with a known fault, in a report.
 _LISTED = 8
-#: Maximum number of quoted characters of an error of yourdfpy.
 _QUOTED = 200
-#: Kinds of joints with position limits in the specification.
+#: Kinds of joints that have position limits in the URDF specification.
 _BOUNDED = ("revolute", "prismatic")
 _LOWER_UPPER = ("lower", "upper")
 _VELOCITY_EFFORT = ("velocity", "effort")
@@ -53,12 +52,8 @@ _VELOCITY_EFFORT = ("velocity", "effort")
 class SecondReading:
     """Result of the comparison with yourdfpy's tree.
 
-    Attributes:
-        by: Name and version of yourdfpy.
-        joints: Number of compared joints, fixed joints included.
-        differences: Differences between the trees, due to an unknown error of urdfkin or of yourdfpy.
-        known: Differences due to known faults of yourdfpy.
-        unread: Reason why yourdfpy cannot read the text; None if yourdfpy can.
+    `joints` counts fixed joints too. `differences` result from an unknown error of urdfkin or of yourdfpy,
+    and `known` from known faults of yourdfpy. `unread` is the reason why yourdfpy cannot read the text.
     """
 
     by: str
@@ -73,19 +68,16 @@ def second_reading(
 ) -> SecondReading:
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
 
-    Args:
-        text: The URDF text.
-        tree: urdfkin's tree of the text.
-        mimic: Whether the tree couples mimic joints; if not, the mimic rules are not compared.
-        root_joint: Whether `load` has added the first joint and link of the tree, which the text does not
-            contain.
+    Without `mimic`, the mimic rules are not compared. `root_joint` states that `load` has added the first
+    joint and link of the tree, which are not in the text.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    if "<!DOCTYPE" in text:  # yourdfpy would read the files that the document type declaration names
-        return SecondReading(by, unread="the file has a document type")
+    # yourdfpy would read the files that a document type declaration names.
+    if "<!DOCTYPE" in text:
+        return SecondReading(by, unread="the file has a document type declaration")
     try:
         robot = read(text)
-    except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions
+    except Exception as error:  # lxml and yourdfpy raise many kinds of exceptions.
         words = " ".join(str(error).split()) or "no message"
         return SecondReading(by, unread=printable(f"{type(error).__name__}: {words}")[:_QUOTED])
     ours = {
@@ -114,7 +106,7 @@ def second_reading(
 
 def read(text: str) -> yourdf.Robot:
     """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
-    import yourdfpy  # yourdfpy imports trimesh, which is slow
+    import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
     # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.
     plain = re.sub(r"\A\s*<\?xml[^>]*\?>", "", text)
@@ -130,7 +122,7 @@ def read(text: str) -> yourdf.Robot:
 def _differences(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield each difference of a joint, and the known fault of yourdfpy that explains it ("": no fault)."""
+    """Yield each difference of a joint and the known fault of yourdfpy behind it, or an empty string."""
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""
@@ -167,7 +159,6 @@ def _limit(joint: yourdf.Joint) -> dict[str, float] | None:
 
 
 def _rules(theirs: Mapping[str, yourdf.Joint], ours: Mapping[str, object]) -> dict[str, Mimic]:
-    """Return yourdfpy's mimic rules of moving joints, with chains of mimic joints resolved."""
     return resolved_rules(
         {
             name: Mimic(joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset)
@@ -189,11 +180,10 @@ def _quaternions(text: str) -> set[str]:
 
 
 def _names(what: str, ours: Iterable[str], theirs: Iterable[str]) -> Iterator[str]:
-    """Yield a line for each name whose number of occurrences differs between the two readers."""
     found, own = Counter(iter(theirs)), Counter(iter(ours))
     for name in found.keys() | own.keys():
         if found[name] != own[name]:
-            yield f"{what} {name}: {found[name]} times, not {own[name]}"
+            yield f"{what} {name}: yourdfpy finds {found[name]}, urdfkin finds {own[name]}"
 
 
 def _shortened(differences: list[str]) -> list[str]:

@@ -1,8 +1,9 @@
 """Compute singular values of Jacobians, condition numbers and manipulabilities, with guaranteed bounds.
 
 *Error of J and residual.* Let s_k be the k-th singular value. By Weyl's inequality, |s_k(J + E) - s_k(J)| <=
-|E| in the spectral norm, and therefore also in the larger Frobenius norm, which this module uses. The matrix
-E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the decomposition.
+|E| in the spectral norm. This module uses the Frobenius norm of E, which is at least as large as the spectral
+norm. The matrix E is the sum of the error of J (`urdfkin.verify.bounds`) and the residual J - U S V^T of the
+decomposition.
 
 *Orthogonality.* The computed U and V are not exactly orthogonal. Let |U^T U - I| <= a and |V^T V - I| <= b.
 By Ostrowski's theorem, each singular value of U S V^T is a singular value of S times a factor. The factor is
@@ -179,9 +180,9 @@ class SingularValues(Displayable):
         """Return the gradient (..., nv) of the manipulability with respect to q, from the frame's Hessian.
 
         The derivative of a singular value is u^T J' v, with the singular vectors u and v of this value. The
-        manipulability is the product of all singular values; the product rule gives its derivative without a
-        division by a singular value. The gradient is NaN if the smallest singular value may be 0, because the
-        manipulability may not be differentiable there.
+        manipulability is the product of all singular values. The product rule gives the derivative of this
+        product without a division by a singular value. The gradient is NaN if the smallest singular value may
+        be 0, because the manipulability may then not be differentiable.
 
         Args:
             H: (..., 6, nv, nv) Hessian of the frame, from `Robot.hessian`.
@@ -234,7 +235,7 @@ def singular_values(
         skew = _skew(U) + _skew(Vt.swapaxes(-1, -2))
         lower = s * _down(1.0 - skew)[..., np.newaxis] - residual[..., np.newaxis]
         upper = s * _up(1.0 + skew)[..., np.newaxis] + residual[..., np.newaxis]
-    # A lower bound that is not finite becomes 0; an upper bound that is not finite becomes inf.
+    # A lower bound of NaN becomes 0, and an upper bound of NaN becomes inf.
     lower, upper = np.nan_to_num(_down(lower), nan=0.0), np.nan_to_num(_up(upper), nan=np.inf, posinf=np.inf)
     return SingularValues(rows, Between(s, np.maximum(lower, 0.0), upper), U, V, columns)
 

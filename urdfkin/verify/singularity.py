@@ -6,9 +6,10 @@
   joints of such columns cause the loss of rank.
 
 A geometric reason, such as parallel axes, is stated only if the columns satisfy the geometric condition, up
-to the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the axis,
-and a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if their
-columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column is 0.
+to the error bound of J. The column of a revolute joint is [a x z; z], where z is the direction of the axis.
+The vector a leads from the frame's origin to a point of the axis. Two joint axes are therefore collinear if
+their columns are equal up to sign. An axis passes through the frame's origin if the linear part of the column
+is 0.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: Maximum number of columns in a minimal dependent set that the search can find; larger sets exist.
+#: The search finds minimal dependent sets of up to this number of columns.
 _LARGEST_SET = 4
-#: A Jacobian with more columns than this number is not searched for minimal dependent sets.
+#: The search for minimal dependent sets is skipped for a Jacobian with more columns than this number.
 _MOST_COLUMNS = 16
-#: Relative rounding error of a singular value decomposition, in eps times the number of rows plus columns.
+#: Relative rounding error of a singular value decomposition, divided by eps and by (rows + columns).
 _ROUNDINGS = 16.0
 #: At random configurations, a singular value below this fraction of the norm counts as 0.
 _NEGLIGIBLE = 1e-9
@@ -41,8 +42,6 @@ class FrameColumns:
     Attributes:
         J: (..., 6, nv) Jacobian at the frame's origin in world axes.
         error: (..., 6, nv) bound on the error of each number of J.
-        frame: Name of the frame.
-        joints: (nv,) name of each column.
         turns: (nv,) True for the column of a revolute joint, False for the column of a prismatic joint, None
             for a column that does not belong to a single joint axis.
         active: (6, nv) bool, False for entries of the Jacobian that are 0 for every q.
@@ -62,7 +61,6 @@ class FrameColumns:
 
 
 def axis_kinds(tree: KinematicTree) -> tuple[bool | None, ...]:
-    """Return the attribute `turns` of `FrameColumns` for a robot."""
     turns: list[bool | None] = [None] * tree.nv
     moving = [(i, joint) for i, joint in enumerate(tree.joints) if joint.kind.nv]
     for i, joint in moving:
@@ -119,7 +117,7 @@ def explain(
 ) -> Singularity:
     """Return the rank of some rows of a Jacobian, and the reasons for a loss of rank.
 
-    `sample` is the index of the configuration; `lower` and `upper` (k,) bound the singular values.
+    `sample` is the index of the configuration. `lower` and `upper` (k,) bound the singular values.
     """
     rank, full = int((lower > 0.0).sum()), len(lower)
     if rank == full:
@@ -142,7 +140,6 @@ class _Explanation:
         self._names = [columns.joints[i] for i in self._moving]
 
     def result(self, full: int, least: float) -> Singularity:
-        """Return the rank, lost directions and reasons, if the smallest singular value is at most `least`."""
         U, s, Vt = np.linalg.svd(self._A)
         self._noise = 8.0 * self._matrix_error() / (s[self._rank - 1] if self._rank else 1.0)
         motions = np.zeros((len(Vt) - self._rank, self._J.shape[1]))
@@ -161,7 +158,7 @@ class _Explanation:
             lost = lost * np.sign(np.take_along_axis(lost, first, axis=1)) + 0.0
         if self._rank == usual:
             reasons = [
-                "Random configurations have the same rank: the cause is the arm, not this configuration."
+                "Random configurations have the same rank, so the arm is the cause, not this configuration."
             ]
         else:
             reasons = [*self._directions(lost), *self._causes(lost, motions)]
@@ -175,7 +172,6 @@ class _Explanation:
         return usual, U[:, int((s > _NEGLIGIBLE * s[0]).sum()) :]
 
     def _without_noise(self, rows: FloatArray) -> FloatArray:
-        """Replace numbers below the error of the Jacobian by 0."""
         return np.where(np.abs(rows) <= self._noise, 0.0, rows)
 
     def _directions(self, lost: FloatArray) -> Iterator[str]:
@@ -219,10 +215,7 @@ class _Explanation:
                     yield one
 
     def _joined(self, sets: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        """Replace overlapping pairs of dependent columns by their union.
-
-        For example, the three pairs of columns of three parallel prismatic joints become one set.
-        """
+        """Replace overlapping pairs of dependent columns by their union."""
         joined: list[set[int]] = []
         if self._linear_only:
             return sets
@@ -263,7 +256,6 @@ class _Explanation:
         return None
 
     def _of_revolute_axes(self, one: tuple[int, ...]) -> str | None:
-        """Return the geometric reason why columns of revolute joints are dependent; None: no known reason."""
         indices = self._moving[list(one)]
         z, v = self._J[3:, indices].T, self._J[:3, indices].T
         size = 1.0 + float(np.abs(v).max())
@@ -286,7 +278,6 @@ class _Explanation:
         return f"{axes} intersect in one point{' and lie in one plane' if len(one) == 3 else ''}."
 
     def _line(self, u: FloatArray) -> str | None:
-        """Return a sentence about a line that all joint axes intersect; None if there is no such line."""
         f, m = u[:3], u[3:]
         if self._linear_only or self._angular_only or not f.any():
             return None
@@ -323,7 +314,7 @@ class _Explanation:
 
 
 def _sparse(rows: FloatArray) -> FloatArray:
-    """Return a basis of the space that the rows span; Gaussian elimination gives the basis many zeros."""
+    """Return a basis with many zeros for the space that the rows span."""
     basis, n = rows.copy(), len(rows)
     free = list(range(basis.shape[1])) if n > 1 else []
     for i in range(n if n > 1 else 0):
@@ -337,9 +328,9 @@ def _sparse(rows: FloatArray) -> FloatArray:
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the span of `rows`, which are projections of orthonormal vectors."""
     _, s, Vt = np.linalg.svd(rows, full_matrices=False)
-    return Vt[: int((s > 0.5).sum())]  # each singular value is 1 or 0, except for rounding
+    # Each singular value is 1 or 0, except for rounding.
+    return Vt[: int((s > 0.5).sum())]
 
 
 def _vector(x: FloatArray) -> str:

@@ -1,6 +1,6 @@
 """Compare a Denavit-Hartenberg table with Pinocchio: placement, Jacobian and acceleration of its tip.
 
-Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. This base
+Pinocchio computes frames in the world, and a table computes the tip relative to the table's base. The base
 may move too, for example in a chain from the left foot to the right hand. Let R, w, v, alpha and a be the
 motion of base b and of tip t in the world, and r = p_t - p_b:
 
@@ -9,16 +9,16 @@ motion of base b and of tip t in the world, and r = p_t - p_b:
     alpha= R_b^T (alpha_t - alpha_b - w_b x (w_t - w_b))
     acc  = R_b^T (a_t - a_b - alpha_b x r - w_b x (w_b x r) - 2 w_b x (v_t - v_b - w_b x r))
 
-These are eq. 7.124 and 7.125, solved for the motion relative to the moving frame.
-`urdfkin.kinematics.equations` computes the table's results, so this module implements the equations
-independently.
+These equations are eq. 7.124 and 7.125, solved for the motion relative to the moving frame. The table's
+results come from `urdfkin.kinematics.equations`, so this module implements the equations independently.
 
-The bound is the sum of the rounding errors of urdfkin and of Pinocchio. If snapping (rounding to simple
-angles) has changed a table, the bound also includes the deviation that the table states. The bound on
-rounding errors is proportional to the robot's reach: the length of the paths from the root to the table's
-base and to its tip, with prismatic displacements. If the sum of all lengths in the table is larger than the
-reach, the bound uses this sum, but at most `PROMISED` times the reach. Tables with Hayati rows never exceed
-this limit. The bound on a Jacobian column is multiplied by the multipliers of its mimic joints.
+The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
+that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
+deviation that the table states. The bound on rounding errors is proportional to the robot's reach. The reach
+is the length of the path from the root to the table's base plus the length of the path from the root to the
+tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
+reach, the bound uses this sum. The bound uses at most `PROMISED` times the reach. Tables with Hayati rows
+never exceed this limit. The bound on a Jacobian column is multiplied by the multipliers of its mimic joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
@@ -50,7 +50,7 @@ PROMISED = 10.0
 
 
 class TableError(UrdfkinError):
-    """A table and Pinocchio differ by more than rounding errors and `--snap` can explain.
+    """A table differs from Pinocchio by more than rounding errors and the option `--snap` can explain.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.TableError, urdfkin.UrdfkinError)
@@ -65,16 +65,13 @@ class TableCheck:
     """Result of the check of a table. Each number is the largest value over all samples.
 
     Attributes:
-        samples: Number of configurations.
         metres: Distance between the table's tip and Pinocchio's tip, m.
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
         units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
         shares: Ratios of the differences `units` to their bounds. A ratio above 1 is a disagreement, unless
-            `loss` explains it.
-        snapped: True if snapping changed the table, for example from 89.99 to 90 degrees. The bound then
-            includes the deviation that the table states.
-        loss: Explanation of a difference above the bound, if very large lengths in the table cause the
-            difference; else None.
+            `loss` explains the difference.
+        snapped: Whether snapping changed the table. The bound then includes the effect of snapping.
+        loss: Explanation of a difference above the bound that very large lengths in the table cause.
     """
 
     samples: int
@@ -91,7 +88,6 @@ class TableCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether snapping and rounding explain all differences."""
         return self.within or self.loss is not None
 
     def __str__(self) -> str:
@@ -112,7 +108,6 @@ class TableCheck:
 
 
 def check_table(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> TableCheck:
-    """Compare a table between two frames of `tree` with Pinocchio's model `oracle` of the same robot."""
     own_q = table.coupling.select(tree, samples.q)
     columns = list(table.coupling.v_index(tree))
     own_v, own_a = samples.v[:, columns], samples.a[:, columns]
@@ -145,7 +140,7 @@ def own_length(table: DHTable) -> float:
 
 
 def _loss(table: DHTable) -> str:
-    """Return a text that names the length with the largest rounding error, this error, and the remedy."""
+    """Return a text with the length that has the largest rounding error, and a remedy."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -158,19 +153,18 @@ def _loss(table: DHTable) -> str:
     )
 
 
-#: Linear and angular differences of each quantity, by the name of the quantity.
+#: Linear and angular differences, by the name of the quantity.
 _Differences = dict[str, tuple[FloatArray, FloatArray]]
 
 
 def _measured(
     differences: _Differences, size: Sizes, slack: _Slack
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the largest difference of each quantity, in eps * scale and as a fraction of the bound."""
     rates = size.rates**2 + size.accelerations
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: Pairs (scale, slack) for the linear and for the angular differences of each quantity.
+    #: Pairs (scale, slack) for the linear and for the angular differences.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, slack.metres), (one, slack.turn)),
         "jacobian": (
@@ -191,7 +185,6 @@ def _measured(
 
 
 def _worst(found: FloatArray, unit: FloatArray | float) -> float:
-    """Return the largest number in `found` as a multiple of its unit; 0 if number and unit are 0."""
     return float((found / np.maximum(unit, NOT_ZERO)).max(initial=0.0))
 
 
@@ -205,7 +198,6 @@ class RelativeMotion:
 
 
 def relative_motion(oracle: Oracle, tree: KinematicTree, table: DHTable, samples: Samples) -> RelativeMotion:
-    """Return Pinocchio's motion of the table's tip relative to the table's base."""
     x = QueryBatch([table.base_frame, table.tip_frame], (samples.q, samples.v, samples.a))
     T = oracle.placements(x)
     R = T[:, 0, :3, :3]
@@ -237,12 +229,10 @@ class Sizes:
     Attributes:
         reach: (n,) length of the path from the root to the table's base plus length of the path from the root
             to the table's tip, m.
-        turning: (columns,) for each coordinate of the table, the sum of |multiplier| over the revolute joints
-            that the coordinate moves. Only joints from the root to the table's base or tip count.
-        sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate of the table
-            moves.
+        turning: (columns,) sum of |multiplier| over the revolute joints that a coordinate of the table moves.
+            Only joints from the root to the table's base or tip count.
+        sliding: (columns,) sum of |multiplier| over the prismatic joints that a coordinate moves.
         rates: (n,) sum of the absolute values of all joint velocities, rad/s and m/s.
-        accelerations: (n,) sum of the absolute values of all joint accelerations, rad/s^2 and m/s^2.
         rounding: (n,) upper bound on the relative error. The bound includes the angles between nearly
             parallel axes that the table treats as parallel (`urdfkin.dh.common_normals`).
     """
@@ -255,12 +245,10 @@ class Sizes:
     rounding: FloatArray
 
     def of_length(self, metres: float) -> Sizes:
-        """Return a copy in which `reach` is at least `metres`."""
         return replace(self, reach=np.maximum(self.reach, metres))
 
 
 def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
-    """Return the sizes of the paths from the root to the two frames of the table."""
     n = len(samples.q)
     reach, rates, accelerations, angles = np.zeros((4, n))
     names, joints, tilt = table.joint_names, 0, 0.0
@@ -294,11 +282,11 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
 
 
 class _Slack:
-    """Allowed differences between a snapped table and the robot, in addition to rounding errors.
+    """Allowed differences between the robot and a table with snapped angles, in addition to rounding errors.
 
     Snapping rotates an axis by at most `turn`, and displaces a joint origin or the tip by at most `metres`. A
-    vector z x d therefore changes by at most `turn` times the reach plus twice `metres`, and a product of two
-    such vectors by at most twice this amount. The cross product of two axes changes by at most twice `turn`.
+    vector z x d therefore changes by at most turn * reach + 2 * metres. A product of two such vectors changes
+    by at most twice this amount. The cross product of two axes changes by at most 2 * turn.
     """
 
     def __init__(self, table: DHTable, own_q: FloatArray, size: Sizes) -> None:

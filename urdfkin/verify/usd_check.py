@@ -6,9 +6,9 @@ from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 - with OpenUSD's parser UsdPhysics. UsdPhysics and urdfkin's parser must find the same bodies, frames, degrees
   of freedom and limits for each joint. A difference is an error.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
-  robot in one configuration, in which each link must have the placement of its prim. The file states these
-  transforms separately from the joint frames. A difference means that the file contradicts itself, and is
-  only a warning.
+  robot in one configuration, in which each link must have the placement of its prim. The file states the
+  prims' transforms separately from the joint frames. A difference means that the file contradicts itself;
+  `load` reports the difference as a warning.
 
 Both comparisons allow only rounding to single precision, in which a stage stores its numbers.
 """
@@ -60,10 +60,7 @@ _TRANSFORM = 6.0 * np.pi
 
 @dataclass(frozen=True, slots=True)
 class UsdReading:
-    """The tree of a USD stage as a URDF text, and the answer of the process that read the stage.
-
-    The remarks name parts of the stage that the tree does not contain, and probable mistakes.
-    """
+    """The tree of a USD stage as a URDF text, and the answer of the process that read the stage."""
 
     urdf: str
     remarks: tuple[Remark, ...]
@@ -80,22 +77,13 @@ def read_usd(
 ) -> UsdReading:
     """Read the robot of a USD file in a process with limits on time (s) and memory.
 
-    OpenUSD's readers also read the stage and the files to which it refers, for `check_usd_source`.
-
-    Args:
-        source: Path of the USD file.
-        variants: Pairs (variant set, variant) to select.
-        articulation: Path or name of the articulation; None: the stage has only one.
-        patience: Time limit, s.
-
-    Raises:
-        SourceError: the file cannot be read or is too large.
-        InputError: OpenUSD is not installed, does not accept the file, or takes too much time or memory; or
-            the robot has a joint that urdfkin does not support.
+    OpenUSD also reads the files to which the stage refers. `variants` contains pairs (variant set, variant).
+    Raises SourceError if the file cannot be read or is too large. Raises InputError if OpenUSD is missing,
+    rejects the file or exceeds a limit, or for an unsupported joint.
     """
     version()
     path = at_home(source)
-    read_bytes(path)  # raises the usual error if the file is missing
+    read_bytes(path)  # `read_bytes` raises the usual error if the file is missing.
     request = {
         "path": os.path.realpath(path),
         "name": str(path),
@@ -120,13 +108,9 @@ def read_usd(
 
 
 def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
-    """Compare a robot with the data that OpenUSD reads from the same stage.
+    """Compare a robot with OpenUSD's data of the stage; return a sentence and remarks about prims.
 
-    Returns:
-        A sentence for the certificate, and remarks about prims whose placements differ.
-
-    Raises:
-        OracleError: OpenUSD's parser and urdfkin disagree about a joint.
+    Raises OracleError if OpenUSD's parser and urdfkin disagree about a joint.
     """
     joints = read.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
@@ -144,8 +128,8 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
     Let u = `SINGLE` be the relative error of one rounding to single precision.
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
-      quaternions adds 4 u to each number. The vector of the four errors has the length 8 u, and the angle
-      error is twice this length, 16 u. The sum is `_ROTATION` u.
+      quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
+      is twice this length, 16 u. The sum is `_ROTATION` u.
     - Origin: three rounding errors (`_ORIGIN`): of the scale factor, of the scaled origin, and of the
       transformed origin.
     """
@@ -184,7 +168,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: For each joint, by name: five numbers about rounding to single precision (`urdfkin.urdf.usd.Usd.single`).
+#: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -275,7 +259,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
     ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
-    if tree.links[0] in prims:  # the root's pose in the stage is arbitrary, so all poses are relative to it
+    # The root's pose in the stage is arbitrary, so all poses become relative to the root.
+    if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])
         rest = inverse(rest[at]) @ rest
     of_links = single_precision(tree, answer["single"]).links
@@ -309,9 +294,10 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     )
     if remarks:
         words = (
-            f"UsdGeom places {len(remarks)} of the {len(prims)} prims elsewhere, by up to {worst[0]:.3g} m"
+            f"UsdGeom and the joints place {len(remarks)} of {len(prims)} prims differently,"
+            f" by up to {worst[0]:.3g} m"
         )
-        # An error of one body displaces all bodies after it, so only the first difference is reported.
+        # An error of one body displaces all later bodies, so only the first difference is reported.
         return words, tuple(remarks[:1])
     return (
         f"UsdGeom's transforms of {len(prims)} prims agree {where}"

@@ -26,20 +26,19 @@ from urdfkin.verify.mjcf_process import error_answer, packed, write_answer
 
 
 def serve() -> None:
-    """Read a request (JSON) from standard input, and write the answer (JSON) to standard output."""
     request = json.load(sys.stdin)
-    os.environ["PXR_WORK_THREAD_LIMIT"] = "1"  # a confined process cannot start threads
+    os.environ["PXR_WORK_THREAD_LIMIT"] = "1"  # A confined process cannot start threads.
     try:
         library()
         limit(request["seconds"])
         write_answer(answer_of(request))
     except Exception as error:
         write_answer(error_answer(error, "OpenUSD cannot read this stage"))
-    os._exit(0)  # skips the exit handlers of the libraries
+    # `os._exit` skips the exit handlers of the libraries.
+    os._exit(0)
 
 
 def answer_of(request: Mapping[str, Any]) -> dict[str, Any]:
-    """Answer a request with the data that OpenUSD reads from the stage."""
     read = read_usd(
         request["path"],
         request["name"],
@@ -67,7 +66,7 @@ def _second_reading(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # A joint with PhysicsArticulationRootAPI also has the description of an articulation: skip it.
+            # A joint with PhysicsArticulationRootAPI also has an articulation's description: skip it.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _described(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}
@@ -84,7 +83,7 @@ def _described(physics: Any, one: Any, read: Usd) -> list[Any]:
     ends = getattr(one, "limit", None)
     if isinstance(one, physics.D6JointDesc):
         own = {str(pair.first).rpartition(".")[2].lower(): pair.second for pair in one.jointLimits}
-        ends = own.get(free.lower())  # `ends` is None if several directions are free
+        ends = own.get(free.lower())  # `ends` is None if the joint has several free directions.
     factor = np.pi / 180.0 if free.startswith("rot") else read.unit
     limits = (
         (float(ends.lower) * factor, float(ends.upper) * factor) if ends is not None else (-np.inf, np.inf)

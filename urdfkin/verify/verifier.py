@@ -1,6 +1,6 @@
-"""The verifier of a robot: it compares results with the oracle and records the checks.
+"""Compare a robot's results with an oracle (Pinocchio or MuJoCo), and record the checks.
 
-The oracle receives the user's arguments. Results are compared in the shape in which a method returns them.
+The oracle receives the user's arguments. Results are compared in the shape that a method returns.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ Verify = bool | Literal["sample"]
 
 SAMPLE = 100
 
-#: Maximum number of values that are compared at once; they fit into the processor's cache.
+#: Maximum number of values that are compared at once, so that the values fit into the processor's cache.
 _PART_SIZE = 262_144
 #: Maximum number of configurations that are compared at once.
 _MOST = 4096
@@ -70,20 +70,9 @@ class NotVerifiedWarning(UserWarning):
 class Verifier:
     """Checks the results of one robot and records them.
 
-    Args:
-        text: The URDF text that Pinocchio reads.
-        tree: urdfkin's tree of the same text.
-        origin: The arguments of `load`. An error message uses them for a command that repeats the
-            computation.
-        policy: Default of the argument `verify` of a robot's methods.
-        mimic: True: mimic joints are coupled. False: every mimic joint moves freely.
-        unverifiable: Known reason why Pinocchio cannot check the robot; None: no known reason.
-        oracle: Name of the oracle for the results of the robot's methods: "pinocchio" or "mujoco". Pinocchio
-            always checks tables, the accuracy study and enclosures.
-
-    Attributes:
-        ledger: Record of checked and unchecked results.
-        reading: Result of the check of the conversion to URDF from another format; empty for a URDF.
+    `unverifiable` is a known reason why Pinocchio cannot check the robot. `oracle` checks the results of the
+    robot's methods; Pinocchio always checks tables, the accuracy study and enclosures. `reading` describes
+    the check of a conversion to URDF, and is empty for a URDF.
     """
 
     def __init__(
@@ -109,12 +98,7 @@ class Verifier:
         return {**self.__dict__, "ledger": Ledger(), "_oracles": {}}
 
     def oracle(self, base: BaseMotion | None = None, by: OracleLibrary = PINOCCHIO) -> Oracle:
-        """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer.
-
-        Raises:
-            OracleError: the oracle does not accept the text, or reads other joints from it.
-            InputError: the oracle is not installed.
-        """
+        """Return the oracle's model of the robot, built at the first call; `base` adds a free-flyer."""
         key = by.name, base is not None
         if key not in self._oracles:
             self._oracles[key] = by.oracle(
@@ -128,11 +112,7 @@ class Verifier:
         return self._oracles[key]
 
     def model(self, *, mimic: bool) -> Any:
-        """Return a new `pinocchio.Model` of the robot, for the user.
-
-        Raises:
-            OracleError: Pinocchio does not accept the text, or reads a different robot from it.
-        """
+        """Return a new `pinocchio.Model`; raise OracleError if Pinocchio cannot check the robot."""
         if self.unverifiable is not None:
             raise OracleError(self.unverifiable, where=self.tree.name)
         return build_model(
@@ -145,8 +125,7 @@ class Verifier:
         )
 
     def locked(self, tree: KinematicTree, lock: tuple[tuple[str, float], ...]) -> Verifier:
-        """Return the verifier of this robot with additional locked joints."""
-        # Pinocchio may accept a robot with fewer moving joints, even if it has refused the original robot.
+        # Pinocchio may accept a robot with fewer moving joints, even after refusing the original robot.
         known = self.unverifiable if self.unverifiable not in self._refusals.values() else None
         verifier = Verifier(
             self.text,
@@ -174,7 +153,6 @@ class Verifier:
         return self._refusals.get(by.name)
 
     def policy_of_call(self, verify: Verify | None) -> Verify:
-        """Return the value of `verify` for a call; None means the robot's `policy`."""
         return as_verify(self.policy if verify is None else verify)
 
     def require_pinocchio(self, verify: Verify | None) -> None:
@@ -198,19 +176,15 @@ class Verifier:
     @property
     def sha256(self) -> str:
         """SHA-256 of the MJCF or USD file, or of the URDF text as UTF-8."""
-        import hashlib  # the import is slow, because hashlib loads OpenSSL
+        # The import is slow, because hashlib loads OpenSSL.
+        import hashlib
 
         return self.origin.sha256 or hashlib.sha256(self.text.encode()).hexdigest()
 
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check the results of a call, in the shape that the call returns, and record the check.
-
-        Raises:
-            VerificationError: the oracle's result differs by more than the bound.
-            OracleError: the shape of the results does not match the arguments.
-        """
+        """Check and record the results of a call; raise VerificationError for a too large difference."""
         ledger, policy = self.ledger, self.policy_of_call(verify)
         if policy is False:
             ledger.unchecked(quantity.name, call.results)
@@ -240,10 +214,10 @@ class Verifier:
         frame: str,
         reference: Reference,
     ) -> Callable[..., FloatArray | None]:
-        """Return a function that calls `compute` for one configuration, and checks and records the result.
+        """Return a function that computes one configuration, and checks and records the result.
 
-        The last argument of `compute` is `out`. `compute` returns None for unsupported arguments. In this
-        case, and if the oracle cannot check the robot, the returned function returns None without a check.
+        The last argument of `compute` is `out`. If `compute` does not support the arguments, or if the oracle
+        cannot check the robot, the returned function returns None without a check.
         """
         quantity, by, frames = QUANTITIES[name], self.library, (frame,)
         if self.cannot(None, by) is not None:
@@ -264,7 +238,7 @@ class Verifier:
             if comparison.agrees:
                 warn_of_degrees(self.tree, arguments[0])
                 self.ledger.checked(name, comparison)
-            else:  # `check` raises the error
+            else:  # `check` raises the error.
                 call = Call(self.tree, lambda _: plan, frame, reference, None, arguments[:-1])
                 self.check(quantity, call, result, True)
             return result
@@ -274,7 +248,7 @@ class Verifier:
     def _compare(
         self, quantity: Quantity, call: Call, ours: FloatArray, part: slice | IntArray
     ) -> tuple[BatchComparison, VerificationError | None]:
-        """Compare the results of some configurations with the oracle's; also return the error, if any."""
+        """Return the comparison with the oracle's results, and an error if a difference is too large."""
         x = call.part(part)
         compared = quantity, self.oracle(call.base, self.library), x, ours, self.library
         comparison = comparison_with_oracle(*compared)
@@ -304,7 +278,6 @@ class Verifier:
         )
 
     def _replay(self, quantity: Quantity, call: Call, k: int, frame: str) -> str:
-        """Return a shell command, or a line of Python, that computes sample `k` again."""
         inputs = (call.q, *call.rates)
         values = {name: array[k].tolist() for name, array in zip("qva", inputs, strict=False)}
         reference = call.reference.name.lower() if quantity.referred else None
@@ -322,11 +295,7 @@ class Verifier:
     def table(self, table: DHTable, samples: int = TABLE_SAMPLES) -> TableCheck | None:
         """Check a Denavit-Hartenberg table; return None, with a warning, if Pinocchio cannot check the robot.
 
-        If very large lengths in the table cause rounding errors above the usual bound, a warning reports
-        this.
-
-        Raises:
-            TableError: urdfkin and Pinocchio differ by more than the bound.
+        Raises TableError if a difference exceeds the bound.
         """
         from urdfkin.verify.tables import TableError, check_table
 
@@ -348,12 +317,9 @@ class Verifier:
         return check
 
     def tree_parameters(self, parameters: TreeParameters) -> str | None:
-        """Compare the links' placements from Khalil-Kleinfinger parameters with Pinocchio's; return a text.
+        """Compare Khalil-Kleinfinger parameters with Pinocchio's placements of the links; return a text.
 
         The result is None, with a warning, if Pinocchio cannot check the robot.
-
-        Raises:
-            TableError: urdfkin and Pinocchio differ by more than the bound.
         """
         from urdfkin.verify.tables import TableError
 
@@ -387,13 +353,6 @@ class Verifier:
 def comparison_with_oracle(
     quantity: Quantity, oracle: Oracle, x: Part, ours: FloatArray, by: OracleLibrary
 ) -> BatchComparison:
-    """Compare urdfkin's results (n, frames, ...) for some configurations with the results of an oracle.
-
-    Large results are compared in blocks, while the oracle's results are still in the processor's cache.
-
-    Raises:
-        OracleError: the oracle does not return a result for each configuration.
-    """
     if quantity.blocks is None:
         theirs, bound = oracle_results_with_bound(quantity, oracle, x, ours, by)
         _check_count(quantity, by, len(theirs), len(ours))
@@ -430,10 +389,8 @@ def oracle_results_with_bound(
 def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Bound:
     """Return the bound on the difference between urdfkin's results and the oracle's.
 
-    The arrays of the bound can be broadcast to the shape of the results.
-
-    The length of a path without prismatic joints is the same in every configuration. The bound of a placement
-    or a Jacobian on a fixed base is then computed for one configuration, stored, and used for all.
+    The length of a path without prismatic joints is the same in every configuration. For a placement or a
+    Jacobian on a fixed base, such a path has one bound for all configurations.
     """
     v, a = (*x.rates, None, None)[:2]
     constant = v is None and x.state is STILL_STATE and x.plan.turns_only and len(x.q) > 0
@@ -448,7 +405,6 @@ def bound_of(quantity: Quantity, x: Part, by: OracleLibrary = PINOCCHIO) -> Boun
 
 
 def own_results(quantity: Quantity, x: Part) -> FloatArray:
-    """Return the results (n, frames, ...) of urdfkin's forward recursion."""
     return quantity.ours(x.plan, (x.q, *x.rates), x.reference, base=x.state)
 
 
@@ -458,7 +414,6 @@ _not_finite_is_reported = partial(np.errstate, over="ignore", under="ignore", in
 
 @_not_finite_is_reported()
 def oracle_results(quantity: Quantity, oracle: Oracle, query: QueryBatch) -> FloatArray:
-    """Return an oracle's results (n, frames, ...)."""
     return quantity.ask(oracle, query)
 
 
@@ -473,7 +428,6 @@ def _warn(reason: str) -> None:
 
 
 def as_verify(verify: object) -> Verify:
-    """Return a valid value of `verify`; raise InputError for other values."""
     if verify is True or verify is False:
         return verify
     if isinstance(verify, str) and verify == "sample":
@@ -484,8 +438,7 @@ def as_verify(verify: object) -> Verify:
 def parts(verify: Verify, n: int, numbers: int) -> Iterator[slice | IntArray]:
     """Yield the indices of the checked configurations in parts; each configuration has `numbers` values.
 
-    The sample is random with a fixed seed. In an ordered batch, a regular choice, such as every k-th
-    configuration, could be biased.
+    The sample is random, because a sample of every k-th configuration may be biased in an ordered batch.
     """
     step = min(_MOST, max(1, _PART_SIZE // max(1, numbers)))
     if verify == "sample" and n > SAMPLE:

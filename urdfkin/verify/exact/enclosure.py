@@ -37,7 +37,7 @@ from urdfkin.verify.quantities import (
 )
 from urdfkin.verify.verifier import Verifier, oracle_results, own_results
 
-#: Decimal digits: at least 15, the precision of a double, and at most 10,000, to limit the computing time.
+#: A double has 15 decimal digits. The maximum of 10,000 digits limits the computing time.
 LEAST_DIGITS, MOST_DIGITS = 15, 10_000
 
 _ENDS = np.vectorize(ends, otypes=[float, float])
@@ -47,14 +47,8 @@ _ENDS = np.vectorize(ends, otypes=[float, float])
 class Enclosure:
     """Lower and upper bounds of the true value of each number in a result.
 
-    The arrays have the shape of the result of the `Robot` method.
-
-    Attributes:
-        quantity: Name of the quantity.
-        lower: Lower bound of each true value.
-        upper: Upper bound of each true value.
-        urdfkin: urdfkin's result.
-        pinocchio: Pinocchio's result; None if Pinocchio cannot compute the result.
+    The arrays have the shape of the result of the `Robot` method. `urdfkin` and `pinocchio` are the computed
+    results; `pinocchio` is None if Pinocchio cannot compute the result.
     """
 
     quantity: str
@@ -67,25 +61,18 @@ class Enclosure:
     def width(self) -> FloatArray:
         """The difference `upper - lower`, which is 0 only if the true value is a double.
 
-        Any other width is at least the distance between two neighbouring doubles.
+        If the true value is not a double, the width is at least the distance between two neighbouring
+        doubles.
         """
         return self.upper - self.lower
 
     def contains(self, x: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether each number of `x` is between `lower` and `upper`.
-
-        Raises:
-            InputError: the shape of `x` is not that of the quantity.
-        """
+        """Return whether each number of `x` is inside its interval; raise InputError for a wrong shape."""
         x = self._alike(x)
         return (self.lower <= x) & (x <= self.upper)
 
     def error(self, x: ArrayLike) -> FloatArray:
-        """Return an upper bound on the difference between each number of `x` and the true value.
-
-        Raises:
-            InputError: the shape of `x` is not that of the quantity.
-        """
+        """Return an upper bound on |x - true value|; raise InputError for a wrong shape."""
         x = self._alike(x)
         farthest = np.maximum(np.abs(x - self.lower), np.abs(self.upper - x))
         return np.where(farthest > 0.0, np.nextafter(farthest, np.inf), 0.0)
@@ -146,12 +133,7 @@ def enclose(
     *,
     hessian: bool = False,
 ) -> Enclosures:
-    """Return intervals that contain the true results of one frame for one sample (`Robot.enclose`).
-
-    Raises:
-        InputError: the inputs are a batch or have a wrong length, or the number of digits is invalid.
-        UnknownNameError: the frame or reference does not exist.
-    """
+    """Return intervals that contain the true results of one frame for one sample."""
     if digits is not None:
         digits = whole_number(digits, "digits", LEAST_DIGITS, MOST_DIGITS)
     tree = verifier.tree

@@ -4,8 +4,8 @@ An interval consists of a midpoint with many digits, and a radius. The library A
 that the result of each sum, product, quotient, root, sine and cosine contains the true value. Vectors are
 triples of intervals.
 
-`read_exact` reads the decimals of a URDF text without rounding them. The text has already been checked by
-`urdfkin.urdf.lint`.
+`read_exact` reads the decimals of a URDF text without rounding them. `urdfkin.urdf.lint` has already checked
+the text.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ DIGITS = 50
 _TWO_DOUBLES = 30
 #: Number of bits for each decimal digit of an interval.
 _BITS = math.log2(10.0)
-#: Number of bits of an interval in addition to its digits; 15 digits, as in a double, give 55 bits.
+#: Number of bits in addition to the bits of an interval's decimal digits. 15 digits then have 55 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _MORE_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT = 17
 #: Number of digits of an exact decimal before it is rounded.
 _ALL_DIGITS = 200
-#: Number of additional bits in iterations.
+#: Number of additional bits in Newton's iteration.
 _SPARE = 30
 
 _ONE_THREAD = lock_over_forks()
@@ -52,8 +52,8 @@ _ONE_THREAD = lock_over_forks()
 def enough_digits(joints: int) -> int:
     """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    Each joint on the path to the frame adds one digit. This is enough, because a joint with an oblique axis
-    loses only about a third of a digit.
+    Each joint on the path to the frame adds one digit. One digit is enough, because a joint with an oblique
+    axis loses only about a third of a digit.
     """
     return _TWO_DOUBLES + joints
 
@@ -75,7 +75,8 @@ def exact(value: Number) -> Number:
 
 def ends(x: Number) -> tuple[float, float]:
     """Return the lower and the upper limit of an interval or an integer, rounded outward to doubles."""
-    if isinstance(x, int):  # a fast path, because most numbers of a large robot are the integer 0
+    # This branch saves time, because most numbers of a large robot are the integer 0.
+    if isinstance(x, int):
         return float(x), float(x)
     return _outward(x.lower(), -math.inf), _outward(x.upper(), math.inf)
 
@@ -90,9 +91,9 @@ def _outward(end: arb, towards: float) -> float:
 def decimal(x: Number, negligible: float) -> str | None:
     """Return an interval's midpoint as a decimal of 17 significant digits; None if the interval is too wide.
 
-    The radius must be at most 1e-20 times the midpoint, so the decimal differs from the true value by at most
-    0.501 units of its last digit. An interval that contains 0 becomes 0 if its radius is at most 1e-10 times
-    `negligible`.
+    The radius must be at most 1e-20 times the midpoint. The decimal then differs from the true value by at
+    most 0.501 units of its last digit. An interval that contains 0 becomes 0 if its radius is at most 1e-10
+    times `negligible`.
 
     >>> with precision(50):
     ...     decimal(exact(1) / 3, 1e-15), decimal(exact(2), 1e-15), decimal(arb(0.0, 1e-40), 1e-15)
@@ -143,7 +144,6 @@ def about(axis: Vector, angle: Number, kind: NumberType = BALLS) -> Matrix:
 
 
 def from_rpy(rpy: Vector, kind: NumberType = BALLS) -> Matrix:
-    """Return Rz(yaw) Ry(pitch) Rx(roll)."""
     x, y, z = ((*kind.sine_cosine(angle), 0, 1) for angle in rpy)
     found: Matrix = eq.product(eq.product(eq.about_z(*z), eq.about_y(*y)), eq.about_x(*x))
     return found
@@ -160,9 +160,9 @@ def nearest_rotation(M: Matrix) -> Matrix:
     """Return the rotation U nearest to M, from the polar decomposition M = U H; M must be nearly a rotation.
 
     Each step of Newton's iteration X - X (X^T X - I)/2 doubles the number of correct digits. The result X = U
-    (1 + E) has the same orthogonal factor U as M. From X^T X - 1 = 2 E + E^2, and because the eigenvalues of
-    E are above -1, follow |E| <= |2 E + E^2| and |X - U| <= |X^T X - 1|. This bound is added to the radius of
-    each interval.
+    (1 + E) has the same orthogonal factor U as M, and X^T X - 1 = 2 E + E^2. The eigenvalues of E are above
+    -1, so |E| <= |2 E + E^2|. Therefore |X - U| <= |X^T X - 1|. This bound is added to the radius of each
+    interval.
     """
     with ctx.workprec(ctx.prec + _SPARE):
         for _ in range(6):
@@ -189,12 +189,8 @@ _WITH_QUATERNIONS = (1, 1)
 class ExactJoint:
     """The numbers of one joint in the URDF text, not rounded to doubles.
 
-    Attributes:
-        R: Rotation from the joint frame to the frame of the parent link.
-        p: Origin of the joint frame in the parent link, m.
-        axis: Unit vector in the joint frame.
-        multiplier: Multiplier of the mimic rule; 1 without a rule.
-        offset: Offset of the mimic rule; 0 without a rule.
+    `R` and `p` (m) are the pose of the joint frame in the parent link. `axis` is a unit vector in the joint
+    frame. Without a mimic rule, `multiplier` is 1 and `offset` is 0.
     """
 
     R: Matrix
@@ -207,25 +203,19 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
 ) -> dict[int, ExactJoint]:
-    """Return the exact constants, by index, of the joints with the indices `among` (None: all).
-
-    Raises:
-        InputError: a joint is not in the text, and is not the root joint that `load` has added.
-    """
+    """Return the exact constants of the joints with the indices `among` (None: all), by index."""
     exact_text = _ExactText(text, kind)
     indices = range(len(tree.joints)) if among is None else among
     return {i: exact_text.joint_of(tree.joints[i], tree.name) for i in indices}
 
 
 def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-    """Return the errors of converting a URDF's decimals to doubles, for `true_value_magnitudes`.
-
-    `path` contains the indices of the joints of a frame's path, from the root; q has the shape (n, nq).
-    """
+    """Return the errors of converting the decimals of a path's joints to doubles, for q (n, nq)."""
     return _ExactText(text).conversion(tree, path, q)
 
 
-@lru_cache(maxsize=1)  # parsing a large URDF is slower than computing the intervals of one sample
+# Parsing a large URDF is slower than computing the intervals of one sample.
+@lru_cache(maxsize=1)
 class _ExactText:
     def __init__(self, text: str, kind: NumberType = BALLS) -> None:
         self.kind = kind
@@ -244,7 +234,6 @@ class _ExactText:
         raise InputError("a joint is not in the URDF text", where=robot, found=joint.name)
 
     def locked(self, free: ExactJoint, lock: Lock) -> ExactJoint:
-        """Return a fixed joint: the joint `free` at the value in `lock`."""
         R, p = free.R, free.p
         value = free.multiplier * self.kind.number(lock.q) + free.offset
         if lock.joint.kind.turns:
@@ -277,7 +266,6 @@ class _ExactText:
         return self.quaternions and origin is not None and "quat_xyzw" in origin.attrib
 
     def rotation(self, origin: Element | None) -> Matrix:
-        """Return the rotation of an origin, from its attribute `rpy` or, since URDF 1.1, `quat_xyzw`."""
         if origin is not None and self.has_quaternion(origin):
             return from_quaternion(self.numbers(origin, "quat_xyzw", ""), self.kind)
         return from_rpy(self.vector(origin, "rpy", "0 0 0"), self.kind)

@@ -29,7 +29,7 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: For each joint velocity of a planar or floating joint: axis in the child link, and True for a rotation.
+#: Axis in the child link of each joint velocity, and whether the joint velocity is angular.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -67,7 +67,7 @@ def move(
 ) -> ExactMotion:
     """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
-    `joints` is a result of `read_exact`, in which each joint comes after the joints between it and the root.
+    In `joints`, a result of `read_exact`, each joint comes after the joints between the joint and the root.
     """
     q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
@@ -110,7 +110,6 @@ def move(
 
 
 def placement_values(motion: ExactMotion, link: int) -> NDArray[np.object_]:
-    """Return the placement T_world_link (4, 4) of a link."""
     s = motion.states[link]
     return _array([*((*row, place) for row, place in zip(s.R, s.p, strict=True)), (0, 0, 0, 1)])
 
@@ -141,13 +140,11 @@ def spatial_acceleration_values(motion: ExactMotion, link: int, reference: Refer
 
 
 def jacobian_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the Jacobian (6, nv) of a link."""
     found = _RECURSION.jacobian(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
 
 def jacobian_rate_values(motion: ExactMotion, link: int, reference: Reference) -> NDArray[np.object_]:
-    """Return the time derivative (6, nv) of a link's Jacobian."""
     found = _RECURSION.jacobian_rate(motion.states[link], motion.columns[link], motion.nv, reference)
     return _array(found).reshape(motion.nv, 6).T
 
