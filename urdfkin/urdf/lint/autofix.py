@@ -10,7 +10,7 @@ urdfkin accepts a fix if three conditions hold:
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
 a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
-lines. The changes are then written as a git binary patch, after the escaped lines as a comment.
+lines. The patch is then a git binary patch, after a comment with the escaped lines.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Maximum number of passes of `--fix` over a file. One pass applies the fixes of one code without overlap.
+#: Maximum number of passes of `--fix` over a file. One pass applies non-overlapping fixes of one code.
 PASSES = 100
 
 #: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.
@@ -54,8 +54,7 @@ def mend(
 ) -> Mended:
     """Apply the automatic fixes of a file, one code after another; do not change a file with errors.
 
-    `choose` is called for each pass over the file, and returns a function that decides whether a finding is
-    fixed.
+    `choose` is called before each pass, and returns a function that selects the findings to fix.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -103,10 +102,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots, except in unused values.
-
-    `turns` contains upper bounds on the allowed rotation (rad) of each joint's frame, by joint name.
-    """
+    """Yield differences in version, links and used joint values; `turns` has the allowed rotations (rad)."""
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return
@@ -163,10 +159,7 @@ _COUNTS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
-    """Return the patch of one file; an empty string if the file does not change.
-
-    `before` and `after` are UTF-8. `shown` escapes the control characters of a text.
-    """
+    """Return the patch of one UTF-8 file; `shown` escapes the control characters of a text."""
     if before == after:
         return ""
     name = _relative(file)
@@ -178,7 +171,6 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
 
 
 def _relative(file: str) -> str:
-    """Return the name relative to the current folder if the file is in this folder."""
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 

@@ -100,7 +100,7 @@ _Place = tuple[Element, str | None]
 def _report_xacro(
     report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
 ) -> bool:
-    """Report unexpanded xacro; return whether kinematics uses any of it."""
+    """Report unexpanded xacro; return whether kinematics uses any of the `places`."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
     for group, severity, message in (
@@ -119,7 +119,6 @@ def _report_xacro(
 
 
 def _is_used(element: Element) -> bool:
-    """Return whether kinematics uses an element: a link, a joint, or an element inside a joint."""
     return element.holder.tag == "joint" or (element.holder is element and element.tag == "link")
 
 
@@ -128,7 +127,6 @@ def _more(group: Sequence[object]) -> str:
 
 
 def is_expression(value: str) -> bool:
-    """Return whether a value contains a xacro expression."""
     start = value.find("${")
     return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
 
@@ -338,7 +336,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
     found: dict[str, list[_Place]] = {}
-    declared = Counter(("xml", "xmlns"))  # XML itself declares these prefixes.
+    declared = Counter(("xml", "xmlns"))  # XML itself declares the prefixes xml and xmlns.
     stack = [(root, False)]
     while stack:
         element, leaving = stack.pop()
@@ -357,7 +355,7 @@ def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix with its attribute; None for the prefix of the tag."""
+    """Yield each namespace prefix with the attribute that contains it, or None for a prefix of the tag."""
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

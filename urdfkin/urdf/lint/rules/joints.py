@@ -46,7 +46,6 @@ def check_structure(report: Reporter, robot: RobotRecord) -> bool:
 
 
 def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
-    """Return whether a joint connects two different links that exist; report other joints."""
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = ", ".join(report.nearest(link, robot.links))
@@ -113,10 +112,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent; report all further links without a parent.
-
-    No link is reported if a joint has no valid child, because the joint may be the parent joint of any link.
-    """
+    """Return whether exactly one link has no parent; report all further links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.failed:
@@ -124,7 +120,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # Another finding reports the joint without a valid child.
+        return False  # A joint without a valid child may be the parent joint of any link.
     parents = {joint.parent for joint in robot.joints}
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
@@ -219,13 +215,13 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) by which Pinocchio changes an axis, for each joint with a changed axis."""
+    """For each joint whose axis Pinocchio changes, return the angle (rad) of this change."""
     axial = (joint for joint in robot.joints if joint.kind in AXIAL)
     return {joint.name: snapped[1] for joint in axial if (snapped := _snap(joint.axis))}
 
 
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that replaces an axis in Pinocchio, and their angle (rad), or None."""
+    """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them."""
     if axis is None:
         return None
     for i in range(3):
@@ -320,7 +316,7 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: A larger multiplier or offset (rad or m) of a mimic joint is reported.
+#: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
 LARGEST = 1e6
 #: Limits are reported if they exclude more than this fraction of the mimicked joint's range.
 #: Smaller fractions are common, because limits are often written with few digits.
@@ -437,10 +433,7 @@ class _MimicChecker:
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a chain of mimic joints, and the joint at the end of the chain.
-
-        The joint is None if the chain is a circle or ends at a missing joint.
-        """
+        """Return the combined rule of a mimic chain, and its last joint (None in a circle or if missing)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
@@ -504,7 +497,7 @@ NOTICEABLE = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, each with the least number of decimals of a rounded value that is reported.
+#: Multiples of pi. A rounded multiple is reported if it has at least the stated number of decimals.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -585,7 +578,7 @@ def _replace_words(raw: str | None, words: list[str]) -> str:
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi, and its value, to which a decimal number is close, or None.
+    """If a decimal number is a rounded multiple of pi, return the multiple and its value, else None.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
