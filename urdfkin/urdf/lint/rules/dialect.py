@@ -272,13 +272,14 @@ def _check_attributes(report: Reporter, element: Element) -> None:
         if attribute in known or ":" in attribute or attribute == "xmlns":
             continue
         close = None if report.is_full(UNKNOWN_ATTRIBUTE) else nearest_tag(attribute, known)
+        every = f"the attributes of <{element.tag}> are: {', '.join(sorted(known))}"
         report.add(
             UNKNOWN_ATTRIBUTE,
             f"<{element.tag}> has no attribute of this name; the attribute is skipped",
             element,
             attribute=attribute,
             found=f"{attribute}={quoted(element.attributes[attribute])}",
-            remedy=f"did you mean {close}?" if close else f"its attributes are {', '.join(sorted(known))}",
+            remedy=f"did you mean {close}?" if close else every,
             severity=Severity.NOTE if attribute in EXTENSIONS else None,
             fix=None if close or attribute in _MEANT else partial(report.without, element, attribute),
         )

@@ -281,15 +281,15 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     if any(getattr(limit, name) is None for name in written):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
-    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits (a missing limit is 0)"
     if lower > upper:
         message, remedy = "the lower limit is above the upper limit", "swap the limits"
         if len(written) < 2:
-            found, remedy = f"{found} (a missing bound is 0)", "write both limits"
+            found, remedy = f"{found} (a missing limit is 0)", "write both limits"
         report.add(INVERTED_LIMIT, message, limit.element, attribute="lower", found=found, remedy=remedy)
     elif lower == upper and bounded:
         message = "the joint cannot move: its limits are equal"
-        remedy = "write the range, or make the joint fixed"
+        remedy = "write two different limits, or make the joint fixed"
         report.add(EMPTY_RANGE, message, limit.element, attribute="lower", found=found, remedy=remedy)
 
 
@@ -390,7 +390,7 @@ class _MimicChecker:
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
         if mimic.multiplier == 0.0:
             message = f"the multiplier is zero: the joint stays at {mimic.offset:g}"
-            remedy = "write the ratio, or make the joint fixed"
+            remedy = "write a multiplier other than zero, or make the joint fixed"
             self.add(MIMIC_CONSTANT, message, mimic, "multiplier", remedy)
         for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
             if abs(value) > LARGEST:
@@ -424,7 +424,7 @@ class _MimicChecker:
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
-            f"{message}but these limits allow {allowed}",
+            f"{message}but the limits of the mimic joint allow {allowed} for {leader.name!r}",
             limit.element,
             attribute="lower",
             found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
@@ -636,7 +636,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
             limit.element,
             attribute="lower" if lower > 0.0 else "upper",
             found=f'lower="{lower:g}" upper="{upper:g}"',
-            remedy="give this joint a value within its limits: --q ready",
+            remedy="use a configuration within the limits, such as --q ready",
             weight=max(lower, -upper),
         )
 
