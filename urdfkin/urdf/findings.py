@@ -313,7 +313,7 @@ class UrdfError(UrdfkinError, ValueError):
 
 
 class UrdfWarning(UserWarning):
-    """The Python warning for each warning in a loaded URDF.
+    """The class of the Python warnings that `urdfkin.load` issues about a robot's file.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.UrdfWarning, UserWarning)

@@ -107,7 +107,7 @@ def examine(
     fold: bool = False,
     wanted: Callable[[Finding], bool] | None = None,
 ) -> Examined:
-    """Check a text with the arguments of `check`; `wanted` selects findings before findings are combined."""
+    """Check a text, with arguments of `check`; `wanted` selects findings before findings are combined."""
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data, limits)
@@ -127,7 +127,7 @@ def file_of(text: Text) -> Path | None:
 
 
 def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
-    """Check the bytes of a URDF with the arguments of `check`; open no file and no network connection."""
+    """Check the bytes of a URDF; open no file and no network connection."""
     report = Reporter("<text>", data, limits)
     read_urdf(report)
     return report.findings(fold=fold)

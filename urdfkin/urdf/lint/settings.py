@@ -235,7 +235,7 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        Call the function once for each finding, in file order, because the function counts known findings.
+        Call the returned function once for each finding, in file order, because it counts known findings.
         """
         codes = self.codes - self.settings.ignored_in(text.label)
         known = [baseline for baseline in (self.baseline, before) if baseline is not None]

@@ -18,7 +18,7 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 #: Largest mass (kg) and largest coordinate (m) of a centre of mass that are not reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: If a mass (kg) is below this number, it is probably a placeholder, and its moments are not checked.
+#: For a mass (kg) below this number, the moments of inertia are not checked: it is probably a placeholder.
 NEGLIGIBLE = 1e-3
 
 #: Largest moment of inertia per kg (m^2) that is treated as a rounding error.

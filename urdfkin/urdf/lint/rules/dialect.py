@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quoted(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Kinematics uses only macros directly inside <robot> or inside a joint.
+    # Kinematics uses a macro only if the macro is directly inside <robot> or inside a joint.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
     expressions: list[_Place] = [
@@ -148,8 +148,8 @@ _COMMON = (
 EXTENSIONS = frozenset(_COMMON.split())
 
 #: Lines of the form `element: attributes > child elements`.
-#: Without a colon, the attributes of the element are not checked.
-#: The content of an element without a line is not checked.
+#: If a line has no colon, the attributes of the element are not checked.
+#: If an element has no line, its content is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision

@@ -136,7 +136,7 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Smaller deviations of an axis length from 1 are usual for numbers with few digits, so they are notes.
+#: Smaller deviations of an axis length from 1 are notes, because numbers with few digits cause them.
 LENGTH_ROUNDING = 2e-4
 
 #: Maximum difference of a unit vector's length from 1, as in `kinematics.inputs`.
@@ -149,7 +149,7 @@ _LEAN = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _SNAPPED = 1e-12
 
-#: Smaller tilts (rad) are not reported, because the error bounds in `verify.bounds` include these tilts.
+#: Smaller tilts (rad) of an axis are not reported, because the bounds in `verify.bounds` include these tilts.
 _TILT = 2.0**-52
 
 
@@ -433,7 +433,7 @@ class _MimicChecker:
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and its last joint (None in a circle or if missing)."""
+        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a circle)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
