@@ -40,23 +40,24 @@ def shortened(text: str, limit: int = QUOTED) -> str:
 
 
 def quoted(text: str, limit: int = QUOTED) -> str:
-    """Return at most `limit` characters of a text in double quotes, safe to print."""
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: A longer line is cut to `SHOWN` characters, with at most `BEFORE` characters before the underlined text.
+#: A line of more than `SHOWN` characters is cut; at most `BEFORE` characters precede the underlined text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
 
 
 class Excerpts:
+    """Shows lines of a file with the wrong text underlined; `data` has no byte order mark."""
+
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
 
     def of(self, finding: Finding) -> str | None:
-        """Return the line of a finding, with carets below the wrong text; None without a position.
+        """Return the line of a finding, with carets below the wrong text; None if the finding marks no text.
 
         >>> from urdfkin.urdf.findings import Severity
         >>> finding = Finding("URDF503", Severity.NOTE, "", column=7, width=11)
@@ -66,7 +67,7 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # A line is decoded only once, because a line may have megabytes.
+        if self.number != finding.line:  # The decoded line is stored, because a line may have megabytes.
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -93,7 +94,10 @@ ROUNDING = 2.0**-50
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """The automatic fix of a finding; the fix rotates a joint frame by at most `turns` (rad)."""
+    """The automatic fix of a finding; the edits are sorted and do not overlap.
+
+    `turns` is an upper bound on the angle (rad) by which the fix rotates a joint frame.
+    """
 
     edits: tuple[Edit, ...]
     turns: float = 0.0
@@ -104,7 +108,7 @@ class Fix:
 
 
 def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
-    """Apply the fixes that do not overlap; return the new bytes and the applied fixes."""
+    """Return the fixed bytes and the applied fixes; a fix that overlaps an earlier fix is skipped."""
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     taken, end = list[Fix](), 0
     for fix in sorted(fixes, key=lambda fix: fix.edits[0].start):
@@ -132,7 +136,7 @@ class Severity(Enum):
 
 
 class PinocchioReading(Enum):
-    """How Pinocchio treats legal content: Pinocchio refuses the file or reads the content differently."""
+    """How Pinocchio treats legal content: it refuses the file, or deviates from the URDF specification."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -153,9 +157,8 @@ class Finding:
         column: Column number in characters, from 1.
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
-        oracle: None if Pinocchio reads the content as the URDF specification defines. Otherwise Pinocchio
-            refuses the file or reads the content differently, and urdfkin cannot verify any result of the
-            robot with Pinocchio.
+        oracle: If this value is not None, Pinocchio refuses the file or reads the content differently, so
+            urdfkin cannot verify any result of the robot with Pinocchio.
         also: Line numbers of further findings with the same code that are combined into this finding.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
@@ -276,7 +279,7 @@ def _lines(lines: tuple[int, ...], shown: int = 4) -> str:
 
 
 class UrdfError(UrdfkinError, ValueError):
-    """A URDF has errors. The message lists the errors, each with file, line and column.
+    """A URDF has errors. The message lists the first five errors, each with file, line and column.
 
     Attributes:
         findings: All findings of the file by line, warnings and notes included.
@@ -310,7 +313,7 @@ class UrdfError(UrdfkinError, ValueError):
 
 
 class UrdfWarning(UserWarning):
-    """The Python warning for each warning in a loaded URDF.
+    """The class of the Python warnings that `urdfkin.load` issues about a robot's file.
 
     >>> import urdfkin
     >>> issubclass(urdfkin.UrdfWarning, UserWarning)
@@ -327,9 +330,9 @@ class Rule:
     """A kind of finding.
 
     Attributes:
-        id: The code of the findings: `URDF` and three digits. A code is never reused. The first digit is the
-            topic. 1: text and XML. 2: elements and attributes. 3: numbers. 4: names and structure. 5: joints.
-            6: probable mistakes. 7: inertials, geometry and materials.
+        id: The code of the findings: `URDF`, `MJCF` or `USD`, and three digits. A code is never reused. The
+            first digit of a URDF code is the topic. 1: text and XML. 2: elements and attributes. 3: numbers.
+            4: names and structure. 5: joints. 6: probable mistakes. 7: inertials, geometry and materials.
     """
 
     id: str
@@ -344,7 +347,10 @@ MARK = "urdfkin:"
 
 @dataclass(slots=True)
 class Comment:
-    """A comment with an instruction; `behind` is True if the comment follows text on the same line."""
+    """A comment with an instruction for urdfkin, and the `element` that begins after the comment.
+
+    `behind` is true if other text precedes the comment on the same line.
+    """
 
     text: str
     line: int
@@ -355,7 +361,7 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """A comment that silences findings; `used` contains the codes of findings that were silenced."""
+    """A comment that silences findings; `used` has the codes of the silenced findings."""
 
     comment: Comment
     codes: tuple[str, ...]
@@ -366,7 +372,7 @@ class Silence:
 @dataclass(slots=True)
 class Silences:
     all: list[Silence] = field(default_factory=list)
-    #: First comment for each ("line", number, code), ("element", id, code) and ("file", 0, code).
+    #: First comment for each key: ("line", number, code), ("element", id, code) or ("file", 0, code).
     _first: dict[tuple[str, int, str], Silence] = field(default_factory=dict)
 
     def add(self, silence: Silence) -> None:
@@ -384,7 +390,7 @@ class Silences:
             self._first.setdefault((*place, code), silence)
 
     def reason(self, code: str, line: int, at: Element | None) -> str | None:
-        """Return the reason in the nearest comment that silences a finding; None without such a comment."""
+        """Return the reason of the nearest comment that silences a finding, or None."""
         places = [("line", line)]
         while at is not None:
             places.append(("element", id(at)))
@@ -401,7 +407,7 @@ SEARCHES = 20
 #: Limits of one search for similar names: number of compared names, and `work` of `nearest`.
 CANDIDATES, WORK = 5_000, 250_000
 
-#: At least this number of warnings or notes with one code are combined into one finding.
+#: If a code has at least this number of warnings or notes, one finding represents all of them.
 #: `FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
@@ -414,7 +420,7 @@ WRITTEN_OUT = 10_000
 
 @dataclass(slots=True)
 class _Kind:
-    """The findings of one code and severity; `lines` has the line numbers of findings that are not stored."""
+    """Findings of one code and severity, with weights; `lines` are lines of findings after `WRITTEN_OUT`."""
 
     severity: Severity
     found: list[tuple[Finding, float]] = field(default_factory=list)
@@ -452,8 +458,8 @@ class Reporter:
     ) -> None:
         """Add a finding about the element `at`, or about the line and column `position`.
 
-        The finding names the child of `<robot>` that contains `at`, or `at` itself if `misplaced` is True. If
-        findings with one code are combined, the finding with the greatest `weight` is reported.
+        The finding names the child of `<robot>` that contains `at`, or `at` itself if `misplaced` is True. Of
+        combined findings, the finding with the greatest `weight` is reported.
         """
         severity = rule.severity if severity is None else severity
         reason = None
@@ -490,14 +496,13 @@ class Reporter:
                 kind.found = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three similar names; after `SEARCHES` calls, return [] for speed."""
+        """Return up to three similar names, or [] after `SEARCHES` calls."""
         self._searches += 1
         if self._searches > SEARCHES:
             return []
         return nearest(word, islice(known, CANDIDATES), work=WORK)
 
     def is_full(self, rule: Rule) -> bool:
-        """Return whether only the line numbers of further findings of a rule are stored."""
         kind = self._kinds.get((rule.id, rule.severity))
         return kind is not None and len(kind.found) >= WRITTEN_OUT
 
@@ -508,7 +513,7 @@ class Reporter:
     def findings(
         self, *, fold: bool = True, wanted: Callable[[Finding], bool] | None = None
     ) -> tuple[Finding, ...]:
-        """Return the findings by line; call `wanted` exactly once for each finding, in file order."""
+        """Return the findings by line; `wanted` is called once for each finding, in file order."""
         pairs = [pair for kind in self._kinds.values() for pair in kind.found]
         if wanted is not None:
             pairs.sort(key=lambda pair: _place_in_file(pair[0]))
@@ -528,7 +533,7 @@ class Reporter:
         return self._raw_blanks
 
     def raw(self, at: Element, attribute: str) -> str | None:
-        """Return an attribute value as written in the file; an XML parser may change the value."""
+        """Return an attribute value as written in the file."""
         span = self._spans(at).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
@@ -549,13 +554,14 @@ class Reporter:
         return None if span is None else Fix((Edit(*span.value, value),), turns)
 
     def without(self, at: Element, *attributes: str) -> Fix | None:
+        """Return the fix that removes attributes."""
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         edits = tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)
         return Fix(edits) if edits else None
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element, and its line if nothing else is on the line."""
+        """Return the fix that removes an element; None if the element has content."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -573,7 +579,7 @@ class Reporter:
 
 @dataclass(frozen=True, slots=True)
 class _AttributeSpan:
-    """The position of an attribute; `value` spans the text between the quotation marks."""
+    """Line, column (in characters) and byte indices of an attribute; `value` excludes quotation marks."""
 
     line: int
     column: int
@@ -613,7 +619,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Combine many findings of one kind; the last finding lists the lines of the others."""
+    """Combine findings of one kind; the last returned finding has the lines of the omitted findings."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

@@ -10,7 +10,7 @@ urdfkin accepts a fix if three conditions hold:
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
 a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
-lines. The changes are then written as a git binary patch, after the escaped lines as a comment.
+lines. The patch is then a git binary patch, after a comment with the escaped lines.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def mend(
 ) -> Mended:
     """Apply the automatic fixes, one code after another; do not change a file with errors.
 
-    `choose` returns a new filter of findings for each pass over the file.
+    `choose` is called before each pass, and returns a function that selects the findings to fix.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -102,7 +102,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots; `turns` has the allowed rotations (rad) by joint name."""
+    """Yield differences in version, links and used joint values; `turns` has the allowed rotations (rad)."""
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return
@@ -159,7 +159,7 @@ _COUNTS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
-    """Return the patch of one file, or an empty string; `shown` escapes control characters."""
+    """Return the patch of one UTF-8 file; `shown` escapes the control characters of a text."""
     if before == after:
         return ""
     name = _relative(file)

@@ -22,7 +22,7 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 
 
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
-    """Return a SARIF document with all rules about URDF files and a result for each finding."""
+    """Return a SARIF document with all rules about URDF files, and a result for each finding."""
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}

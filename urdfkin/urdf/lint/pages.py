@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _MODULES = (parser, dialect, joints, bodies)
 
+#: The rules about URDF files, indexed by module name.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in _MODULES
@@ -47,9 +48,8 @@ class Page:
     """The documentation of a rule.
 
     Attributes:
-        why: The consequences of the problem for a user.
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. An example
-            that begins with a joint or a comment is completed with the links `base` and `tip`.
+            that begins with a joint or a comment lacks the links `base` and `tip`.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
     """

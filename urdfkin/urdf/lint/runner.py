@@ -85,7 +85,11 @@ def check(
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """The result of a check; positions in findings refer to `data`, which has no byte order mark."""
+    """The result of a check; `robot` is None if the text is not a URDF.
+
+    `data` has no byte order mark, and findings state positions in `data`. `silenced` has pairs of a finding
+    and the reason in the comment.
+    """
 
     text: Text
     data: bytes
@@ -103,7 +107,7 @@ def examine(
     fold: bool = False,
     wanted: Callable[[Finding], bool] | None = None,
 ) -> Examined:
-    """Check a text with the arguments of `check`; `wanted` filters findings before they are combined."""
+    """Check a text, with arguments of `check`; `wanted` selects findings before findings are combined."""
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data, limits)
@@ -122,7 +126,7 @@ def file_of(text: Text) -> Path | None:
 
 
 def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
-    """Check the bytes of a URDF with the arguments of `check`; open no file and no network connection."""
+    """Check the bytes of a URDF; open no file and no network connection."""
     report = Reporter("<text>", data, limits)
     read_urdf(report)
     return report.findings(fold=fold)

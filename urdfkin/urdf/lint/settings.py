@@ -51,11 +51,9 @@ def key_of(finding: Finding, file: str) -> Key:
 
 @dataclass(slots=True)
 class Baseline:
-    """The findings of a baseline, and how many of them this run has encountered.
+    """Numbers of known findings, by key; file names in the keys are relative to `root`.
 
-    Attributes:
-        counts: For each key, the number of baseline findings that this run has not yet encountered.
-        met: Number of baseline findings that this run has encountered.
+    If this run encounters a known finding, the number in `counts` decreases and `met` increases.
     """
 
     counts: Counter[Key]
@@ -99,10 +97,7 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return the text of a baseline with the findings of the checked `files`.
-
-    Entries of an older baseline at `path` are copied if they are about other existing files.
-    """
+    """Return a baseline as text; copy entries of the old baseline at `path` about other existing files."""
     counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
     if path.exists():
         checked = {relative(file, path.parent) for file in files}
@@ -125,13 +120,13 @@ _WORDS = {
     str: "a string",
 }
 
-#: Default patterns of robot files, without .xacro, because most of them contain only a part of a robot.
+#: Default patterns of robot files, without .xacro, because most .xacro files describe only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """A table of checked settings in `file`; without a table, `file` is None."""
+    """The checked settings of a file; `file` is None if no file contains settings."""
 
     file: Path | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -147,10 +142,9 @@ class Settings:
 
 
 def find_settings(start: Path) -> Settings:
-    """Return the settings that apply in a folder; empty settings without a table [tool.urdfkin].
+    """Return the settings of the nearest pyproject.toml with a table [tool.urdfkin], or empty settings.
 
-    The search for pyproject.toml goes upwards, up to the first folder that contains .git. Raise SourceError
-    for an unreadable file, and InputError for invalid TOML or a wrong setting.
+    The search goes upwards from `start`, up to the first folder that contains .git.
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
@@ -238,8 +232,7 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        Call the function exactly once for each finding, in file order, because the function counts the known
-        findings. `before` is a baseline with the findings in an older version of the file.
+        Call the returned function once for each finding, in file order, because it counts known findings.
         """
         codes = self.codes - self.settings.ignored_in(text.label)
         known = [baseline for baseline in (self.baseline, before) if baseline is not None]
@@ -252,19 +245,21 @@ class Choice:
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Do the same as `of` with copies of the baselines, so that a file can be checked again."""
+        """Call `of` with copies of the baselines, so that the original baselines do not change."""
         copies = [known and replace(known, counts=Counter(known.counts)) for known in (self.baseline, before)]
         return replace(self, baseline=copies[0]).of(text, copies[1])
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings in an older version of a file; None if no finding can be new."""
+    """Return the findings in an older version of a file; None if no finding can be new.
+
+    If the text names a file that was deleted since the older version, findings about missing meshes are new.
+    """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # The older version of a xacro file cannot be expanded.
-        # If a file that the xacro file may include has changed, every finding is new.
+        # An older xacro file cannot be expanded, so every finding is new if a possible include has changed.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)

@@ -15,10 +15,10 @@ INERTIAL_INCOMPLETE = Rule("URDF701", "inertial-incomplete", WARNING)
 INERTIAL_IMPOSSIBLE = Rule("URDF702", "inertial-impossible", WARNING)
 INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 
-#: A larger mass (kg), or a larger coordinate (m) of a centre of mass, is reported.
+#: Largest mass (kg) and largest coordinate (m) of a centre of mass that are not reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: Moments of inertia of a smaller mass (kg) are not checked, because the mass is probably a placeholder.
+#: For a mass (kg) below this number, the moments of inertia are not checked: it is probably a placeholder.
 NEGLIGIBLE = 1e-3
 
 #: Largest moment of inertia per kg (m^2) that is treated as a rounding error.
@@ -107,7 +107,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
 
 
 def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
-    """Return the eigenvalues of the tensor (ixx, ixy, ixz, iyy, iyz, izz), smallest first."""
+    """Return the eigenvalues of an inertia tensor, smallest first, by the trigonometric cubic formula."""
     scale = max(map(abs, moments))
     if scale == 0.0:
         return (0.0, 0.0, 0.0)
@@ -155,7 +155,7 @@ def _check_geometry(
         numbers.vector(origin, "xyz")
         numbers.vector(origin, "rpy")
     capsule = None if geometry is None else geometry.first("capsule")
-    if capsule is not None and version < (1, 1):  # URDF readers skip this capsule.
+    if capsule is not None and version < (1, 1):  # URDF readers skip capsules in files before version 1.1.
         message = 'a capsule needs version="1.1" and is ignored'
         report.add(GEOMETRY, message, capsule, remedy="use a cylinder and two spheres")
     shape = geometry.children[0] if geometry is not None and geometry.children else None
@@ -236,7 +236,7 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report missing meshes; if the URDF's file `beside` is None, search only `package://` meshes."""
+    """Report missing meshes and packages; without the URDF file `beside`, only `package://` meshes."""
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
     for mesh in _meshes(root):

@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quoted(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # A macro changes the kinematics only if it is directly inside <robot>, or inside a joint.
+    # Kinematics uses a macro only if the macro is directly inside <robot> or inside a joint.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
     expressions: list[_Place] = [
@@ -100,7 +100,7 @@ _Place = tuple[Element, str | None]
 def _report_xacro(
     report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
 ) -> bool:
-    """Report unexpanded xacro; return whether kinematics uses any of it."""
+    """Report unexpanded xacro; return whether kinematics uses any of the `places`."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
     for group, severity, message in (
@@ -119,7 +119,6 @@ def _report_xacro(
 
 
 def _is_used(element: Element) -> bool:
-    """Return whether kinematics uses an element: a link, a joint, or an element inside a joint."""
     return element.holder.tag == "joint" or (element.holder is element and element.tag == "link")
 
 
@@ -149,8 +148,8 @@ _COMMON = (
 EXTENSIONS = frozenset(_COMMON.split())
 
 #: Lines of the form `element: attributes > child elements`.
-#: Without a colon, the attributes of the element are not checked.
-#: The content of an element without a line is not checked.
+#: If a line has no colon, the attributes of the element are not checked.
+#: If an element has no line, its content is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -272,13 +271,14 @@ def _check_attributes(report: Reporter, element: Element) -> None:
         if attribute in known or ":" in attribute or attribute == "xmlns":
             continue
         close = None if report.is_full(UNKNOWN_ATTRIBUTE) else nearest_tag(attribute, known)
+        every = f"the attributes of <{element.tag}> are: {', '.join(sorted(known))}"
         report.add(
             UNKNOWN_ATTRIBUTE,
             f"<{element.tag}> has no attribute of this name; the attribute is skipped",
             element,
             attribute=attribute,
             found=f"{attribute}={quoted(element.attributes[attribute])}",
-            remedy=f"did you mean {close}?" if close else f"its attributes are {', '.join(sorted(known))}",
+            remedy=f"did you mean {close}?" if close else every,
             severity=Severity.NOTE if attribute in EXTENSIONS else None,
             fix=None if close or attribute in _MEANT else partial(report.without, element, attribute),
         )
@@ -336,7 +336,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
     found: dict[str, list[_Place]] = {}
-    declared = Counter(("xml", "xmlns"))  # XML itself declares `xml` and `xmlns`.
+    declared = Counter(("xml", "xmlns"))  # XML itself declares the prefixes xml and xmlns.
     stack = [(root, False)]
     while stack:
         element, leaving = stack.pop()
@@ -355,7 +355,7 @@ def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix and its attribute; None for the prefix of the tag."""
+    """Yield each namespace prefix with the attribute that contains it, or None for a prefix of the tag."""
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

@@ -45,7 +45,6 @@ def check_structure(report: Reporter, robot: RobotRecord) -> bool:
 
 
 def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
-    """Return whether a joint connects two different links that exist; report other joints."""
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = ", ".join(report.nearest(link, robot.links))
@@ -120,7 +119,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # A joint without a valid child may be the parent joint of these links.
+        return False  # A joint without a valid child may be the parent joint of any link.
     parents = {joint.parent for joint in robot.joints}
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
@@ -136,7 +135,7 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: A smaller difference between an axis length and 1 is usual for an axis with few digits.
+#: Smaller deviations of an axis length from 1 are notes, because numbers with few digits cause them.
 LENGTH_ROUNDING = 2e-4
 
 #: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
@@ -149,7 +148,7 @@ _LEAN = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _SNAPPED = 1e-12
 
-#: The error bounds in `verify.bounds` include smaller tilts (rad).
+#: Smaller tilts (rad) of an axis are not reported, because the bounds in `verify.bounds` include these tilts.
 _TILT = 2.0**-52
 
 
@@ -215,13 +214,13 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) by which Pinocchio changes an axis, for each joint with a changed axis."""
+    """For each joint whose axis Pinocchio changes, return the angle (rad) of this change."""
     axial = (joint for joint in robot.joints if joint.kind in AXIAL)
     return {joint.name: snapped[1] for joint in axial if (snapped := _snap(joint.axis))}
 
 
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that Pinocchio uses instead of an axis, and the angle (rad) between them."""
+    """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them."""
     if axis is None:
         return None
     for i in range(3):
@@ -281,15 +280,15 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     if any(getattr(limit, name) is None for name in written):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
-    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "neither lower nor upper, so both are 0"
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits (a missing limit is 0)"
     if lower > upper:
         message, remedy = "the lower limit is above the upper limit", "swap the limits"
         if len(written) < 2:
-            found, remedy = f"{found} (a missing bound is 0)", "write both limits"
+            found, remedy = f"{found} (a missing limit is 0)", "write both limits"
         report.add(INVERTED_LIMIT, message, limit.element, attribute="lower", found=found, remedy=remedy)
     elif lower == upper and bounded:
         message = "the joint cannot move: its limits are equal"
-        remedy = "write the range, or make the joint fixed"
+        remedy = "write two different limits, or make the joint fixed"
         report.add(EMPTY_RANGE, message, limit.element, attribute="lower", found=found, remedy=remedy)
 
 
@@ -316,7 +315,7 @@ MIMIC_CHAIN = Rule("URDF525", "mimic-chain", NOTE)
 MIMIC_SCALE = Rule("URDF526", "mimic-scale", WARNING)
 MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
-#: A larger multiplier or offset (rad or m) of a mimic joint is reported.
+#: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
 LARGEST = 1e6
 #: Limits are reported if they exclude more than this fraction of the mimicked joint's range.
 #: Smaller fractions are common, because limits are often written with few digits.
@@ -390,7 +389,7 @@ class _MimicChecker:
     def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
         if mimic.multiplier == 0.0:
             message = f"the multiplier is zero: the joint stays at {mimic.offset:g}"
-            remedy = "write the ratio, or make the joint fixed"
+            remedy = "write a multiplier other than zero, or make the joint fixed"
             self.add(MIMIC_CONSTANT, message, mimic, "multiplier", remedy)
         for attribute, value in (("multiplier", mimic.multiplier), ("offset", mimic.offset)):
             if abs(value) > LARGEST:
@@ -423,7 +422,7 @@ class _MimicChecker:
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
-            f"{message}but these limits allow {allowed}",
+            f"{message}but the limits of the mimic joint allow {allowed} for {leader.name!r}",
             limit.element,
             attribute="lower",
             found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
@@ -432,7 +431,7 @@ class _MimicChecker:
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and the joint at the end of the chain or None."""
+        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a circle)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
@@ -496,7 +495,7 @@ NOTICEABLE = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi. A rounded multiple is reported only if it has the given number of decimals or more.
+#: Multiples of pi. A rounded multiple is reported if it has at least the stated number of decimals.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -576,7 +575,7 @@ def _replace_words(raw: str | None, words: list[str]) -> str:
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """If a decimal number is a rounded multiple of pi, return the multiple and its value (rad).
+    """If a decimal number is a rounded multiple of pi, return the multiple and its value, else None.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -634,7 +633,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
             limit.element,
             attribute="lower" if lower > 0.0 else "upper",
             found=f'lower="{lower:g}" upper="{upper:g}"',
-            remedy="give this joint a value within its limits: --q ready",
+            remedy="use a configuration within the limits, such as --q ready",
             weight=max(lower, -upper),
         )
 

@@ -108,8 +108,8 @@ def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | 
 def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
     """Yield tag, name and span (in bytes) of each MJCF element that a finding can name.
 
-    The name of an equality without a name is its index. If the file includes other files, the index is
-    unknown, and the equality is skipped.
+    An equality constraint without a name is named by its index. If the file includes other files, the index
+    is unknown, and the constraint is skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
