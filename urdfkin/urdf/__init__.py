@@ -2,8 +2,8 @@
 
 | Step | Module | Result |
 |---|---|---|
-| Source | `sources`, `catalogue`, `xacro` | `Text`: the bytes of a URDF and information about their source |
-| Parser | `parser` | `Element`, then the `RobotRecord` of `records`; problems are `Finding`s of `findings` |
+| Source | `sources`, `catalogue`, `xacro` | `Text`: the bytes of a URDF and the name of the source |
+| Parser | `parser` | `RobotRecord` (in `records`), and a `Finding` (in `findings`) for each problem |
 | Tree | `reader` | `KinematicTree` |
 | Writer | `writer` | URDF text |
 

@@ -37,7 +37,6 @@ class Entry:
     """A robot of the catalogue.
 
     Attributes:
-        family: arm, hand, humanoid, quadruped, ...
         relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
@@ -70,7 +69,6 @@ class Entry:
 
 @cache
 def catalogue() -> Mapping[str, Entry]:
-    """Return all robots by name: first the robots of example-robot-data, then urdfkin's own robots."""
     return {**_read("catalogue.toml", own=False), **_read("own.toml", own=True)}
 
 
@@ -113,21 +111,17 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
     return entries
 
 
-#: Environment variables with search paths.
+#: Environment variables with search paths for packages.
 VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _NAME = re.compile(rb"<name>([^<]*)</name>")
 
-#: Schemes of URIs that consist of the name of a package and a path in the package.
+#: Schemes of addresses that consist of a package name and a path in the package.
 SCHEMES = ("package://", "model://")
 
 
 def split_uri(uri: str) -> tuple[str, str] | None:
-    """Return the package and the path of a `package://` address; None for any other text.
-
-    >>> split_uri("package://ur_description/meshes/base.stl")
-    ('ur_description', 'meshes/base.stl')
-    """
+    """Return package and path of a `package://` or `model://` address; None for other text."""
     for scheme in SCHEMES:
         if uri.startswith(scheme):
             package, _, path = uri.removeprefix(scheme).partition("/")
@@ -143,7 +137,7 @@ def find_package(
 ) -> Path | None:
     """Return the folder of a package, or None; the docstring of this module describes the search.
 
-    The search includes the folders above the file `beside`. `accepts` filters the candidate folders.
+    `beside` is the file from which the search goes upwards.
     """
     if not name or name in (".", "..") or "\0" in name:
         return None
@@ -196,12 +190,10 @@ class Described:
 
 
 def described(source: object) -> Described | None:
-    """Return the file of a robot in robot_descriptions, by its module or name; None for any other source.
+    """Return the file of a robot in robot_descriptions; None for any other source.
 
-    Raises:
-        InputError: the package is not installed, or the description has neither a URDF nor an MJCF file.
-        UnknownNameError: there is no description of this name. The message lists the nearest names.
-        SourceError: the description cannot be downloaded.
+    Raise InputError for a missing package or file, UnknownNameError for an unknown description, and
+    SourceError for a failed download.
     """
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
         if source in catalogue() or exists(Path(source)):
@@ -220,7 +212,7 @@ def _description(name: str) -> ModuleType:
         raise UnknownNameError("robot description", name, DESCRIPTIONS)
     try:
         return importlib.import_module(f"{_PACKAGE}.{name}")
-    except Exception as error:  # git raises errors of many classes
+    except Exception as error:  # The download raises errors of many classes.
         message = str(error).strip().splitlines() or [type(error).__name__]
         raise SourceError(
             "this robot description cannot be downloaded",

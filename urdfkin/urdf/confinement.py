@@ -20,7 +20,7 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum memory of the process in bytes. Python and the imported libraries need about a tenth of it.
+#: Maximum memory of the process in bytes. Python and the imported libraries need about a tenth.
 MEMORY = 2 * 1024**3
 
 #: Audit events that are always allowed.
@@ -37,8 +37,8 @@ class Ground:
     Attributes:
         roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
             The target of a symbolic link must also be one of these files, or be in one of these folders.
-        installed: Folders in which a symbolic link may point to a package in any other folder. An example is
-            the install folder of `colcon build --symlink-install`.
+        installed: Folders in which a symbolic link may point to a package in any other folder, as in the
+            install folder of `colcon build --symlink-install`.
     """
 
     roots: list[str] = field(default_factory=list)
@@ -46,7 +46,7 @@ class Ground:
 
     @classmethod
     def around(cls, path: Path, search: list[str], arguments: list[str]) -> Ground:
-        """Allow reading a file's folder, package and repository, search paths, and paths in arguments."""
+        """Allow a file's folder, package and repository, the search paths, and paths in `arguments`."""
         wide = [path.parent / argument for argument in arguments if "\0" not in argument]
         for mark in ("package.xml", ".git"):
             wide += _nearest_folder_with(mark, path.resolve())
@@ -59,7 +59,7 @@ class Ground:
 
     def holds(self, path: str) -> bool:
         real = os.path.realpath(path)
-        # The search for packages reads every package.xml.
+        # The search for packages may read every package.xml.
         if os.path.basename(real) == "package.xml":  # noqa: PTH119
             return True
         roots = self.roots
@@ -70,12 +70,11 @@ class Ground:
 
 
 def _nearest_folder_with(mark: str, path: Path) -> list[Path]:
-    """Return a list with the nearest folder above `path` in which `mark` exists, or an empty list."""
     return [folder for folder in path.parents if _exists(folder / mark)][:1]
 
 
 def _lies_in(root: str, path: str) -> bool:
-    """Return whether a path is `root`, or is in the folder `root` and has no hidden parts below `root`."""
+    """Return whether a path is `root`, or is in `root` without hidden parts below `root`."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep
@@ -85,12 +84,12 @@ def _lies_in(root: str, path: str) -> bool:
 def _exists(path: Path) -> bool:
     try:
         return path.exists()
-    except OSError:  # the name is too long
+    except OSError:  # The operating system refuses a name that is too long.
         return False
 
 
 def limit(seconds: int) -> None:
-    """Limit memory and time of this process, and prevent it from writing files and starting processes."""
+    """Limit memory and CPU time of this process; forbid writing files and starting processes."""
     import resource
 
     bounds = {
@@ -101,7 +100,7 @@ def limit(seconds: int) -> None:
         resource.RLIMIT_NOFILE: 64,
         resource.RLIMIT_CORE: 0,
     }
-    if sys.platform == "darwin":  # macOS does not support a limit on the address space
+    if sys.platform == "darwin":  # macOS does not support a limit on the address space.
         del bounds[resource.RLIMIT_AS]
     for kind, most in bounds.items():
         hard = resource.getrlimit(kind)[1]

@@ -22,7 +22,7 @@ from urdfkin.urdf.xacro import arguments_of
 #: Functions of xacro that would give an expression access to types and attributes.
 _FORBIDDEN = ("type", "vars")
 
-#: Test expression that xacro's own evaluation accepts, but urdfkin's evaluation refuses.
+#: An expression that xacro itself evaluates, but that urdfkin refuses.
 _PROBE = "${(lambda: 1)()}"
 
 _TOO_MUCH = f"the expansion takes more than {MEMORY / 1024**3:g} GiB of memory"
@@ -33,7 +33,7 @@ def serve() -> None:
     request = json.load(sys.stdin)
     limit(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # the names of included files may be relative to this folder
+    os.chdir(Path(request["path"]).parent)  # Included files may have names relative to this folder.
     ground = Ground(**request["ground"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
@@ -43,20 +43,16 @@ def serve() -> None:
         answer = {"error": f"{type(error).__name__}: {error}"[:2000]}
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
     sys.stdout.flush()
-    os._exit(0)  # the confinement may prevent a normal exit of Python
+    os._exit(0)  # The confinement may prevent a normal exit of Python.
 
 
 def _expand(
     path: Path, arguments: dict[str, str], search: Mapping[str, str], ground: Ground
 ) -> dict[str, Any]:
-    """Return the URDF, and the names of the arguments that the file declares.
-
-    The names are None if the user gives no arguments, or if an included file cannot be read.
-    """
     import xacrodoc
 
     _replace_evaluation(path, search, ground)
-    importlib.import_module("xml.dom.expatbuilder")  # xacro cannot import this module after `confine`
+    importlib.import_module("xml.dom.expatbuilder")  # After `confine`, xacro cannot import this module.
     confine(ground.holds)
     document = xacrodoc.XacroDoc.from_file(path, subargs=arguments, walk_up=False, resolve_packages=False)
     urdf = document.to_urdf_string()
@@ -65,7 +61,7 @@ def _expand(
 
 
 def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -> None:
-    """Make xacro and xacrodoc call urdfkin's functions to evaluate expressions and to find packages.
+    """Make xacro call urdfkin's functions to evaluate expressions and to find packages.
 
     Raise RefusedError if xacro still evaluates expressions itself.
     """
@@ -82,7 +78,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
     def value_of(expression: str, names: Mapping[str, Any], local: object = None) -> object:
         try:
             return evaluate(expression, names, functions)
-        except MemoryError:  # the message of a MemoryError is empty
+        except MemoryError:  # A MemoryError has no message.
             raise RefusedError(_TOO_MUCH) from None
 
     def value_of_arguments(expression: str, context: Mapping[str, Any]) -> str:
@@ -92,7 +88,7 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
         return str(evaluate(expression, {**symbols, "true": True, "false": False, **names}, functions))
 
     xacro.safe_eval = value_of
-    substitution_args._eval = value_of_arguments  # $(eval ...)
+    substitution_args._eval = value_of_arguments  # This function evaluates `$(eval ...)`.
     xacrodoc.packages.get_path = _finder(path, search, ground)
     try:
         xacro.eval_text(_PROBE, symbols)
@@ -103,10 +99,8 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
 
 
 def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[str], str]:
-    """Return the function that finds packages for xacro's $(find name)."""
-
     def is_package(folder: Path) -> bool:
-        """Return whether a folder is allowed or has a package.xml; `$(find etc)` must not find /etc."""
+        """Accept allowed folders and folders with a package.xml, so that `$(find etc)` does not find /etc."""
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:

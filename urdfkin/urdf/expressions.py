@@ -1,7 +1,7 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro itself passes expressions to `eval`. xacro searches for forbidden names only in the outermost code
-object, so a lambda, a comprehension or a chain of attributes can run any program. This module interprets the
+xacro itself passes expressions to `eval`, and searches for forbidden names only in the outermost code object.
+A lambda, a comprehension or a chain of attributes can therefore run any program. This module interprets the
 syntax tree of an expression. An expression may contain only values, operators, the functions of xacro and the
 methods in `_METHODS`.
 """
@@ -59,11 +59,9 @@ class RefusedError(Exception):
 
 
 def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[object]) -> Any:
-    """Return the value of an expression, in which only `functions` and `_METHODS` may be called.
+    """Return the value of an expression that calls only `functions` and `_METHODS`.
 
-    Raises:
-        RefusedError: the expression contains something other than values, operators and allowed calls.
-        SyntaxError: the text is not an expression.
+    Raise RefusedError for forbidden content, and SyntaxError for text that is not an expression.
 
     >>> evaluate("2 * a[1] + max(a)", {"a": [1, 2], "max": max}, [max])
     6
@@ -73,7 +71,7 @@ def evaluate(expression: str, names: Mapping[str, Any], functions: Collection[ob
 
 
 class _Evaluation:
-    """Evaluate a syntax tree. The method that evaluates a node has the name of the node's class."""
+    """Evaluate a syntax tree; each method is named after the class of its nodes."""
 
     def __init__(self, names: Mapping[str, Any], functions: Collection[object]) -> None:
         self._names, self._functions = names, functions
@@ -102,7 +100,7 @@ class _Evaluation:
                 return getattr(owner, name)
         if isinstance(owner, dict) and not name.startswith("_"):
             try:
-                return owner[name]  # xacro's namespaces and YAML files are dictionaries
+                return owner[name]  # xacro stores namespaces and YAML files as dictionaries.
             except (KeyError, AttributeError):
                 raise NameError(f"{name!r} is not defined in '{ast.unparse(node.value)[:80]}'") from None
         kind_name = type(owner).__name__
@@ -178,7 +176,7 @@ class _Evaluation:
             return
         loop, *others = loops
         for value in self.value(loop.iter):
-            # Copying the outer scope would evaluate all properties; xacro evaluates only those that are read.
+            # A copy of the outer scope would evaluate all xacro properties, even unused properties.
             scope = ChainMap(dict(_bound(loop.target, value)), self._names)  # type: ignore[arg-type]
             inner = _Evaluation(scope, self._functions)
             if all(inner.value(condition) for condition in loop.ifs):

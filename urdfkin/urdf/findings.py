@@ -1,7 +1,6 @@
 """Define findings: problems in a URDF, each with a code, a position, the wrong text and a remedy.
 
-The parser and the rules of `urdfkin.urdf.lint` add findings to the `Reporter` of a file. Line and column
-numbers do not count a byte order mark.
+Line and column numbers do not count a byte order mark.
 
 A comment in a URDF can silence findings. The comment names the codes of the findings and gives a reason:
 
@@ -42,18 +41,18 @@ def shortened(text: str, limit: int = QUOTED) -> str:
 
 
 def quoted(text: str, limit: int = QUOTED) -> str:
-    """Return a text in double quotes, at most `limit` characters of it, safe to print."""
+    """Return at most `limit` characters of a text in double quotes, safe to print."""
     return '"' + shortened(text, limit).replace('"', '\\"') + '"'
 
 
-#: A longer line is cut to `SHOWN` characters, of which at most `BEFORE` precede the marked text.
+#: A longer line is cut to `SHOWN` characters, with at most `BEFORE` characters before the underlined text.
 SHOWN, BEFORE = 100, 60
 
 _TAB = "    "
 
 
 class Excerpts:
-    """Lines of a file with the wrong text of findings underlined. The data has no byte order mark."""
+    """Lines of a file with the wrong text underlined; the file's data has no byte order mark."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
@@ -70,7 +69,7 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # decode a line once, because one line may have megabytes
+        if self.number != finding.line:  # A line is decoded only once, because a line may have megabytes.
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -97,12 +96,11 @@ ROUNDING = 2.0**-50
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """The automatic fix of a finding.
+    """The automatic fix of a finding; the edits do not overlap.
 
     Attributes:
-        edits: Edits of the text, in file order, without overlap.
-        turns: Upper bound on the angle (rad) by which the fix rotates the frame of a joint; 0 if the fix does
-            not change the robot.
+        turns: Upper bound on the angle (rad) by which the fix rotates a joint frame; 0 if the robot stays
+            equal.
     """
 
     edits: tuple[Edit, ...]
@@ -114,11 +112,7 @@ class Fix:
 
 
 def apply(data: bytes, fixes: Iterable[Fix]) -> tuple[bytes, list[Fix]]:
-    """Apply the fixes that do not overlap; return the new bytes and the applied fixes.
-
-    >>> apply(b'<axis xyz="0 0 2"/>', [Fix((Edit(11, 16, "0 0 1"),))])[0]
-    b'<axis xyz="0 0 1"/>'
-    """
+    """Apply the fixes that do not overlap; return the new bytes and the applied fixes."""
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     taken, end = list[Fix](), 0
     for fix in sorted(fixes, key=lambda fix: fix.edits[0].start):
@@ -142,12 +136,11 @@ class Severity(Enum):
 
     @property
     def rank(self) -> int:
-        """0 for errors, 1 for warnings, 2 for notes."""
         return list(Severity).index(self)
 
 
 class PinocchioReading(Enum):
-    """Deviation of Pinocchio from the URDF specification: legal content is refused or read differently."""
+    """How Pinocchio treats legal content: Pinocchio refuses the file or reads the content differently."""
 
     REFUSES = "refuses"
     DIFFERS = "differs"
@@ -209,7 +202,7 @@ class Finding:
             return ""
         tag = shortened(self.element)
         if self.element == "prim" and self.name is not None and len(self.name) > QUOTED:
-            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"  # a prim's path ends with its name
+            return f"{tag} '...{printable(self.name[3 - QUOTED :])}'"
         return tag if self.name is None else f"{tag} '{shortened(self.name)}'"
 
     @property
@@ -345,8 +338,6 @@ class Rule:
         id: The code of the findings: `URDF` and three digits. A code is never reused. The first digit is the
             topic. 1: text and XML. 2: elements and attributes. 3: numbers. 4: names and structure. 5: joints.
             6: probable mistakes. 7: inertials, geometry and materials.
-        slug: The short name, in words with hyphens.
-        oracle: Pinocchio's behaviour, if Pinocchio does not follow the specification.
     """
 
     id: str
@@ -364,7 +355,6 @@ class Comment:
     """A comment with an instruction for urdfkin.
 
     Attributes:
-        text: The text between `<!--` and `-->`.
         behind: Whether the line has other text before the comment.
         element: The element that begins after the comment, or None.
     """
@@ -378,10 +368,7 @@ class Comment:
 
 @dataclass(slots=True, eq=False)
 class Silence:
-    """A comment that silences findings with the codes `codes`.
-
-    `used` contains the codes for which the comment has silenced a finding.
-    """
+    """A comment that silences findings; `used` contains the codes of findings that were silenced."""
 
     comment: Comment
     codes: tuple[str, ...]
@@ -391,11 +378,9 @@ class Silence:
 
 @dataclass(slots=True)
 class Silences:
-    """The comments of a file that silence findings."""
-
     all: list[Silence] = field(default_factory=list)
-    #: The first comment that silences a code. The key has the kind of place ("line", "element" or "file"),
-    #: the line number, the element's `id` or 0, and the code.
+    #: First comment that silences a code. A key is ("line", number, code), ("element", id, code) or
+    #: ("file", 0, code).
     _first: dict[tuple[str, int, str], Silence] = field(default_factory=dict)
 
     def add(self, silence: Silence) -> None:
@@ -425,12 +410,12 @@ class Silences:
         return None
 
 
-#: Maximum number of misspelt names in a file for which similar names are searched.
+#: Maximum number of misspelt names in a file for which similar names are suggested.
 SEARCHES = 20
-#: In one search for similar names: maximum number of compared names, and the argument `work` of `nearest`.
+#: Limits of one search for similar names: number of compared names, and the argument `work` of `nearest`.
 CANDIDATES, WORK = 5_000, 250_000
 
-#: If at least this number of warnings (or notes) have the same code, they are combined into one finding.
+#: At least this number of warnings or notes with one code are combined into one finding.
 #: `FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
@@ -445,8 +430,7 @@ WRITTEN_OUT = 10_000
 class _Kind:
     """The findings of one code and severity.
 
-    `found` has at most `WRITTEN_OUT` findings, each with its weight (see `Reporter.add`). `lines` contains
-    the line numbers of all further findings.
+    `found` has at most `WRITTEN_OUT` findings with their weights; `lines` has the lines of further findings.
     """
 
     severity: Severity
@@ -456,15 +440,6 @@ class _Kind:
 
 @dataclass(slots=True)
 class Reporter:
-    """The findings of one file.
-
-    Attributes:
-        file: The name of the file in the findings.
-        data: The bytes of the file; the positions of attributes are indices into these bytes.
-        comments: The comments with an instruction for urdfkin.
-        silenced: The findings that a comment silences, each with the reason in the comment.
-    """
-
     file: str
     data: bytes = b""
     limits: Limits = DEFAULT_LIMITS
@@ -492,19 +467,14 @@ class Reporter:
         weight: float = 0.0,
         fix: Callable[[], Fix | None] | None = None,
     ) -> None:
-        """Add a finding with a message, the wrong text `found` (in quotes) and a remedy.
+        """Add a finding about the element `at`, or about the line and column `position`.
 
-        - `at` is the element with the problem, and `attribute` the name of the wrong attribute.
-        - `position` is the line and column of a finding without an element.
-        - The finding has the tag and the name of the child of `<robot>` that contains `at`. If `at` is
-          `misplaced`, the finding has the tag and the name of `at`.
-        - `severity` replaces the severity of the rule.
-        - `weight`: if findings with one code are combined, the finding with the greatest weight is reported.
-        - `fix` returns the automatic fix, or None.
+        The finding names the child of `<robot>` that contains `at`, or `at` itself if `misplaced` is True. If
+        findings with one code are combined, the finding with the greatest `weight` is reported.
         """
         severity = rule.severity if severity is None else severity
         reason = None
-        if self.silences.all and severity is not Severity.ERROR:  # a comment cannot silence an error
+        if self.silences.all and severity is not Severity.ERROR:  # A comment cannot silence an error.
             start = position[0] if at is None else self._place(at, attribute)[0]
             reason = self.silences.reason(rule.id, start, at)
         kind = self._kinds.setdefault((rule.id, severity), _Kind(severity))
@@ -528,7 +498,7 @@ class Reporter:
             self.silenced.append((finding, reason))
 
     def silence(self, silences: Silences) -> None:
-        """Apply comments to the findings of the reporter, and to all findings that are added later."""
+        """Apply comments to all findings, including findings that are added later."""
         self.silences = silences
         for (code, severity), kind in self._kinds.items():
             if severity is not Severity.ERROR:
@@ -537,14 +507,14 @@ class Reporter:
                 kind.found = [pair for pair, reason in reasons if reason is None]
 
     def nearest(self, word: str, known: Iterable[str]) -> list[str]:
-        """Return up to three known names similar to a word; [] after `SEARCHES` calls, for speed."""
+        """Return up to three similar names; after `SEARCHES` calls, return [] for speed."""
         self._searches += 1
         if self._searches > SEARCHES:
             return []
         return nearest(word, islice(known, CANDIDATES), work=WORK)
 
     def is_full(self, rule: Rule) -> bool:
-        """Return whether the reporter stores only line numbers for further findings of a rule."""
+        """Return whether only the line numbers of further findings of a rule are stored."""
         kind = self._kinds.get((rule.id, rule.severity))
         return kind is not None and len(kind.found) >= WRITTEN_OUT
 
@@ -555,11 +525,9 @@ class Reporter:
     def findings(
         self, *, fold: bool = True, wanted: Callable[[Finding], bool] | None = None
     ) -> tuple[Finding, ...]:
-        """Return the findings by line.
+        """Return the findings by line; `fold` combines many findings with one code into one.
 
-        `fold` combines many warnings with one code into one finding. If there are more than a hundred errors
-        with one code, the hundredth error lists the lines of all further errors. `wanted` is called once for
-        each finding, in file order, and returns whether the finding is reported.
+        `wanted` is called once for each finding, in file order, and returns whether the finding is reported.
         """
         pairs = [pair for kind in self._kinds.values() for pair in kind.found]
         if wanted is not None:
@@ -574,24 +542,23 @@ class Reporter:
 
     @property
     def has_raw_blanks(self) -> bool:
-        """Whether the file has an attribute value with characters that XML parsers replace."""
+        """Whether the file has attribute values in which XML parsers replace characters."""
         if self._raw_blanks is None:
             self._raw_blanks = _RAW_BLANK.search(self.data) is not None
         return self._raw_blanks
 
     def raw(self, at: Element, attribute: str) -> str | None:
-        """Return the text of an attribute value in the file, which the XML parser may have changed."""
+        """Return an attribute value as written in the file; an XML parser may change the value."""
         span = self._spans(at).get(attribute)
         return None if span is None else self.data[slice(*span.value)].decode("utf-8", "replace")
 
     def _spans(self, at: Element) -> dict[str, _AttributeSpan]:
-        """Return the positions of an element's attributes. The positions of the last element are cached."""
         if self._element is not at:
             self._element, self._attributes = at, dict(_attributes(self.data, at))
         return self._attributes
 
     def _place(self, at: Element, attribute: str | None) -> tuple[int, int, int]:
-        """Return line, column and width of an element's start tag, or of one of its attributes."""
+        """Return line, column and width of a start tag or of one attribute."""
         span = None if attribute is None else self._spans(at).get(attribute)
         if span is None:
             return at.line, at.column, 1 + len(at.tag)
@@ -603,14 +570,14 @@ class Reporter:
         return None if span is None else Fix((Edit(*span.value, value),), turns)
 
     def without(self, at: Element, *attributes: str) -> Fix | None:
-        """Return the fix that removes attributes, and the white space before each attribute."""
+        """Return the fix that removes attributes and the white space before each attribute."""
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         edits = tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)
         return Fix(edits) if edits else None
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element, and its line if the line contains nothing else."""
+        """Return the fix that removes an empty element, or its whole line."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -628,13 +595,9 @@ class Reporter:
 
 @dataclass(frozen=True, slots=True)
 class _AttributeSpan:
-    """The position of an attribute in the file.
+    """The position of an attribute; columns are in characters, indices in bytes.
 
-    Attributes:
-        line: Line, from 1.
-        column: Column in characters, from 1.
-        start: Index of the first byte of the attribute's name.
-        value: Index of the first byte of the value, and index of the closing quotation mark.
+    `value` contains the index of the value's first byte and the index of the closing quotation mark.
     """
 
     line: int
@@ -643,8 +606,8 @@ class _AttributeSpan:
     value: tuple[int, int]
 
 
-#: Regular expression for a value with a tab, a line end or a reference such as `&amp;`.
-#: An XML parser replaces these characters. Possessive quantifiers keep the matching time linear.
+#: An attribute value with a tab, a line end or a reference such as `&amp;`, which XML parsers replace.
+#: Possessive quantifiers keep the matching time linear.
 _RAW_BLANK = re.compile(rb"""=\s*+(?:"[^"<\t\r\n&]*+[\t\r\n&]|'[^'<\t\r\n&]*+[\t\r\n&])""")
 
 NEWLINE = re.compile(rb"\r\n|\r|\n")
@@ -652,7 +615,6 @@ _REST_OF_LINE = re.compile(rb"[ \t]*+(?:\r\n|\r|\n)")
 
 
 def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]]:
-    """Yield the name and the position of each attribute in an element's start tag."""
     tag = START_TAG.match(data, at.offset)
     if tag is None:
         return
@@ -665,7 +627,7 @@ def _attributes(data: bytes, at: Element) -> Iterator[tuple[str, _AttributeSpan]
 
 
 def blanks_before(data: bytes, start: int, blanks: bytes = b" \t\r\n") -> int:
-    """Return the index of the first byte of the white space that ends at `start`."""
+    """Return the index at which the white space before `start` begins."""
     while start > 0 and data[start - 1] in blanks:
         start -= 1
     return start
@@ -676,7 +638,7 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Combine many warnings or notes of one kind into one; the last finding lists the lines of the others."""
+    """Combine many findings of one kind; the last finding lists the lines of the others."""
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

@@ -48,7 +48,7 @@ class XmlTree(Protocol):
 
 
 def text_of(source: Any) -> tuple[str, str] | None:
-    """Return the URDF text of an object of another library, and the object's name in messages; else None.
+    """Return the URDF text of another library's object and the object's name in messages, or None.
 
     Raise InputError if an element cannot be written as XML, or if a yourdfpy robot is not a tree.
     """
@@ -61,10 +61,9 @@ def text_of(source: Any) -> tuple[str, str] | None:
 
 
 def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a finding if yourdfpy may have lost rotations. `file` is the robot's name in messages.
+    """Return a finding if yourdfpy may have lost rotations.
 
-    yourdfpy (0.0.60) ignores the attribute quat_xyzw and does not store the text of the file. If a joint in
-    the file has quat_xyzw, yourdfpy therefore loses the rotation of this joint.
+    yourdfpy (0.0.60) ignores the attribute quat_xyzw, so the rotation of a joint with quat_xyzw is lost.
     """
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
@@ -86,14 +85,10 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
 
 
 def urdf_of(robot: yourdf.Robot) -> str:
-    """Return the URDF of a yourdfpy robot, with mimic rules, which yourdfpy's own writer (0.0.60) omits.
+    """Return the URDF of a yourdfpy robot; yourdfpy's own writer (0.0.60) omits mimic rules.
 
-    The axes are not normalised, so that `check` can report their lengths.
-
-    Raises:
-        InputError: the joints form no tree, mimic joints form a circle, required limits are missing, or a
-            name or number has a wrong type.
-        UnknownNameError: the mimicked joint of a mimic joint does not exist.
+    The axes are not normalised, so that `check` can report their lengths. Raise InputError for an invalid
+    robot, and UnknownNameError for a missing mimicked joint.
     """
     try:
         records = [_record(joint) for joint in robot.joints]
@@ -131,7 +126,7 @@ def _text(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                if isinstance(child.tag, str):  # not a comment or an instruction
+                if isinstance(child.tag, str):  # The tag of a comment or an instruction is not a string.
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
     except (TypeError, AttributeError, RecursionError) as error:
@@ -160,8 +155,8 @@ class Modelled:
     """The kinematic tree of a Pinocchio model.
 
     Attributes:
-        joints: For each link whose frame is a joint frame: the index of the Pinocchio joint, by link name.
-        frames: For each other link: the index of the link's Pinocchio frame, by link name.
+        joints: Index of the Pinocchio joint, for each link whose frame is a joint frame.
+        frames: Index of the Pinocchio frame, for each other link.
     """
 
     tree: KinematicTree
@@ -170,13 +165,12 @@ class Modelled:
 
 
 def is_model(source: object) -> TypeGuard[Any]:
-    """Return whether an object is Pinocchio's `Model` or `RobotWrapper`, without importing Pinocchio."""
     kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(source).__mro__]
     return ("pinocchio", "Model") in kinds or ("pinocchio", "RobotWrapper") in kinds
 
 
 def tree_of_model(source: Any) -> Modelled:
-    """Convert Pinocchio's `Model` or `RobotWrapper`; raise InputError for a joint that URDF does not have."""
+    """Convert a `Model` or `RobotWrapper`; raise InputError for a joint that URDF does not have."""
     model = getattr(source, "model", source)
     return _ModelReader(model).read()
 
@@ -193,20 +187,20 @@ class _ModelReader:
         bodies = self.bodies
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
-        #: Name of the link that each joint moves, by the index of the joint.
+        #: Name of the link that each joint moves, by the joint's index.
         self.carriers = {j: unique(name, self.link_names) for j, name in names.items()}
-        #: Name of the link of each converted frame, by the index of the frame.
+        #: Name of the link of each converted frame, by the frame's index.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """Yield the indices of joint and body if both have the same frame; the last body comes first."""
+        """Yield joint and body index for each body at a joint frame, last body first."""
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i
 
     def read(self) -> Modelled:
-        """Convert all frames, then all moving joints. In Pinocchio, a parent frame has a lower index."""
+        """Convert all frames, then all moving joints; a parent frame has a lower index."""
         for i in range(len(self.frames)):
             self._frame(i)
         frames = zip(self.frames, self.kinds, strict=True)
@@ -220,7 +214,7 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return the parent link of a frame, and its pose in this link; T is its pose in the joint frame."""
+        """Return a frame's parent link and pose in this link; T is the pose in the joint frame."""
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T

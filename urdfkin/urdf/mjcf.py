@@ -2,15 +2,15 @@
 
 MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model:
 
-- Each body becomes a link with the body's frame. Each site with a name becomes a link; a fixed joint connects
-  this link with the link of the site's body.
-- The joints of a body move one after the other, each about its anchor p_k: F <- F Trans(p_k) J_k Trans(-p_k).
-  A body with several joints becomes a chain of joints and links. The last link of the chain is the body.
+- Each body becomes a link with the body's frame. Each site with a name also becomes a link; a fixed joint
+  connects this link with the link of the body.
+- The joints of a body move one after the other. Joint k, with the anchor p_k and the motion J_k, changes the
+  pose F of the body to F Trans(p_k) J_k Trans(-p_k). A body with several joints becomes a chain of joints and
+  links. The last link of the chain is the body.
 - The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
-  MuJoCo's qpos. Only the order of quaternion numbers differs: in MuJoCo, the scalar part of a quaternion is
-  the first number.
+  MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
 
-Parts of the file that a kinematic tree cannot represent, for example tendons, are listed in `Mjcf.listed`.
+`Mjcf.listed` names the parts of the file that a kinematic tree cannot represent, for example tendons.
 
 MuJoCo can align the frame of a free body with the body's inertial frame (options `align` and `alignfree`).
 The inertial frame depends on the shapes, so MuJoCo needs the meshes to compile a file with such an option.
@@ -43,12 +43,12 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
-#: Limit (+- m) that is written for a prismatic joint without limits, because URDF requires limits.
+#: Limit (m) that replaces a missing limit of a prismatic joint, because URDF requires limits.
 UNBOUNDED = 1000.0
-#: Regular expression for the beginning of an MJCF text. The matching time is linear in the text's length.
+#: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
-#: Number of bytes at the beginning of a file in which the root element of MJCF is searched.
+#: Number of bytes that are read from a file to find the root element.
 _HEAD = 65_536
 
 
@@ -57,7 +57,6 @@ class Listed:
     """A part of the file that the tree does not represent or represents differently, or a probable mistake.
 
     Attributes:
-        what: A description in one clause.
         where: The tag and the name of the element, or the tag alone; None for the whole file.
         moves: Whether the part of the file affects the motion of the links.
         remedy: The remedy for a probable mistake; None for a part that is left out.
@@ -74,9 +73,10 @@ class Mjcf:
     """A robot from an MJCF file.
 
     Attributes:
-        model: MuJoCo's compiled model with all bodies.
-        fused: MuJoCo's compiled model with fused static bodies if the file sets `fusestatic`; otherwise None.
-        frames: "body" or "site", and the index of this body or site in MuJoCo's model, for each link.
+        model: MuJoCo's compiled model, in which all bodies remain separate.
+        fused: If `whole` is True and the file sets `fusestatic`: the model with fused static bodies.
+            Otherwise None.
+        frames: "body" or "site", and the index in `model`, for each link.
         coordinates: Index in MuJoCo's qpos of each moving joint, including mimic joints.
         rules: Name of the mimic joint for each equality that is a mimic rule, by the equality's index.
         apart: Indices of the active equalities between joints that the tree cannot represent.
@@ -96,7 +96,7 @@ class Mjcf:
     aligns: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's qpos (n, MuJoCo's nq) for q (n, nq); the mimic rules set the mimic joints."""
+        """Return MuJoCo's qpos for q (n, nq), including the values of mimic joints."""
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.coordinates:
@@ -111,10 +111,7 @@ class Mjcf:
         return full
 
     def placements(self, q: FloatArray) -> FloatArray:
-        """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`.
-
-        Frames that the model `fused` contains are computed with this model.
-        """
+        """Return the placements (n, frames, 4, 4) of `frames` for q (n, nq), computed by `mj_kinematics`."""
         qpos = self.qpos(q)
         out = _placements(self.model, qpos, dict(enumerate(self.frames.values())))
         if self.fused is not None:
@@ -123,7 +120,7 @@ class Mjcf:
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """Return the body or site in `fused` with the same name as a frame of `model`, or None."""
+        """Return the body or site of `fused` with the name of a frame of `model`, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
@@ -149,10 +146,10 @@ class Mjcf:
         return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """Return a sum of hinge angles for each frame (n, frames), in rad, for bounds on rounding errors.
+        """Return a sum of hinge angles (n, frames), in rad, for bounds on rounding errors.
 
-        The sum has a summand |q| + |ref| for each hinge between the world and the frame, if the reference
-        value `ref` of the hinge is not 0.
+        Each hinge between the world and a frame adds |q| + |ref| if the hinge's reference value `ref` is not
+        0.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -164,17 +161,14 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield the index in the model, the kind, and the index in qpos of each joint of a body."""
+        """Yield index, kind and qpos index of each joint of a body."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         for j in _joint_indices(m, body):
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Return a quantity for each frame (n, frames); `at_body` (n, bodies) is the quantity for each body.
-
-        For a site, the result is the quantity of its body plus the site's entry in `own` (sites,).
-        """
+        """Select a column of `at_body` (n, bodies) for each frame; for a site, add `own` (sites,)."""
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
             for kind, i in self.frames.values()
@@ -182,10 +176,7 @@ class Mjcf:
         return np.stack(columns, axis=1)
 
     def residuals(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's residuals `efc_pos` (n, equalities) of the equalities between joints.
-
-        The residual is NaN for an equality that is inactive or that does not concern joints.
-        """
+        """Return MuJoCo's residuals (n, equalities) of active equalities between joints; NaN for others."""
         mujoco, m = library(), self.model
         off = mujoco.mjtDisableBit
         m.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_FRICTIONLOSS)
@@ -203,9 +194,9 @@ class Mjcf:
     def rule_sizes(self, q: FloatArray) -> FloatArray:
         """Return the size (n, equalities) of each mimic rule, which bounds the rule's rounding error.
 
-        The size of a rule for joint y is s(y) (k + 1). For the rule y = y0 + c0 + c1 (x - x0), s(y) is
-        |y0| + |c0| + |c1| (s(x) + |x0|). For an independent joint x, s(x) is |x|. The number k counts the
-        rules from the mimic joint y to an independent joint.
+        A joint y with the rule y = y0 + c0 + c1 (x - x0) has the sum s(y) = |y0| + |c0| + |c1| (s(x) + |x0|).
+        An independent joint x has the sum s(x) = |x|. The size of the rule is s(y) (k + 1), where k is the
+        number of rules from y to an independent joint.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
@@ -228,7 +219,6 @@ class Mjcf:
 
 
 def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]) -> FloatArray:
-    """Return the placements (n, frames, 4, 4) of bodies and sites, computed by `mj_kinematics`."""
     mujoco = library()
     data = mujoco.MjData(model)
     out = np.zeros((len(qpos), len(frames), 4, 4))
@@ -243,11 +233,7 @@ def _placements(model: Any, qpos: FloatArray, frames: dict[int, tuple[str, int]]
 
 
 def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
-    """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>.
-
-    >>> is_mjcf("<mujoco/>"), is_mjcf(b"<mujoco/>"), is_mjcf("<robot/>"), is_mjcf("panda")
-    (True, True, False, False)
-    """
+    """Return whether a text, bytes, or a .xml or .mjcf file has the root element <mujoco>."""
     if isinstance(source, bytes):
         return _ROOT.match(source.decode("utf-8-sig", "replace")) is not None
     if is_text(source):
@@ -257,15 +243,14 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
     try:
         return is_mjcf(read_start(at_home(source), _HEAD))
     except OSError:
-        return False  # `load` reports the error when it reads the file
+        return False  # `load` reports the error later.
 
 
 def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
-    If `whole` is True, MuJoCo compiles the unchanged file with its meshes. Otherwise urdfkin first removes
-    the shapes and inertias, so that MuJoCo needs no mesh files. `name` is the name of the source in messages.
-    Raise InputError if MuJoCo is not installed or does not accept the file, or if the robot has a ball joint.
+    If `whole` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files. Raise
+    InputError without MuJoCo, for an invalid file, and for a ball joint.
     """
     mujoco = library()
     fused = None
@@ -307,14 +292,14 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
 
 def _spec(mujoco: Any, source: str | os.PathLike[str]) -> Any:
     spec = mujoco.MjSpec.from_string(source) if is_text(source) else mujoco.MjSpec.from_file(str(source))
-    spec.compiler.usethread = False  # a confined process cannot start threads
-    # Only dynamics needs large memory sizes; -1 replaces the sizes in the file by the default.
+    spec.compiler.usethread = False  # A confined process cannot start threads.
+    # Only dynamics needs the memory sizes in the file; -1 selects MuJoCo's default sizes.
     spec.memory = spec.njmax = spec.nconmax = spec.nstack = -1
     return spec
 
 
 def _aligned_bodies(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield each free body without moving descendants that MuJoCo aligns with its inertial frame."""
+    """Yield the free bodies whose frames MuJoCo aligns with their inertial frames."""
     kinds, choices = mujoco.mjtJoint, mujoco.mjtAlignFree
     for joint in spec.joints:
         if joint.type != kinds.mjJNT_FREE:
@@ -357,7 +342,7 @@ def _useless(spec: Any) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
-    """Yield the parts of the file that the tree does not represent, except equalities between joints."""
+    """Yield the parts that the tree does not represent, except equalities between joints."""
     for i, one in enumerate(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
             kind, names = str(one.type).rpartition("_")[2].lower(), _join_names(one.name1, one.name2)
@@ -373,12 +358,7 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
 
 
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
-    """Yield a finding if a file is in degrees, but the limits of its hinges are probably in radians.
-
-    The angle unit applies to the whole file, so a wrong unit is reported only if all hinges have implausibly
-    small limits. In a file in radians, limits that look like degrees are not reported, because some hinges
-    turn several times.
-    """
+    """Yield a finding if all hinge limits of a file in degrees are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
     if 0.0 < largest <= LARGEST_ANGLE:
@@ -387,7 +367,7 @@ def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
 
 
 def _strip(mujoco: Any, spec: Any) -> None:
-    """Remove the elements that kinematics does not need, so that meshes may be missing."""
+    """Remove elements that kinematics does not need, so that mesh files may be missing."""
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
     for one in list(spec.equalities):
         if one.type != mujoco.mjtEq.mjEQ_JOINT:
@@ -398,7 +378,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # The next loop sets a placeholder inertia, with which MuJoCo must not align the frame.
+        # MuJoCo must not align a frame with the placeholder inertia that the next loop sets.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -416,7 +396,7 @@ def _joint_indices(model: Any, body: int) -> range:
 
 @dataclass(slots=True)
 class _MjcfReader:
-    """Convert one compiled model with the name `name`; `source` is the name of the file in messages."""
+    """Convert a compiled model; `source` is the name of the file in messages."""
 
     mujoco: Any
     model: Any
@@ -510,7 +490,7 @@ class _MjcfReader:
         return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
 
     def _rules(self) -> Iterator[tuple[str, Mimic]]:
-        """Yield the mimic rules, which are equalities y = m x + c of two joints. Chains are resolved."""
+        """Yield the mimic rules: linear equalities of two joints, with chains combined."""
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
@@ -535,7 +515,7 @@ class _MjcfReader:
             yield name, resolve(rules, name)
 
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
-        """Return the name and the rule of the mimic joint y in the equality y - y0 = c0 + c1 (x - x0).
+        """Return the mimic joint y and its rule for the equality y - y0 = c0 + c1 (x - x0).
 
         Here x0 and y0 are the reference values of the joints. The result is None if the equality is not
         linear, or has only one joint.
@@ -550,7 +530,7 @@ class _MjcfReader:
 
 
 def unique(name: str, taken: set[str]) -> str:
-    """Append underscores to a name until it is unique, and add it to the taken names."""
+    """Append underscores to a name until it is unique; add the name to `taken`."""
     while name in taken:
         name += "_"
     taken.add(name)
@@ -569,7 +549,7 @@ def leads(rules: Mapping[str, Mimic], joint: str, to: str) -> bool:
 
 
 def resolve(rules: Mapping[str, Mimic], joint: str) -> Mimic:
-    """Combine a chain of mimic rules into one rule, whose mimicked joint moves independently."""
+    """Combine a chain of mimic rules into one rule relative to an independent joint."""
     rule = rules[joint]
     while rule.leader in rules:
         end = rules[rule.leader]

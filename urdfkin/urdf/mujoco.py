@@ -19,14 +19,13 @@ def library() -> Any:
 
 
 def compiled(spec: Any) -> Any:
-    """Compile a MuJoCo specification without warnings, because MuJoCo's warnings are about dynamics."""
+    """Compile a specification; ignore MuJoCo's warnings, which are about dynamics."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         return spec.compile()
 
 
 def version() -> str:
-    """Return the installed version, without importing MuJoCo."""
     if (found := installed_version("mujoco")) is None:
         raise InputError("MuJoCo is not installed", remedy=install_remedy("mujoco"))
     return found

@@ -4,8 +4,8 @@ The XML parser is expat: it keeps namespace prefixes (`xacro:macro`), reports th
 parses deep nesting without recursion, and opens no file. If a document type declaration defines entities or
 refers to an external file, parsing stops with an error. No entity is expanded.
 
-A number is a finite decimal number in ASCII, as in urdfdom: `xs:double` of XML Schema without NaN and INF.
-The parser repairs nothing; every problem is a finding. `urdfkin.urdf.lint` checks the records further.
+A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
+finding.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from urdfkin.urdf.records import (
     RobotRecord,
 )
 
-# Bytes: UTF-8 and the XML declaration.
+# -- bytes
 
 EMPTY = Rule("URDF101", "empty-file", ERROR)
 ENCODING = Rule("URDF102", "not-utf8", ERROR)
@@ -57,7 +57,7 @@ XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16: a byte order mark, or the character '<'.
-#: UTF-32 is tested first, because some of its byte sequences begin with a sequence of UTF-16.
+#: UTF-32 must be tested first, because its byte order mark FF FE 00 00 begins with UTF-16's mark FF FE.
 _WIDE = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
@@ -72,7 +72,7 @@ _ASCII_SUPERSETS = re.compile(r"(iso8859|windows125|cp125|latin|koi8|mac)")
 
 
 def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
-    """Return the bytes of UTF-8 text without a byte order mark; None after an error."""
+    """Return the UTF-8 bytes without a byte order mark; None after an error."""
     if not data.strip():
         what = "the file is empty" if not data else "the file contains only white space"
         report.add(EMPTY, what, remedy="check the program that wrote the file")
@@ -138,7 +138,7 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
 
 
 def _codec(name: str) -> str | None:
-    """Return Python's name of an encoding, in lower case; None if it is unknown."""
+    """Return Python's lower-case name of an encoding; None for an unknown encoding."""
     try:
         return codecs.lookup(name).name.lower().replace("-", "").replace("utf8", "utf-8")
     except LookupError:
@@ -151,7 +151,7 @@ def line_and_column(data: bytes, offset: int) -> tuple[int, int]:
     return before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
 
 
-# XML: elements with positions.
+# -- XML elements
 
 SYNTAX = Rule("URDF105", "xml-syntax", ERROR)
 ENTITY = Rule("URDF106", "entity", ERROR)
@@ -169,7 +169,7 @@ MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 #: Maximum depth of nested elements in older versions of libxml2.
 COMMON_DEPTH = 256
 
-#: Number of bytes that are passed to expat in one call.
+#: Number of bytes that expat parses in one call.
 _PIECE = 1_000_000
 
 #: Maximum number of stored characters of an element's text.
@@ -180,11 +180,11 @@ _NAMES = frozenset({"name", "link", "joint"})
 
 
 class _StopError(Exception):
-    """Stop the parser, because urdfkin cannot interpret the rest of the file after an error."""
+    """An error after which the parser does not interpret the rest of the file."""
 
 
 def read_document(report: Reporter) -> Element | None:
-    """Parse the reporter's file and return its root element. If this fails, add a finding and return None."""
+    """Parse the file of `report` and return its root element; None after an error."""
     data, most = report.data, report.limits.bytes
     if len(data) > most:
         message = "the file is too large"
@@ -235,7 +235,7 @@ class _Builder:
         parser.SkippedEntityHandler = self.skipped
 
     def read(self, data: bytes) -> None:
-        """Parse the file in pieces. expat reads incomplete markup again together with the next piece."""
+        """Parse the file in pieces, and refuse a tag, comment or instruction that is too long."""
         whole, size = memoryview(data), min(_PIECE, self.limits.markup)
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
@@ -321,7 +321,7 @@ class _Builder:
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
-        """Report a document type declaration; stop the parser if it contains or refers to definitions."""
+        """Report a document type declaration; stop if it contains or refers to definitions."""
         self.begun = True
         start = self.report.data.rfind(b"<!DOCTYPE", 0, self.parser.CurrentByteIndex)
         position = line_and_column(self.report.data, start)
@@ -365,7 +365,7 @@ class _Builder:
         self.report.add(SYNTAX, message, found=found, remedy=remedy, position=position)
 
     def _entity_name(self) -> str | None:
-        """Return the first entity name after the error position that XML does not define."""
+        """Return the first undefined entity after the error position."""
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
@@ -379,7 +379,7 @@ class _Builder:
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
 _PREDEFINED = (b"lt", b"gt", b"amp", b"quot", b"apos")
 
-#: A clearer message and a remedy for each message of expat.
+#: Clearer messages, with remedies, that replace messages of expat.
 _REASONS: dict[str, tuple[str, str | None]] = {
     expat.errors.XML_ERROR_SYNTAX: ("text instead of an element", "a URDF begins with <robot ...>"),
     expat.errors.XML_ERROR_INVALID_TOKEN: ("a character that XML does not allow here", None),
@@ -401,7 +401,7 @@ _REASONS: dict[str, tuple[str, str | None]] = {
 }
 
 
-# Numbers and vectors in attributes.
+# -- numbers in attributes
 
 BAD_NUMBER = Rule("URDF301", "bad-number", ERROR)
 BAD_VECTOR = Rule("URDF302", "bad-vector", ERROR)
@@ -414,10 +414,9 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers in attributes, and report invalid numbers.
+    """Read numbers in attributes.
 
-    `bad_number` is the rule for an invalid number, `bad_vector` the rule for a wrong count of numbers. The
-    default rules are for numbers that kinematics uses.
+    `bad_number` is the rule for an invalid number, `bad_vector` the rule for a wrong count of numbers.
     """
 
     report: Reporter
@@ -425,7 +424,7 @@ class NumberReader:
     bad_vector: Rule = BAD_VECTOR
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
-        """Return a number; `default` if the attribute is missing, None if the value is not a number."""
+        """Return a number; `default` without the attribute, None for an invalid number."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
@@ -439,7 +438,7 @@ class NumberReader:
         return value
 
     def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
-        """Return `count` numbers, or None if the attribute is missing or cannot be read."""
+        """Return `count` numbers; None without the attribute or for an invalid number."""
         written = element.attributes.get(attribute)
         if written is None:
             return None
@@ -484,7 +483,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report a text that is too long for a number, because its conversion takes quadratic time."""
+        """Report text that is too long: the conversion to a number takes quadratic time."""
         if len(written) <= most:
             return False
         found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
@@ -496,7 +495,7 @@ class NumberReader:
         return True
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
-        """Report tabs and line ends, which urdfdom refuses, although XML parsers replace them by spaces."""
+        """Report tabs and line ends between or after numbers: urdfdom refuses these characters."""
         raw = self.report.raw(element, attribute)
         if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
             return
@@ -508,7 +507,7 @@ class NumberReader:
     def _report_refused(self, element: Element, attribute: str, what: str) -> None:
         value = element.attributes[attribute]
         rule, message = WHITESPACE, f"{attribute} has {what}, which urdfdom refuses"
-        if self.bad_number is not BAD_NUMBER:  # kinematics does not use the number
+        if self.bad_number is not BAD_NUMBER:  # Kinematics does not use this number.
             rule, message = self.bad_number, f"{attribute} has {what}, which urdfdom does not read"
         self.report.add(
             rule,
@@ -521,13 +520,13 @@ class NumberReader:
         )
 
 
-#: Messages about the numbers of these elements do not contain the tag.
+#: Tags of elements that messages about numbers do not name.
 _PLAIN = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
 
-#: Patterns of invalid numbers with remedies; the first pattern that matches determines the remedy.
+#: Patterns of invalid numbers, with remedies. The first matching pattern determines the remedy.
 _REMEDIES = (
     (r"[+-]?(nan|inf|infinity)", "write a finite number"),
     (r".*\$[({].*", "expand the xacro first"),
@@ -548,7 +547,7 @@ def _remedy(piece: str) -> str:
     return next(found, "write a number such as -1.5 or 2e-3")
 
 
-# Links and joints: records.
+# -- links and joints
 
 NOT_URDF = Rule("URDF201", "not-a-urdf", ERROR)
 VERSION = Rule("URDF203", "urdf-version", ERROR)
@@ -571,12 +570,11 @@ JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floati
 NEWEST = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
-#: If a length is between these bounds, its square neither underflows nor overflows.
+#: The square of a length between these bounds neither underflows nor overflows.
 SHORTEST, LONGEST = 1e-150, 1e150
 
 
 def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
-    """Return the links and joints of a document, or None if the document is not a URDF."""
     if root.tag != "robot":
         _other_format(report, root)
         return None
@@ -649,7 +647,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
 
 
 def named(report: Reporter, element: Element) -> str:
-    """Return the name of a link or joint; report a missing name, and then return an empty string."""
+    """Return the name of a link or joint; report a missing name."""
     name = element.attributes.get("name")
     if not name:
         what = "has no name" if name is None else "has an empty name"
@@ -681,10 +679,7 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute; report a missing or empty attribute and return None.
-
-        If `number` is True, an empty attribute is not reported, because `NumberReader` reports it.
-        """
+        """Return a required attribute; report a missing attribute and, without `number`, an empty one."""
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"
@@ -749,17 +744,17 @@ class JointReader:
         axis = joint.axis_element = joint.element.first("axis")
         if axis is None:
             return
-        if joint.kind in ("fixed", "floating"):  # the axis of such a joint has no effect
+        if joint.kind in ("fixed", "floating"):  # The axis of these joints has no effect.
             NumberReader(self.report, IGNORED, IGNORED).vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
             joint.axis = self.numbers.vector(axis, "xyz")
             return
         if not axis.attributes and (axis.text or any(x.tag == "xyz" and x.text for x in axis.children)):
-            return  # rule URDF212 reports text between tags
+            return  # Rule URDF212 reports text between tags.
         message = "some readers read <axis> without xyz as 1 0 0, and urdfdom as 0 0 0"
         remedy = 'write the axis, for example <axis xyz="1 0 0"/>'
-        # A planar joint moves in the XY plane, whatever its axis is (URDF505).
+        # A planar joint moves in the XY plane of its frame, independent of the axis.
         severity = Severity.WARNING if joint.kind == "planar" else None
         self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
@@ -792,7 +787,7 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
     def _others(self, joint: JointRecord) -> None:
-        """Check elements that kinematics does not use, because urdfdom refuses a file if they are invalid."""
+        """Check unused elements too, because urdfdom refuses a file with an invalid element."""
         dynamics, safety = (joint.element.first(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
             self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
@@ -807,7 +802,7 @@ class JointReader:
 
 _EXAMPLE_LIMIT = '<limit lower="-1" upper="1" effort="10" velocity="1"/>'
 
-#: Numeric attributes of a joint's elements that kinematics does not use.
+#: Numeric attributes that kinematics does not use, by the tag of the element.
 _UNUSED_NUMBERS = {
     "dynamics": ("damping", "friction"),
     "safety_controller": ("k_velocity", "k_position", "soft_lower_limit", "soft_upper_limit"),
@@ -816,8 +811,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    """Return the known tag or attribute that is most similar to a word, or None."""
-    # The cache does not store long words, which may have megabytes.
+    # Long words are not cached, because a word may have megabytes.
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 
@@ -831,5 +825,5 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
     return next((name for name in sorted(known) if sorted(name.lower()) == letters), None)
 
 
-#: Words with more characters are not similar to any tag or attribute of URDF.
+#: A word with more characters is not similar to any tag or attribute of URDF.
 _LONGEST_WORD = 32

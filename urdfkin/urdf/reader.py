@@ -1,7 +1,4 @@
-"""Build a `KinematicTree` from the records of a URDF.
-
-This module normalises the axes, resolves chains of mimic joints, and sorts the joints in Pinocchio's order.
-"""
+"""Build a `KinematicTree` from the records of a URDF."""
 
 from __future__ import annotations
 
@@ -28,12 +25,7 @@ from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRec
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
     """Return the kinematic tree of a URDF in which `urdfkin.urdf.lint` found no errors.
 
-    If `mimic` is False, mimic joints move freely. If `root_joint` is "floating" or "planar", a joint of this
-    kind with the name `root_joint` connects the root link with the world.
-
-    Raises:
-        InputError: the joints do not form a tree, mimic joints form a cycle, or `root_joint` is invalid.
-        UnknownNameError: the mimicked joint of a mimic joint does not exist.
+    If `root_joint` is "floating" or "planar", a joint `root_joint` connects the root link with the world.
     """
     name = urdf.element.attributes.get("name", "")
     tree = build_tree(name, root_link(name, urdf.links, urdf.joints), joint_rows(urdf.joints, mimic=mimic))
@@ -43,7 +35,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 
 
 def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
-    """Return each joint with its mimic rule, its parent link and its child link.
+    """Return each joint with its parent link and its child link.
 
     Raise InputError if mimic joints form a circle, and UnknownNameError if a mimicked joint does not exist.
     """
@@ -52,7 +44,7 @@ def joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tup
 
 
 def root_link(name: str, links: Iterable[str], joints: Sequence[JointRecord]) -> str:
-    """Return the link without a parent; raise InputError if there is none, or more than one."""
+    """Return the link without a parent; raise InputError unless there is exactly one."""
     roots = set(links) - {joint.child for joint in joints}
     if len(roots) != 1:
         found = ", ".join(sorted(roots)) or "none"
@@ -64,7 +56,7 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
     kind = JointKind(joint.kind)
     quaternion = joint.quaternion
     roll, pitch, yaw = np.array(joint.rpy) if quaternion is None else rpy_of_quaternion(quaternion)
-    # The parser has checked the numbers, so `rotation_from_rpy`, which checks numbers, is not called.
+    # `rotation_from_rpy` is not called, because it would check the numbers again.
     T = np.eye(4)
     T[:3, :3] = coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch) @ coordinate_rotation(0, roll)
     T[:3, 3] = joint.xyz
@@ -80,13 +72,13 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
 
 
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
-    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length, as in URDF 1.1."""
+    """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length."""
     scaled = np.asarray(quaternion) / np.abs(quaternion).max()
     return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
 
 
 def _unit(axis: FloatArray, joint: str) -> FloatArray:
-    """Divide an axis by its length, as Pinocchio does; return a unit vector unchanged."""
+    """Divide an axis by its length, as Pinocchio does."""
     length = math.hypot(*axis)
     if not 0.0 < length < math.inf:
         raise InputError("a joint's axis has no direction", where=f"joint {joint}", found=str(axis.tolist()))
@@ -107,11 +99,10 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 
 
 def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
-    """Return the mimic rule of each mimic joint, relative to a joint that moves independently.
+    """Return the rule of each mimic joint relative to an independent joint.
 
-    A mimic joint z may follow another mimic joint y, which follows x. This function combines the chain into
-    one rule: z = m2 (m1 x + b1) + b2. Pinocchio combines the rules in the same order, from x upwards, so
-    urdfkin and Pinocchio have equal rounding errors.
+    If z mimics y, and y mimics x, the combined rule is z = m2 (m1 x + b1) + b2. Pinocchio also combines the
+    rules from x upwards, so urdfkin and Pinocchio have equal rounding errors.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

@@ -1,7 +1,7 @@
-"""Define records for the XML elements and the joints of a URDF, and limits on the size of a URDF.
+"""Records of the XML elements and joints of a URDF, and limits on the size of a URDF.
 
-`urdfkin.urdf.parser` creates the records. In the record of a joint, None marks a value that the parser cannot
-read. If a value is missing in the file, the record contains the default of the URDF specification.
+In the record of a joint, None marks a value that the parser cannot read. If a value is missing in the file,
+the record contains the default of the URDF specification.
 """
 
 from __future__ import annotations
@@ -20,9 +20,7 @@ class Limits:
     """Limits on the size of a URDF file and its content.
 
     Attributes:
-        bytes: Maximum size of the file in bytes.
         depth: Maximum number of levels of nested elements. Pinocchio never reads more than the default.
-        elements: Maximum number of elements.
         attributes: Maximum number of attributes of one element.
         name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
         number: Maximum number of characters of one number.
@@ -52,7 +50,6 @@ class Element:
     """An XML element of a URDF.
 
     Attributes:
-        line: Line number of the start tag, from 1.
         offset: Index of the start tag's first byte, without counting a byte order mark.
         above: The child of `<robot>` that contains this element; None for the children of `<robot>`.
         text: The first characters of the text between the element's tags.
@@ -69,7 +66,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child. To save memory, an element without children has no list."""
+        """Add a child; to save memory, an element without children has no list."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:
@@ -79,11 +76,11 @@ class Element:
         return [child for child in self.children if child.tag == tag]
 
     def first(self, tag: str) -> Element | None:
-        """Return the first child with a tag, or None. URDF readers ignore all later children with the tag."""
+        """Return the first child with a tag; URDF readers ignore further children with this tag."""
         return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[Element]:
-        """Yield the element and all its descendants in file order, without recursion."""
+        """Yield the element and all its descendants in file order."""
         stack = [self]
         while stack:
             element = stack.pop()
@@ -107,7 +104,7 @@ AXIAL = ("revolute", "continuous", "prismatic")
 
 @dataclass(slots=True)
 class LimitRecord:
-    """A `<limit>` element. None is the value of a missing attribute."""
+    """A `<limit>` element; the value of a missing attribute is None."""
 
     element: Element
     lower: float | None
@@ -153,7 +150,6 @@ class RobotRecord:
 
     @property
     def by_name(self) -> dict[str, JointRecord]:
-        """The first joint with each name."""
         first: dict[str, JointRecord] = {}
         for joint in self.joints:
             first.setdefault(joint.name, joint)

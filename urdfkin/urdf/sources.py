@@ -18,7 +18,6 @@ from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import Entry, catalogue, find_package, split_uri
 
-#: Suffixes of USD files.
 USD = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -27,15 +26,12 @@ class Origin:
     """The arguments of `load`, and properties of the source.
 
     Attributes:
-        source: A path, a catalogue name, or `-` for standard input. For text, bytes and streams without a
-            name, the source is `<text>` or `<bytes>`.
-        oracle: The name of the library that checks the results; None for the default library.
+        source: A path, a catalogue name, or `-` for standard input; `<text>`, `<bytes>` or `<file>` for a
+            source without a name.
         table: Whether the robot was created from a Denavit-Hartenberg table.
         sha256: The digest of an MJCF or USD file; empty for other sources.
-        lock: Name and value (rad or m) of each locked joint, without mimic joints. A mimic joint is locked
-            together with its mimicked joint.
+        lock: Name and value (rad or m) of each locked joint, without mimic joints.
         variants: Variant sets and variants that were selected in a USD stage.
-        articulation: The articulation that was chosen in a USD stage, or None.
     """
 
     source: str
@@ -57,7 +53,7 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """The source for a new call of `load`. For a text, this is `-` (standard input)."""
+        """The source for a new call of `load`; `-` (standard input) for text and bytes."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
@@ -82,13 +78,7 @@ class Origin:
 
     @property
     def words(self) -> str:
-        """The source and the options as written on a command line.
-
-        >>> Origin("my arm.urdf", root_joint="floating").words
-        "'my arm.urdf' --root-joint floating"
-        >>> Origin("<text>").words
-        '-'
-        """
+        """The source and the options as written on a command line."""
         return " ".join(filter(None, (shlex.quote(self.again), self.options)))
 
     @property
@@ -103,11 +93,7 @@ class Origin:
 
     @property
     def python(self) -> str:
-        """The call of `load` in Python.
-
-        >>> Origin("panda", mimic=False).python
-        "urdfkin.load('panda', mimic=False)"
-        """
+        """The call of `load` in Python."""
         values = {
             "mimic": self.mimic,
             "root_joint": self.root_joint,
@@ -131,11 +117,9 @@ class Text:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: The path or name from which the URDF can be read again; `<text>`, `<bytes>` or `<file>` for a
-            source without a name.
+        source: The path or name from which the URDF can be read again; otherwise `<text>`, `<bytes>` or
+            `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
-        variants: Variant sets and variants that were selected in a USD stage.
-        articulation: The articulation that was chosen in a USD stage, or None.
     """
 
     data: bytes
@@ -149,17 +133,10 @@ class Text:
 
 
 def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
-    """Read a URDF from any source.
+    """Read a URDF from any source, at most `most` + 1 bytes (or characters of an open text file).
 
-    A catalogue name has priority over a file with this name in the current folder. For a file `panda`, write
-    `./panda`. The function reads at most `most` + 1 bytes (or characters of an open text file), even from an
-    infinite device such as `/dev/zero`. A .xacro file is expanded with the arguments `xacro_args`.
-
-    Raises:
-        SourceError: the file cannot be read.
-        UnknownNameError: the source is neither a file nor a catalogue name, or the xacro file does not
-            declare an argument. The message lists the nearest names.
-        InputError: the type of the source is wrong.
+    A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`. Raise
+    SourceError for an unreadable file, UnknownNameError for an unknown name, and InputError for a wrong type.
     """
     if xacro_args is not None and not isinstance(xacro_args, Mapping):
         raise InputError("`xacro_args` must be a mapping from names to values", found=safe_repr(xacro_args))
@@ -186,11 +163,6 @@ def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, objec
 
 
 def is_xacro(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Return whether the suffix of a path is .xacro.
-
-    >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf"), is_xacro("<robot/>")
-    (True, False, False)
-    """
     return _suffix(source) == ".xacro"
 
 
@@ -208,7 +180,7 @@ def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def _suffix(source: object) -> str:
-    """Return the suffix of a path in lower case; an empty string for text and any other source."""
+    """Return the suffix of a path in lower case; an empty string for any other source."""
     if not isinstance(source, str | os.PathLike):
         return ""
     is_text = isinstance(source, str) and source.lstrip().startswith("<")
@@ -240,7 +212,7 @@ def _read_string(word: str, most: int) -> Text:
 
 
 def _in_package(name: str, path: str) -> Path:
-    """Return the file of a `package://` address. The search starts in the current folder and goes upwards."""
+    """Return the file of a `package://` address; raise SourceError for an unknown package."""
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
@@ -253,8 +225,7 @@ def _in_package(name: str, path: str) -> Path:
 
 
 def _encode(content: str | bytes, label: str, source: str) -> Text:
-    # UTF-8 does not allow a lone surrogate, which a Python string may contain.
-    # With "surrogatepass", `encode` does not fail, and the check of the bytes reports the surrogate.
+    # `encode` must accept a lone surrogate, because the later check of the bytes reports it.
     data = content if isinstance(content, bytes) else content.encode("utf-8", "surrogatepass")
     return Text(data, label, source)
 
@@ -272,13 +243,13 @@ def _read_file(path: Path, most: int) -> Text:
 
 
 def as_word(path: Path) -> str:
-    """Return the path as text that `load` cannot mistake for an option, URDF text or a catalogue name."""
+    """Return a path that cannot be mistaken for an option, URDF text or a catalogue name."""
     word = str(path)
     return f"./{word}" if word.startswith(("-", "<")) or entry_of(word) is not None else word
 
 
 def entry_of(word: str) -> Entry | None:
-    """Return the catalogue entry of a name; None for a path, which contains a dot or a separator."""
+    """Return the catalogue entry of a name, or None; a name has no dot and no separator."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

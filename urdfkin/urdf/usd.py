@@ -1,18 +1,18 @@
 """Convert the UsdPhysics joints of a USD stage (a scene of objects, called prims) to a kinematic tree.
 
-- A prim with `PhysicsRigidBodyAPI` becomes a link with the prim's frame, without the prim's scale. A plain
-  `Xform` prim below a body also becomes a link; a fixed joint connects this link with the body.
+- A prim with `PhysicsRigidBodyAPI` becomes a link; the scale of the prim's frame is removed. A plain `Xform`
+  prim below a body also becomes a link; a fixed joint connects this link with the body.
 - A joint prim contains the pose A of the joint frame in the first body, and the pose B of the joint frame in
   the second body. With the joint motion J(q), the pose of the second body in the first body is A J(q) B^-1.
-  If the second body is the parent in the tree, urdfkin needs the inverse, B J(q)^-1 A^-1. The inverse has the
-  same form, with A and B exchanged and the opposite joint axis.
-- Lengths are multiplied by `metersPerUnit`, angles are converted from degrees. If the up axis is Y, the robot
-  is rotated, so that z is up.
+  If the second body is the parent in the tree, urdfkin uses the inverse, B J(q)^-1 A^-1. To compute the
+  inverse, urdfkin exchanges A and B and reverses the joint axis.
+- Lengths are multiplied by `metersPerUnit`, and angles are converted from degrees. If the up axis is Y, the
+  robot is rotated, so that z is up.
 - Joints that close a loop, name a missing prim, or are excluded from the articulation are reported.
 
-A stage may consist of many files, called layers. Before OpenUSD combines the layers, `files_of` reads each
-layer separately, and refuses references to network addresses and to files outside the robot's folder, package
-and repository.
+A stage consists of files, called layers. Before OpenUSD combines the layers, `files_of` reads each layer
+separately, and refuses references to network addresses and to files outside the robot's folder, package and
+repository.
 """
 
 from __future__ import annotations
@@ -53,40 +53,38 @@ from urdfkin.urdf.sources import USD
 
 #: Maximum number of layers of a stage.
 _LAYERS = 1_000
-#: Largest number in single precision. If a joint has no limit, the file contains this number or infinity.
+#: A missing limit of a joint is written as infinity or as this largest number in single precision.
 _LARGEST = float(np.finfo(np.float32).max)
-#: A cosine between two axes of a frame is a rounding error, not shear, up to this number times u n.
-#: Here n is the number of prims on the path to the frame's prim.
+#: A frame has shear if the cosine between two of its axes exceeds this number times u times n.
+#: Here n is the number of prims on the path of the frame's prim.
 #: The factor u is the largest relative error of rounding to single precision.
 #: Each entry of a stored rotation matrix has an error of u.
 #: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
 #: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
 _SHEAR = 14.0
-#: Limits up to this number (degrees) are not reported: the joint hardly moves, even in radians.
+#: Joints with smaller limits (degrees) hardly move, so such limits are not reported as a wrong unit.
 _SMALLEST_ANGLE = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
-#: First bytes of a pointer file of Git LFS, which stands for a file that was not downloaded.
+#: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Regular expression for the names of USD relationships that point to the mimicked joint. The group is the
-#: direction, such as rotX.
+#: Names of USD relationships to a mimicked joint. The group is the direction, such as rotX.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
-#: Words in the names of types and applied schemas that couple joints or bodies.
+#: Words in the names of USD types and schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of the type names of joints that a kinematic tree cannot represent.
-#: OpenUSD recognizes such a joint only if the plugin that defines the type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
-#: Coefficients of a MuJoCo joint equality that a mimic rule, which is linear, cannot contain.
+#: Coefficients of the nonlinear terms of a MuJoCo joint equality; a mimic rule is linear.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _DIRECTIONS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 #: Names of Xform prims that contain the shapes of a body.
 _SHAPES = ("visual", "visuals", "collision", "collisions")
-#: Rotation matrix that turns the up axis y to z.
+#: Rotation matrix that rotates the y axis onto the z axis.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: Kinds of remarks. `urdfkin.urdf.lint.rules.left_out` defines a rule for each kind.
+#: Kinds of remarks. The module `left_out` of the rules defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -95,11 +93,10 @@ Kind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """A part of the stage that the tree does not represent, or that is probably a mistake.
+    """A part of the stage that the tree does not represent, or a probable mistake.
 
     Attributes:
-        where: The path of the prim; empty if the remark is about the whole stage.
-        what: A description in one clause.
+        where: The path of the prim; empty for a remark about the whole stage.
     """
 
     kind: Kind
@@ -110,14 +107,13 @@ class Remark:
 
 @dataclass(frozen=True, slots=True)
 class JointReading:
-    """The numbers of a joint prim, in the stage's axes.
+    """The numbers of a joint prim, in the stage's axes; `body1`, `p1` and `quat1` are about the second body.
 
     Attributes:
         free: The directions in which the joint moves, such as `rotZ`.
-        body0: Path of the first body; empty for the world. `body1` is the path of the second body.
-        p0: (3,) origin of the joint frame in the first body, m. `p1` is the origin in the second body.
-        quat0: (4,) unit quaternion of the joint frame in the first body, scalar last. `quat1` is the
-            quaternion in the second body.
+        body0: Path of the first body; empty for the world.
+        p0: (3,) origin of the joint frame in the first body, m.
+        quat0: (4,) unit quaternion of the joint frame in the first body, scalar last.
         limits: Lower and upper limit, rad or m.
         size: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`, for error bounds.
     """
@@ -144,15 +140,13 @@ class Usd:
         prims: The path of the prim for each link that represents a prim.
         rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
         rest_q: (nq,) configuration in which the stage shows the robot.
-        single: Five numbers, by joint name, that describe the effect of rounding to single precision.
-            Number 1: a bound (m) on the error of the joint origins. Number 2: a bound (rad) on the error of
-            the joint orientations. Number 3: the sum of the lengths (m) of the vectors that these orientation
-            errors rotate. Number 4: for a mimic joint, a bound on the relative error of its joint value;
-            otherwise 0. Number 5: the distance (m) between the joint frame and the frame of the child.
+        single: Five numbers for each joint name, which bound the effect of rounding to single precision.
+            Number 1 bounds the error (m) of the joint origins. Number 2 bounds the error (rad) of the joint
+            orientations. Number 3 is the sum of the lengths (m) of the vectors that these orientation errors
+            rotate. Number 4 bounds the relative error of a mimic joint's value; it is 0 for other joints.
+            Number 5 is the distance (m) between the joint frame and the child frame.
         joints: The numbers of each joint prim in the tree, by the path of the prim.
-        unit: metersPerUnit.
-        remarks: Parts of the stage that the tree does not represent, and probable mistakes.
-        files: The files of the stage.
+        unit: The stage's metersPerUnit.
     """
 
     tree: KinematicTree
@@ -168,7 +162,6 @@ class Usd:
 
 
 def version() -> str:
-    """Return the installed version of OpenUSD, without importing it."""
     found = installed_version("usd-core") or installed_version("usd-exchange")
     if found is None:
         raise InputError("OpenUSD is not installed", remedy=install_remedy("usd"))
@@ -176,7 +169,7 @@ def version() -> str:
 
 
 def library() -> Any:
-    """Return an object whose attributes are OpenUSD's modules; raise InputError if OpenUSD is missing."""
+    """Return a namespace of OpenUSD's modules; raise InputError if OpenUSD is not installed."""
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
@@ -185,12 +178,9 @@ def library() -> Any:
 
 
 def files_of(pxr: Any, path: str) -> tuple[str, ...]:
-    """Return the files of a stage. Each layer is read separately, before its references are followed.
+    """Return the files of a stage; read each layer before its references are followed.
 
-    Raises:
-        InputError: there are too many layers, or a reference is a network address or an expression, or leads
-            to a file that is not USD, or to a file outside the robot's folder, package and repository.
-        SourceError: a file is too large or not a regular file, or cannot be read.
+    Raise InputError for a forbidden reference or too many layers, and SourceError for an unreadable file.
     """
     ground = Ground.around(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
@@ -227,7 +217,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
 
 
 def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
-    """Refuse value clips, because USD does not list the files of value clips as dependencies of a layer."""
+    """Refuse value clips, because OpenUSD does not list their files as dependencies of a layer."""
     found: list[str] = []
 
     def look(path: Any) -> None:
@@ -242,7 +232,7 @@ def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
 
 
 def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> str | None:
-    """Return the resolved path of an asset; None if the file does not exist."""
+    """Return the path of an asset, or None for a missing file; refuse a forbidden reference."""
     written = asset.partition(":SDF_FORMAT_ARGS:")[0]
     if not written:
         return None
@@ -253,7 +243,7 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
     address = str(pxr.Sdf.ComputeAssetPathRelativeToLayer(layer, written))
     outer, inner = pxr.Ar.SplitPackageRelativePathOuter(address)
     if not os.path.isabs(outer):  # noqa: PTH117  the comparison needs a string
-        # Without a file beside the layer, OpenUSD searches in the current folder.
+        # If there is no file beside the layer, OpenUSD searches in the current folder.
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
         outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
@@ -275,13 +265,9 @@ def read_usd(
 ) -> Usd:
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
-    `variants` are pairs of a variant set and a variant, and are applied in order. The variant is selected on
-    every prim that has this variant set. `articulation` is the path or name of the articulation to read; None
-    if there is only one.
-
-    Raises:
-        InputError: OpenUSD is not installed or does not accept the file, a reference is refused, the robot
-            has a joint that urdfkin does not support, or the articulation is ambiguous.
+    `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
+    with the variant set. `articulation` is the path or name of the articulation to read; None if there is
+    only one.
     """
     pxr = library()
     try:
@@ -299,11 +285,10 @@ def read_usd(
 
 
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
-    """Select USD variants in the temporary session layer; return the paths of expanded instances.
+    """Select variants in the session layer, which is not saved; return the paths of expanded instances.
 
-    OpenUSD cannot select a variant inside an instance. An instance that contains the variant set is therefore
-    expanded: in the session layer, its prim becomes non-instanceable. Raise UnknownNameError for an unknown
-    variant set or variant.
+    OpenUSD cannot select a variant inside an instance. An instance with the variant set is therefore made
+    non-instanceable. Raise UnknownNameError for an unknown variant set or variant.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     opened = set[str]()
@@ -329,7 +314,6 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
 
 
 def _variant_sets(pxr: Any, stage: Any) -> dict[str, list[Any]]:
-    """Return, for each variant set, the prims that have it, including prims inside instances."""
     sets: dict[str, list[Any]] = {}
     every = pxr.Usd.TraverseInstanceProxies(pxr.Usd.PrimAllPrimsPredicate)
     for prim in pxr.Usd.PrimRange.Stage(stage, every):
@@ -350,9 +334,7 @@ class _Edge:
 
     Attributes:
         name: At first the name of the prim; later the unique name of the joint in the tree.
-        ends: The paths of the two bodies that the joint connects; None is the world.
-        frames: The poses of the joint frame in these bodies.
-        size: See `JointReading`.
+        frames: The poses of the joint frame in the two bodies; a body is None for the world.
         rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
@@ -377,7 +359,7 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Read a stage. `source` is the stage's name in messages; `opened` has the expanded instances' paths."""
+    """Read a stage; `source` is the stage's name in messages, `opened` the paths of expanded instances."""
 
     pxr: Any
     stage: Any
@@ -388,7 +370,7 @@ class _StageReader:
     _edges: list[_Edge] = field(default_factory=list)
     _read: dict[str, JointReading] = field(default_factory=dict)
     _single: dict[str, tuple[float, float, float, float, float]] = field(default_factory=dict)
-    # `root_joint` and `universe` are Pinocchio's names for the joint of a moving base and for the world.
+    # Pinocchio uses the name `universe` for the world and `root_joint` for the joint of a moving base.
     _link_names: set[str] = field(default_factory=lambda: {"universe"})
     _joint_names: set[str] = field(default_factory=lambda: {"root_joint"})
     _unit: float = 1.0
@@ -454,10 +436,7 @@ class _StageReader:
         return prims
 
     def _value(self, prim: Any, name: str) -> Any:
-        """Return the value of an attribute, or else its default, or else None.
-
-        If an overriding layer sets the value to `None`, the value is treated as missing.
-        """
+        """Return the value of an attribute, or its default if the value is missing or blocked, or None."""
         attribute = prim.GetAttribute(name)
         if not attribute:
             return None
@@ -468,7 +447,6 @@ class _StageReader:
         return value
 
     def _report_timed(self, attribute: Any, instead: str) -> None:
-        """Report an attribute that has time samples or a spline, but no default value."""
         path = str(attribute.GetPath())
         if path in self._looked_at:
             return
@@ -482,7 +460,7 @@ class _StageReader:
             self._report("time-samples", where, what, "write a default value")
 
     def _report_timed_transforms(self, prim: Any) -> None:
-        """Report transform operations without a default value, for a prim and all prims above it."""
+        """Report transform operations without a default value, for a prim and its ancestors."""
         while prim and (path := str(prim.GetPath())) not in self._looked_at:
             self._looked_at.add(path)
             if prim.IsA(self.pxr.UsdGeom.Xformable):
@@ -494,7 +472,7 @@ class _StageReader:
             prim = prim.GetParent()
 
     def _uneven_scale(self, prim: Any) -> str | None:
-        """Return a text about the scale of the nearest ancestor with a non-uniform scale, or None."""
+        """Describe the nearest ancestor with a non-uniform scale, or return None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -503,7 +481,7 @@ class _StageReader:
         return None
 
     def _placed(self, prim: Any) -> tuple[FloatArray, FloatArray]:
-        """Return the pose of a prim in the world (4, 4), in m with z up, and its scale (3,)."""
+        """Return the pose (4, 4) of a prim in the world, in m with z up, and the prim's scale (3,)."""
         self._report_timed_transforms(prim)
         where = f"{self.source}: {prim.GetPath()}"
         M = np.array(self._cache.GetLocalToWorldTransform(prim)).T
@@ -541,7 +519,6 @@ class _StageReader:
             self._report_couplings(prim)
 
     def _report_couplings(self, prim: Any) -> None:
-        """Report prims and schemas that couple joints or bodies and that urdfkin does not read."""
         path, schemas = str(prim.GetPath()), _schemas(prim)
         joint = prim.IsA(self.pxr.UsdPhysics.Joint)
         kind = str(prim.GetTypeName())
@@ -562,18 +539,18 @@ class _StageReader:
             if not any(word in schema for word in _COUPLINGS) or (joint and _is_mimic(schema)):
                 continue
             if schema == "MjcEqualityJointAPI" and "NewtonMimicAPI" in schemas:
-                # MjcEqualityJointAPI repeats the rule of NewtonMimicAPI, and may add terms of higher degree.
+                # MjcEqualityJointAPI repeats the rule of NewtonMimicAPI, and may add nonlinear terms.
                 if more := [name for name in _HIGHER if self._value(prim, name)]:
                     what = f"the terms {', '.join(more)} of this joint's mimic rule are not read"
                     self._report("left-out-of-usd", path, what)
                 continue
             unread.append(schema)
-        # If the joint is not in the tree, `remarks` already contains a remark about the joint.
+        # A joint that is not in the tree was already reported.
         if unread and not any(one.where == path and one.kind == "left-out-of-usd" for one in self.remarks):
             self._report("left-out-of-usd", path, f"urdfkin does not read {', '.join(unread)}")
 
     def _owner(self, prim: Any) -> str | None:
-        """Return the path of the articulation root that is the prim or is above the prim, or None."""
+        """Return the path of the articulation root at or above a prim, or None."""
         while prim and str(prim.GetPath()) != "/":
             if prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 return str(prim.GetPath())
@@ -583,7 +560,7 @@ class _StageReader:
     # -- joints --------------------------------------------------------------------------------------
 
     def _edge(self, prim: Any) -> _Edge | None:
-        """Return a joint that connects two bodies, or a body and the world; report any other joint."""
+        """Return a joint between two bodies, or a body and the world; report any other joint."""
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
             self._report("left-out-of-usd", path, "this joint is disabled")
@@ -614,7 +591,7 @@ class _StageReader:
             return None
         kind, axis, limits, free = self._motion(prim)
         size, rounded = size_A + size_B, (off_A[0] + off_B[0], off_A[1] + off_B[1])
-        # A pose in the world (the body is None) is converted back to the up axis of the stage.
+        # A pose relative to the world is converted back to the up axis of the stage.
         C, D = (T if body is not None else pose(self._up.T) @ T for body, T in ((first, A), (second, B)))
         self._read[path] = JointReading(
             free, first or "", second or "", C[:3, 3], quaternion_of(C[:3, :3]),
@@ -627,8 +604,8 @@ class _StageReader:
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
         """Return body i (0 or 1) of a joint and the joint frame; None if the body does not exist.
 
-        The result has four entries: the path of the body (None for the world), the pose of the joint frame in
-        the body (m), the number `size`, and the bounds `rounded` (see `_Edge`).
+        The result contains the path of the body (None for the world), the pose of the joint frame in the body
+        (m), and the numbers `size` and `rounded` of `_Edge`.
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
@@ -659,12 +636,11 @@ class _StageReader:
         return body, A, length, off
 
     def _rounding_of_transforms(self, path: str, body: str | None, length: float) -> tuple[float, float]:
-        """Bound how far rounding to single precision moves (m) and rotates (rad) a prim relative to a body.
+        """Bound the motion (m and rad) of a prim when transforms are rounded to single precision.
 
-        The bounds are 0 if the file stores all transforms in double precision. If the file stores a rotation
-        in single precision, rounding rotates the prim, and moves all prims below the prim. Transforms in half
-        precision are ignored. `length` is the sum of the lengths (m) of the translations from the body to the
-        prim. The body None is the world.
+        The motion is relative to `body`; None is the world. If the rotation of a prim is rounded, the prim
+        rotates and all prims below the prim also move. `length` is the sum of the lengths (m) of the
+        translations from the body to the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
@@ -681,10 +657,7 @@ class _StageReader:
         return any(str(path).startswith(one) for one in self._instancers)
 
     def _motion(self, prim: Any) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the kind, the axis, the limits (rad or m) and the free directions of a joint.
-
-        Raise InputError if urdfkin does not support the joint.
-        """
+        """Return kind, axis, limits (rad or m) and free directions; refuse an unsupported joint."""
         physics, path = self.pxr.UsdPhysics, f"{self.source}: joint {prim.GetPath()}"
         if prim.IsA(physics.FixedJoint):
             return JointKind.FIXED, _unit(0), _NO_LIMITS, ""
@@ -705,9 +678,9 @@ class _StageReader:
         return self._general_motion(prim, path)
 
     def _general_motion(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the same tuple as `_motion` for a `PhysicsJoint`, which has limits for six directions.
+        """Return the result of `_motion` for a `PhysicsJoint`, which has limits for six directions.
 
-        If the lower limit of a direction is above its upper limit, the joint does not move in this direction.
+        A direction is locked if its lower limit is above its upper limit.
         """
         limits: dict[str, tuple[float, float]] = {}
         for direction in _DIRECTIONS:
@@ -731,10 +704,9 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return the lower or upper limit of a `PhysicsJoint` in one of its six directions.
+        """Return a limit of a `PhysicsJoint`; raise InputError if a layer blocks the limit with `None`.
 
-        Raise InputError if a layer contains `None` for the limit. OpenUSD's parser of UsdPhysics does not
-        replace `None` by the default value, but other readers do.
+        For a blocked limit, OpenUSD's parser of UsdPhysics does not use the default, but other readers do.
         """
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
@@ -760,14 +732,11 @@ class _StageReader:
     # -- articulations -------------------------------------------------------------------------------
 
     def _articulations(self) -> list[_Articulation]:
-        """Return the groups of bodies that joints connect.
-
-        A joint between two articulations is reported and does not merge the groups of its two bodies.
-        """
+        """Group the bodies that joints connect; report a joint between two articulations instead."""
         above: dict[str, str] = {path: path for path in self._bodies}
 
         def top(path: str) -> str:
-            """Return the body that represents the group of a body (union-find)."""
+            """Return the body that represents a group of bodies (union-find)."""
             while above[path] != path:
                 above[path] = above[above[path]]
                 path = above[path]
@@ -798,23 +767,22 @@ class _StageReader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # If the base of an articulation is not a rigid body, several groups are attached to the world.
+        # Without a rigid base, an articulation can have several groups of bodies attached to the world.
         merged: dict[str, list[_Articulation]] = {}
         for group in groups.values():
             single = not group.path and len(group.bodies) == 1
             if single and group.edges[0].kind is JointKind.FIXED:
-                continue  # a single body that is fixed to the world is not a robot
+                continue  # A single body that is fixed to the world is not a robot.
             self._name(group)
             merged.setdefault(self._root(group) or group.path, []).append(group)
         found = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
         paths = Counter(group.path for group in found)
         for group in found:
-            if paths[group.path] > 1:  # no joint connects the groups of this articulation
+            if paths[group.path] > 1:
                 group.path = self._root(group) or group.bodies[0]
         return found
 
     def _name(self, group: _Articulation) -> None:
-        """Set the path of a group to its articulation root, or else to its root body."""
         for edge in group.edges:
             if edge.prim.HasAPI(self.pxr.UsdPhysics.ArticulationRootAPI):
                 group.path = edge.path
@@ -847,7 +815,6 @@ class _StageReader:
         return self._merge(below, wanted.rstrip("/") or "/")
 
     def _merge(self, groups: list[_Articulation], path: str) -> _Articulation:
-        """Merge several articulations that are attached to the world into one articulation."""
         for group in groups:
             if len(groups) > 1 and self._root(group) is not None:
                 what = "this articulation is not attached to the world, so it cannot be joined with others"
@@ -857,7 +824,7 @@ class _StageReader:
         return _Articulation(path, bodies, [edge for group in groups for edge in group.edges])
 
     def _root(self, group: _Articulation) -> str | None:
-        """Return the root body of a group; None if the world is its root."""
+        """Return the root body of a group, or None if the world is the root."""
         if any(None in edge.ends for edge in group.edges):
             return None
         if group.path in group.bodies:
@@ -932,7 +899,7 @@ class _StageReader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return a prim's name, preceded by the names of ancestors if other bodies have the same name."""
+        """Return a prim's name, with the names of ancestors if the name is not unique."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -942,7 +909,6 @@ class _StageReader:
     def _joints(
         self, edge: _Edge, links: Mapping[str | None, str], *, backwards: bool
     ) -> Iterator[tuple[Joint, str, str]]:
-        """Yield the joint with its two links, and a fixed joint if the child frame is not on the axis."""
         (A, B), (parent, child), axis, kind = edge.frames, edge.ends, edge.axis, edge.kind
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
@@ -999,10 +965,7 @@ class _StageReader:
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield the path of each plain Xform prim that becomes a link, and the path of the prim's body.
-
-        An Xform that is an instance, or that only groups shapes, becomes no link.
-        """
+        """Yield the paths of each Xform prim that becomes a link and of the prim's body."""
         body_api, shape = self.pxr.UsdPhysics.RigidBodyAPI, self.pxr.UsdGeom.Gprim
 
         def below(prim: Any, body: str) -> Iterator[tuple[str, str]]:
@@ -1031,7 +994,6 @@ class _StageReader:
     # -- mimic joints --------------------------------------------------------------------------------
 
     def _mimics(self, edges: Sequence[_Edge]) -> Iterator[tuple[str, Mimic]]:
-        """Yield the name and the rule of each mimic joint, with chains of rules resolved."""
         by_path = {edge.path: edge for edge in edges}
         rules: dict[str, Mimic] = {}
         for edge in edges:
@@ -1051,7 +1013,7 @@ class _StageReader:
             yield by_path[path].name, replace(rule, leader=by_path[rule.leader].name)
 
     def _rules(self, edge: _Edge) -> Iterator[Mimic]:
-        """Yield each mimic rule of a joint, in rad or m; the leader is the path of the mimicked joint."""
+        """Yield the mimic rules of a joint, in rad or m; `Mimic.leader` is a prim's path."""
         prim, schemas = edge.prim, _schemas(edge.prim)
         own = self._factor(edge.kind)
         if "NewtonMimicAPI" in schemas:
@@ -1088,7 +1050,6 @@ class _StageReader:
     # -- the whole stage -----------------------------------------------------------------------------
 
     def _report_loose_bodies(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
-        """Report bodies that no joint connects and that are below the topmost prim of the articulation."""
         joined = {path for group in found for path in group.bodies}
         top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:
@@ -1099,7 +1060,6 @@ class _StageReader:
     def _rest(
         self, tree: KinematicTree, group: _Articulation, links: Mapping[str, str], rest: FloatArray
     ) -> FloatArray:
-        """Return the configuration (nq,) in which the stage shows the robot."""
         q = np.zeros(tree.nq)
         placed = dict(zip(links.values(), rest, strict=True))
         values = {}
@@ -1132,7 +1092,6 @@ class _StageReader:
             self._report("up-axis", "", what, 'write upAxis = "Z"')
 
     def _report_layers(self, paths: Sequence[str]) -> None:
-        """Report each layer that describes one of the prims with another unit or up axis than the stage."""
         root = self.stage.GetRootLayer()
         known = {root, self.stage.GetSessionLayer()}
         above = {str(one) for path in paths for one in self.pxr.Sdf.Path(path).GetPrefixes()}
@@ -1145,7 +1104,7 @@ class _StageReader:
                     self._report_layer(layer.pseudoRoot, name, prim)
 
     def _report_layer(self, root: Any, name: str, prim: Any) -> None:
-        """Compare the unit and the up axis of a layer with the stage; `prim` is the layer's topmost prim."""
+        """Report another unit or up axis of a layer; `prim` is the layer's topmost prim."""
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
@@ -1161,7 +1120,6 @@ class _StageReader:
             self._report("up-axis", path, f"{what}; the layer is not rotated", remedy)
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
-        """Return whether a prim's scale in the world is `factor`, up to rounding to single precision."""
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
@@ -1169,7 +1127,7 @@ class _StageReader:
     def _is_resolved(self, prim: Any) -> bool:
         """Return whether a prim or an ancestor has a transform operation with the suffix `unitsResolve`.
 
-        By convention, such an operation converts a referenced layer to the unit and up axis of the stage.
+        By convention, such an operation converts a layer to the unit and up axis of the stage.
         """
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
@@ -1179,18 +1137,18 @@ class _StageReader:
 
 
 def _rounding(x: FloatArray) -> FloatArray:
-    """Return the largest error (half an ulp) of rounding each number to single precision; 0 for a zero."""
+    """Return half an ulp in single precision for each number, or 0 for a zero."""
     half = 0.5 * np.spacing(np.abs(x).astype(np.float32)).astype(np.float64)
     return np.asarray(np.where(x == 0.0, 0.0, half))
 
 
 def _turned(xyzw: FloatArray) -> float:
-    """Return a bound (rad) on the change of a rotation when the numbers of its quaternion are rounded.
+    """Bound the change (rad) of a rotation when the numbers of its quaternion are rounded.
 
     The rotation changes by twice the angle between the exact and the rounded quaternion. Each of the four
     numbers changes by at most its rounding error, so the difference of the quaternions is a vector in a
-    four-dimensional box. Only the component of the vector that is perpendicular to the quaternion changes the
-    rotation. This component is longest at a corner of the box, so the function compares all corners.
+    four-dimensional box. Only the component of this vector that is perpendicular to the quaternion changes
+    the rotation. This component is longest at a corner of the box, so the function compares all corners.
     """
     unit = xyzw / np.linalg.norm(xyzw)
     corners = _rounding(xyzw) * np.array(list(product((-1.0, 1.0), repeat=4)))
@@ -1208,7 +1166,7 @@ def _target(prim: Any, name: str) -> str:
 
 
 def _schemas(prim: Any) -> list[str]:
-    """Return the applied API schemas as the file names them, including schemas unknown to OpenUSD."""
+    """Return the names of the applied API schemas, including schemas unknown to OpenUSD."""
     return [str(one) for one in prim.GetPrimTypeInfo().GetAppliedAPISchemas()]
 
 

@@ -1,9 +1,8 @@
 """Write a `KinematicTree` as URDF text, and insert attributes and elements into an existing text.
 
-Each number has enough digits to restore the same double. A joint's rotation is written as roll, pitch and
-yaw, from which URDF readers compute the rotation up to rounding errors.
-
-Positions in an existing text do not count a byte order mark.
+Each number has enough digits to restore the same double. A rotation is written as roll, pitch and yaw, from
+which URDF readers compute the rotation up to rounding errors. Positions in an existing text do not count a
+byte order mark.
 """
 
 from __future__ import annotations
@@ -22,19 +21,9 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 requires finite limits of effort and velocity. If such a limit is infinite, the file therefore
-    declares version 1.2, in which these limits may be missing.
-
-    Raises:
-        InputError: a revolute or prismatic joint has no finite position limits, or a name contains a
-            character that XML does not allow.
-
-    >>> from urdfkin.model.tree import build_tree
-    >>> print(to_urdf(build_tree("stone", "only", [])))
-    <robot name="stone">
-      <link name="only"/>
-    </robot>
-    <BLANKLINE>
+    URDF 1.0 requires finite limits of effort and velocity, so a tree with an infinite limit is written as
+    URDF 1.2. Raise InputError for a revolute or prismatic joint without finite position limits, and for a
+    name that XML does not allow.
     """
     version = ' version="1.2"' if any(_needs_newer_version(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{attribute(tree.name)}"{version}>']
@@ -88,11 +77,7 @@ def _limit(joint: Joint, limit: Limit | None) -> Iterable[str]:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Write numbers, separated by spaces, with all digits that restore the same doubles.
-
-    >>> numbers([0.1, -0.0, 1e-17])
-    '0.1 -0.0 1e-17'
-    """
+    """Write numbers with all digits that restore the same doubles."""
     return " ".join(repr(float(value)) for value in values)
 
 
@@ -107,7 +92,7 @@ def attribute(text: str) -> str:
     return "".join(_ESCAPES.get(character, character) for character in text)
 
 
-#: Regular expression for a character that XML 1.0 does not allow (production Char).
+#: Characters that XML 1.0 does not allow (production Char).
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -115,7 +100,7 @@ _INDENTATION = re.compile(rb"((?:\r\n|\r|\n)?[ \t]*+)\Z")
 
 
 def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iterator[Edit]:
-    """Yield the edits that set attributes of an element. New attributes follow the existing attributes."""
+    """Yield the edits that set attributes of an element; new attributes come last."""
     name_end = at.offset + 1 + len(at.tag.encode())
     tag = START_TAG.match(data, at.offset)
     end = tag.end() if tag else name_end
@@ -133,6 +118,6 @@ def with_attributes(data: bytes, at: Element, values: Mapping[str, str]) -> Iter
 
 
 def before(data: bytes, at: Element, element: str) -> Edit:
-    """Return the edit that inserts the text `element` before the element `at`, with the same indentation."""
+    """Return the edit that inserts the text `element` before `at`, with the same indentation."""
     indentation = _INDENTATION.search(data[max(0, at.offset - 1000) : at.offset])
     return Edit(at.offset, at.offset, element + (indentation[1].decode() if indentation else ""))

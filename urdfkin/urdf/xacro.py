@@ -1,11 +1,10 @@
 """Expand a .xacro file to URDF text, in a separate process with restricted rights.
 
-A xacro file is a program, and may come from an untrusted source. The module `expanding` contains the code of
-the separate process. docs/xacro.md lists the operations that a xacro file may do.
+A xacro file is a program, and may come from an untrusted source. docs/xacro.md lists the operations that a
+xacro file may do. The module `expanding` contains the code of the separate process.
 
-xacro itself ignores an argument that the file does not declare, but urdfkin raises an error. To find the
-declared arguments, the separate process reads the file and the files that it includes. If an included file is
-not found or not allowed, or if its name is computed, urdfkin accepts any argument.
+xacro itself ignores an argument that the file does not declare, but urdfkin raises an error. If urdfkin
+cannot read all included files, every argument is accepted.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from urdfkin.urdf.catalogue import VARIABLES, search_path
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum size in bytes, and maximum number, of the files in which declared arguments are searched.
+#: Limits of the search for declared arguments: size of a file in bytes, and number of files.
 MOST_ARGUMENTS, MOST_FILES = 10_000_000, 200
 
 #: Function that returns the folder of a package, or raises LookupError.
@@ -41,7 +40,7 @@ _COMPUTED = re.compile(r"\$[({]|[*?\[]")
 
 
 def arguments_of(path: Path, find: Find) -> set[str] | None:
-    """Return the names in `<xacro:arg>` and `$(arg)` of a file and of all files that it includes.
+    """Return the names of the xacro arguments of a file and of all files that it includes.
 
     The result is None if one of the files cannot be read, or if there are more than `MOST_FILES` files.
     """
@@ -78,7 +77,7 @@ def _included_file(name: str, beside: Path, find: Find) -> Path:
     return folder / name
 
 
-#: Maximum time of an expansion in seconds. A macro may call itself without end.
+#: Maximum time of an expansion in seconds, because a macro may call itself without end.
 PATIENCE = 60.0
 
 #: Maximum size of the expanded URDF in bytes.
@@ -92,11 +91,8 @@ class XacroError(UrdfkinError):
 def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIENCE) -> bytes:
     """Return the URDF of a xacro file, as UTF-8.
 
-    Raises:
-        SourceError: the file does not exist.
-        UnknownNameError: the file does not declare an argument.
-        XacroError: xacrodoc is not installed, or xacro cannot expand the file. Examples: the file opens
-            a forbidden file, starts a program, or needs too much memory or more than `patience` seconds.
+    Raise SourceError for a missing file, UnknownNameError for an undeclared argument, and XacroError if
+    xacrodoc is not installed or the expansion fails.
     """
     if not path.is_file():
         raise SourceError("no such file", where=str(path))
@@ -112,7 +108,7 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
         raise XacroError("the expanded URDF is too long", where=str(path), found=f"more than {MOST} bytes")
     answer = _answer(output)
     if "urdf" in answer:
-        if isinstance(names := answer.get("arguments"), list):  # the process is not trusted
+        if isinstance(names := answer.get("arguments"), list):  # The process is not trusted.
             declared = [str(name) for name in names]
             if unknown := [name for name in arguments if name not in declared]:
                 raise UnknownNameError("xacro argument", unknown[0], declared, where=str(path))

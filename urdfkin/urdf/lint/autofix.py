@@ -9,9 +9,8 @@ urdfkin accepts a fix if three conditions hold:
   change by at most `Fix.turns` (rad).
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
-a CI service, for example an escape sequence or a GitHub workflow command. Such text must be escaped, but
-`git apply` refuses a patch with escaped lines. The changes are then written as a git binary patch, which is
-ASCII. The lines are escaped and precede this patch as a comment.
+a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
+lines. The changes are then written as a git binary patch, after the escaped lines as a comment.
 """
 
 from __future__ import annotations
@@ -34,8 +33,7 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Maximum number of passes of `--fix` over a file. One pass applies the fixes of one code.
-#: If two fixes overlap, the second fix needs another pass.
+#: Maximum number of passes of `--fix` over a file. One pass applies the fixes of one code without overlap.
 PASSES = 100
 
 #: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.
@@ -44,7 +42,7 @@ TILT = Fraction(1, 2**52)
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """A fixed file, the fixed findings, and the reasons, by code, why other findings were not fixed."""
+    """A fixed file; `kept` contains the reasons, by code, why other findings were not fixed."""
 
     text: Text
     fixed: tuple[Finding, ...]
@@ -54,10 +52,10 @@ class Mended:
 def mend(
     text: Text, look: Callable[[Text], Examined], choose: Callable[[], Callable[[Finding], bool]]
 ) -> Mended:
-    """Apply the automatic fixes of a file, one code after another. A file with errors is not changed.
+    """Apply the automatic fixes of a file, one code after another; do not change a file with errors.
 
-    `look` checks a text and returns all findings. `choose` is called for each pass over the file, and returns
-    a function that decides whether a finding is fixed.
+    `choose` is called for each pass over the file, and returns a function that decides whether a finding is
+    fixed.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -86,9 +84,7 @@ def mend(
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # A reporter stores only some of the findings if a code has very many.
-    # After a fix, the reporter may store other findings of such a code, which would look new.
-    # Therefore, these codes are not compared.
+    # Codes with very many findings are not compared, because the reporter stores only some of these findings.
     many = {finding.code for finding in before.findings if finding.also}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
@@ -107,9 +103,9 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots, except in unused values such as the axis of a fixed joint.
+    """Yield the differences between two robots, except in unused values.
 
-    `turns` are upper bounds on the allowed rotation (rad) of each joint's frame, by joint name.
+    `turns` contains upper bounds on the allowed rotation (rad) of each joint's frame, by joint name.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
@@ -120,7 +116,6 @@ def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> I
 
 
 def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
-    """Return the first property in which two joints differ, or None."""
     # If roll, pitch or yaw changes by an angle, the frame rotates by at most this angle.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
@@ -150,7 +145,6 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
 
 
 def _limits(joint: JointRecord) -> tuple[float | None, ...]:
-    """Return the limits that have an effect: only revolute and prismatic joints have position limits."""
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()
@@ -164,15 +158,14 @@ def _rule(joint: JointRecord) -> tuple[str, float, float] | None:
 
 #: Number of bytes in each line of git's binary patch.
 _IN_A_LINE = 52
-#: Letters with which a line of git's binary patch states its number of bytes.
+#: In git's binary patch, the first letter of a line encodes the number of bytes of the line.
 _COUNTS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
-    """Return the patch of one file, safe to print; an empty string if the file does not change.
+    """Return the patch of one file; an empty string if the file does not change.
 
-    `file` is the name relative to the current folder. `before` and `after` are UTF-8. `shown` returns text
-    for one line of a terminal or a log, with control characters escaped.
+    `before` and `after` are UTF-8. `shown` escapes the control characters of a text.
     """
     if before == after:
         return ""
@@ -185,13 +178,13 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
 
 
 def _relative(file: str) -> str:
-    """Return a file name for `git apply`: a relative name if the file is in the current folder."""
+    """Return the name relative to the current folder if the file is in this folder."""
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 
 
 def _unified_diff(name: str, before: bytes, after: bytes) -> str:
-    end = "\t" if " " in name else ""  # git needs a tab after a file name that contains spaces
+    end = "\t" if " " in name else ""  # Git needs a tab after a file name that contains spaces.
     old, new = (f"{_quote(f'{side}/{name}')}{end}" for side in "ab")
     # Like git, StringIO ends a line only at a line feed.
     a, b = (io.StringIO(data.decode(), newline="\n").readlines() for data in (before, after))
@@ -201,7 +194,7 @@ def _unified_diff(name: str, before: bytes, after: bytes) -> str:
 
 
 def _quote(name: str) -> str:
-    """Return a file name as git writes it: in quotes if it contains a quote or a special character."""
+    """Return a file name as git writes it."""
     if name.isascii() and name.isprintable() and not set(name) & {'"', "\\"}:
         return name
     return '"' + "".join(

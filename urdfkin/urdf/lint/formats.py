@@ -22,10 +22,10 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 
 
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
-    """Return one SARIF run with every code as a rule and every finding as a result.
+    """Return a SARIF document with all rules about URDF files, and a result for each finding.
 
-    A rule about MJCF or USD files is listed in the SARIF run only if a finding has the rule's code. A
-    silenced finding is marked as "suppressed in source", with the reason in the comment.
+    A rule about MJCF or USD files is included only if a finding has the rule's code. A silenced finding is
+    marked as "suppressed in source".
     """
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
@@ -93,30 +93,22 @@ def _region(finding: Finding) -> dict[str, int]:
 
 
 def _uri(file: str) -> str:
-    """Return a file name as a URI reference, relative if the name is relative."""
     if file.startswith("<"):
         return file.strip("<>")
     return Path(file).as_uri() if Path(file).is_absolute() else quote(os.fsencode(Path(file).as_posix()))
 
 
-#: Version of the JSON format; the number changes when a field is removed or changes its meaning.
+#: Version of the JSON format. The number changes if a field is removed or gets another meaning.
 JSON_VERSION = 1
 
 
 def summary(findings: Sequence[Finding], files: int) -> str:
-    """Return one line with the numbers of errors, warnings, notes and files.
-
-    >>> summary([], 1)
-    'no findings in 1 file'
-    """
+    """Return one line with the numbers of errors, warnings, notes and files."""
     return f"{totals(findings)} in {files} file" + ("" if files == 1 else "s")
 
 
 def statistics(findings: Sequence[Finding]) -> Iterator[str]:
-    """Yield a line for each code, the most frequent code first.
-
-    A line has the count, the severity, `[*]` if --fix can fix the findings, and the title.
-    """
+    """Yield a line for each code, the most frequent first; `[*]` marks codes with fixes."""
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:
         counts[finding.code] += finding.count
@@ -134,12 +126,7 @@ def as_json(
     version: str,
     silenced: Sequence[tuple[Finding, str]] = (),
 ) -> str:
-    """Return the findings as one JSON document.
-
-    An entry of "findings" has the fields of `Finding`, and the `title` of the code. An entry of "silenced"
-    also has the `reason` in the comment that silences the finding. The positions in a `fix` are byte indices,
-    which do not count a byte order mark.
-    """
+    """Return the findings as a JSON document; positions in a `fix` are byte indices."""
     document = {
         "schema": "urdfkin-findings",
         "version": JSON_VERSION,
@@ -158,7 +145,7 @@ def _entry(finding: Finding) -> dict[str, Any]:
 
 
 def as_github(findings: Sequence[Finding]) -> str:
-    """Return a workflow command for each finding, errors first. GitHub shows each finding beside its line."""
+    """Return a GitHub workflow command for each finding, errors first."""
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
         f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 _MODULES = (parser, dialect, joints, bodies)
 
-#: The rules about URDF files, by the name of their module.
+#: The rules about URDF files, by the name of the module.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in _MODULES
@@ -37,7 +37,7 @@ RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda r
 #: The rules about MJCF and USD files, indexed by code.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
-#: Code of each rule. The keys are the code in lower case, the digits of the code, and the short name.
+#: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
 CODES = {word: rule.id for rule in RULES.values() for word in (rule.id.lower(), rule.id[4:], rule.slug)}
 
 _TOPIC = {rule.id: topic for topic, own in TOPICS.items() for rule in own}
@@ -49,7 +49,6 @@ class Page:
     """The documentation of a rule.
 
     Attributes:
-        title: The problem in one line.
         why: The consequences of the problem for a user.
         example: A minimal example with the problem: a whole document, or the content of `<robot>`. An example
             that begins with a joint or a comment is completed with the links `base` and `tip`.
@@ -107,7 +106,7 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    """Return the rule with a code or short name, in upper or lower case, or raise UnknownNameError."""
+    """Return the rule with a code or short name, in upper or lower case."""
     known, name = RULES | OF_OTHERS, word.strip().lower()
     codes = CODES | {name: rule.id for rule in OF_OTHERS.values() for name in (rule.id.lower(), rule.slug)}
     if name not in codes:
@@ -117,8 +116,6 @@ def find_rule(word: str) -> Rule:
 
 def find_rules(word: str) -> tuple[Rule, ...]:
     """Return the rules that a word selects: a code, a short name, the first digits of codes, or ALL.
-
-    Raise UnknownNameError if there is no such rule.
 
     >>> [rule.id for rule in find_rules("rounded-pi")], len(find_rules("URDF30"))
     (['URDF601'], 5)
@@ -159,7 +156,6 @@ def explain(rule: Rule) -> str:
 
 
 def _example(text: str) -> str:
-    """Indent an example, escape unprintable characters, and cut long lines."""
     lines = [printable(line) for line in text.strip("\n").split("\n")]
     cut = [line if len(line) <= _WIDEST else line[: _WIDEST - 4] + " ..." for line in lines]
     return "\n".join(f"    {line}" for line in cut).rstrip()

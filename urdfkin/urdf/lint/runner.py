@@ -1,6 +1,6 @@
 """Run all rules on a URDF: rules about bytes, XML, elements, names, joints, numbers and links.
 
-The text is parsed once. `urdfkin.load` builds the robot from the records that the rules have checked.
+`urdfkin.load` builds the robot from the records that the rules have checked.
 """
 
 from __future__ import annotations
@@ -44,8 +44,7 @@ def check(
 ) -> Findings:
     """Check a URDF and return the findings by line.
 
-    The function also checks that the packages and mesh files in the URDF exist. No mesh
-    is opened.
+    The function also checks that the packages and mesh files in the URDF exist. No mesh is opened.
 
     Args:
         source: A path, a catalogue name, URDF text, bytes, an open file, or `-` for standard input.
@@ -62,8 +61,8 @@ def check(
     Returns:
         The findings that no comment silences, as a list. Notebooks show this list as a table. The list is
         empty if the file has no problem. If a file has more than 10,000 findings with one code, the list
-        contains the first 10,000. The attribute `also` of the last of these findings contains the line
-        numbers of all further findings.
+        contains the first 10,000. The last of these findings has the line numbers of all further findings in
+        the attribute `also`.
 
     Raises:
         SourceError: the file cannot be read.
@@ -86,12 +85,11 @@ def check(
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """The result of a check.
+    """The result of a check; `robot` is None if the text is not a URDF.
 
     Attributes:
-        data: The bytes of the text without a byte order mark. All positions in the findings are positions in
+        data: The bytes of the text without a byte order mark. Positions in the findings are positions in
             `data`.
-        robot: The records of the robot; None if the text is not a URDF.
         silenced: The findings that a comment silences, each with the reason in the comment.
     """
 
@@ -128,15 +126,13 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """Return the path of the file that contains a text; None if there is no file."""
+    """Return the path of the file that contains a text, or None."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
 
 def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
-    """Check the bytes of a URDF and return the findings by line, with the arguments of `check`.
-
-    The function opens no file and no network connection, and uses neither yourdfpy nor Pinocchio.
+    """Check the bytes of a URDF with the arguments of `check`; open no file and no network connection.
 
     >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
     []
@@ -147,11 +143,10 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """Parse and check the bytes of a reporter's file, and return the records; None if the file is not a URDF.
+    """Parse and check the file of `report`; return None if the file is not a URDF.
 
-    If `mimic` is False, mimic joints move freely, and all findings about mimic joints are notes. `root_joint`
-    is "floating" or "planar" if the robot gets an additional joint `root_joint` with the parent link
-    `universe`; the file must not contain these names.
+    If `mimic` is False, all findings about mimic joints are notes. If `root_joint` is not None, the names
+    `root_joint` (joint) and `universe` (link) are errors.
     """
     root = read_document(report)
     read_comments(report, CODES)

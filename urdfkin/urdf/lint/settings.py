@@ -37,7 +37,7 @@ from urdfkin.urdf.lint.rules.bodies import MESH_MISSING
 from urdfkin.urdf.lint.runner import Examined, file_of
 from urdfkin.urdf.sources import Text, as_word, is_xacro
 
-#: Version of the format of baselines; the number changes when a field is removed or changes its meaning.
+#: Version of the baseline format. The number changes if a field is removed or gets another meaning.
 BASELINE_VERSION = 1
 
 Key = tuple[str, ...]
@@ -51,12 +51,12 @@ def key_of(finding: Finding, file: str) -> Key:
 
 @dataclass(slots=True)
 class Baseline:
-    """The known findings, and how many of them were found again.
+    """The findings of a baseline, and how many of them this run has encountered.
 
     Attributes:
-        counts: Number of known findings that were not found again yet, by key.
+        counts: For each key, the number of baseline findings that this run has not yet encountered.
         root: The folder to which the file names in the keys are relative.
-        met: Number of known findings that were found again.
+        met: Number of baseline findings that this run has encountered.
     """
 
     counts: Counter[Key]
@@ -64,7 +64,7 @@ class Baseline:
     met: int = 0
 
     def knows(self, finding: Finding) -> bool:
-        """Return whether a finding is known, and count the known finding as found again."""
+        """Return whether a finding is known, and count the finding as encountered."""
         key = key_of(finding, relative(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
@@ -73,13 +73,12 @@ class Baseline:
         return True
 
     def gone(self, files: Iterable[str]) -> int:
-        """Return the number of known findings in the checked files that were not found again."""
+        """Return the number of known findings in `files` that this run has not encountered."""
         checked = {relative(file, self.root) for file in files}
         return sum(count for (file, *_), count in self.counts.items() if count > 0 and file in checked)
 
 
 def relative(file: str, root: Path) -> str:
-    """Return the name of a file relative to a folder, with forward slashes."""
     if file.startswith("<"):
         return file
     path = os.path.relpath(Path(file.removesuffix(" (expanded)")).resolve(), root.resolve())
@@ -87,7 +86,7 @@ def relative(file: str, root: Path) -> str:
 
 
 def read_baseline(path: Path) -> Baseline:
-    """Read a baseline; raise SourceError or InputError if the file cannot be read or is no baseline."""
+    """Read a baseline; raise InputError if the file is not a baseline."""
     counts = Counter[Key]()
     try:
         document = json.loads(read_text(path))
@@ -102,10 +101,9 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return the text of a baseline with the findings of the checked `files`.
+    """Return the text of a baseline with `findings`, which are about the checked `files`.
 
-    If there is an older baseline at `path`, its entries about other existing files are copied. If the file at
-    `path` is not a baseline, raise InputError.
+    Entries of an older baseline at `path` are copied if they are about other existing files.
     """
     counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
     if path.exists():
@@ -118,7 +116,6 @@ def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path)
     return json.dumps(document, indent=1) + "\n"
 
 
-#: Type of each setting.
 _KINDS = {
     "select": list, "ignore": list, "per-file-ignores": dict, "strict": bool, "notes": bool,
     "include": list, "exclude": list, "baseline": str,
@@ -130,13 +127,13 @@ _WORDS = {
     str: "a string",
 }
 
-#: Default patterns of robot files in a folder. Most .xacro files contain only a part of a robot.
+#: Default patterns of robot files, without .xacro, because most .xacro files are a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """A table of checked settings. `file` is the file that contains the table; None without a table."""
+    """A table of checked settings in `file`; without a table, `file` is None."""
 
     file: Path | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -153,11 +150,10 @@ class Settings:
 
 
 def find_settings(start: Path) -> Settings:
-    """Return the settings that apply in a folder; empty settings if there is no table [tool.urdfkin].
+    """Return the settings that apply in a folder; empty settings without a table [tool.urdfkin].
 
-    The table is in the pyproject.toml of the folder or of a folder above, up to the first folder that
-    contains .git. Raise SourceError if a pyproject.toml cannot be read, and InputError if the file is not
-    TOML or a setting is wrong.
+    The search for pyproject.toml goes upwards, up to the first folder that contains .git. Raise SourceError
+    for an unreadable file, and InputError for invalid TOML or a wrong setting.
     """
     for folder in (start, *start.absolute().parents):
         file = folder / "pyproject.toml"
@@ -169,10 +165,7 @@ def find_settings(start: Path) -> Settings:
 
 
 def read_settings(file: Path) -> Settings:
-    """Return the settings in the table [tool.urdfkin] of a file.
-
-    Raise SourceError if the file cannot be read, and InputError without this table or with a wrong setting.
-    """
+    """Return the settings in a file; raise InputError if there is no table [tool.urdfkin]."""
     if (found := _table(file, pipes=True)) is None:
         remedy = "add this table, or omit --config"
         raise InputError("no table [tool.urdfkin]", where=str(file), remedy=remedy)
@@ -215,11 +208,7 @@ def _is_list_of_strings(value: Any) -> bool:
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """Return the codes of all rules that words name (see `find_rules`), or raise UnknownNameError.
-
-    >>> sorted(codes(["rounded-pi", "URDF52"]))[:3]
-    ['URDF520', 'URDF521', 'URDF522']
-    """
+    """Return the codes of the rules that `words` select (see `find_rules`)."""
     return frozenset(rule.id for word in words for rule in find_rules(word))
 
 
@@ -246,14 +235,6 @@ _PARTS = (".xacro", ".yaml", ".yml", ".xml", ".urdf")
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The options of `urdfkin check` that select the reported findings.
-
-    Attributes:
-        codes: The selected codes.
-        notes: Whether notes are reported.
-        baseline: The known findings, or None.
-    """
-
     codes: frozenset[str]
     notes: bool = True
     settings: Settings = field(default_factory=Settings)
@@ -262,37 +243,36 @@ class Choice:
     def of(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
         """Return a function that decides whether a finding is reported.
 
-        Call the function exactly once for each finding of the file, in order, because the function counts the
-        known findings. `before` is a baseline with the findings in an older version of the file.
+        Call the function exactly once for each finding, in file order, because the function counts the known
+        findings. `before` is a baseline with the findings in an older version of the file.
         """
         codes = self.codes - self.settings.ignored_in(text.label)
         known = [baseline for baseline in (self.baseline, before) if baseline is not None]
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # `any` would stop at the first baseline that knows the finding, but each baseline must count it.
+            # Each baseline must count the finding, but `any` would stop at the first match.
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
 
     def again(self, text: Text, before: Baseline | None = None) -> Callable[[Finding], bool]:
-        """Like `of`, but count in copies of the baselines, so that the same file can be checked again."""
+        """Do the same as `of` with copies of the baselines, so that a file can be checked again."""
         copies = [known and replace(known, counts=Counter(known.counts)) for known in (self.baseline, before)]
         return replace(self, baseline=copies[0]).of(text, copies[1])
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings in an older version of a file. `look` checks the text of a file.
+    """Return the findings in an older version of a file; None if no finding can be new.
 
-    If no file that affects the findings has changed, the result is None, because no finding is new. If a mesh
-    file was deleted after the older version, the finding about the missing mesh is new.
+    The finding about a missing mesh is new if the mesh file was deleted after the older version.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
         # The older version of a xacro file cannot be expanded.
-        # If any file has changed that the xacro file may include, every finding is new.
+        # If a file that the xacro file may include has changed, every finding is new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
@@ -309,11 +289,10 @@ LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def collected(word: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the files that an argument of the command names, sorted; raise SourceError if there is none.
+    """Return the sorted files that `word` names; raise SourceError if there is none.
 
-    The argument `word` is a file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[`, `**`. The
-    files in a folder match the patterns `include`. Files and folders that match the patterns `exclude` are
-    skipped, except a file that the user names.
+    `word` is a file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[` or `**`. A file that
+    the user names is never excluded.
     """
     path = Path(word)
     if word == "-" or word in catalogue():

@@ -1,1 +1,1 @@
-"""Rules that check the records of a URDF. A TOML file beside each module describes the module's rules."""
+"""Rules that check a URDF. A TOML file beside each module documents the module's rules."""

@@ -110,9 +110,6 @@ def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
     """Return the eigenvalues of an inertia tensor, smallest first, by the trigonometric cubic formula.
 
     The moments are ixx, ixy, ixz, iyy, iyz, izz.
-
-    >>> principal_moments([1.0, 0.0, 0.0, 2.0, 0.0, 3.0])
-    (1.0, 2.0, 3.0)
     """
     scale = max(map(abs, moments))
     if scale == 0.0:
@@ -161,7 +158,7 @@ def _check_geometry(
         numbers.vector(origin, "xyz")
         numbers.vector(origin, "rpy")
     capsule = None if geometry is None else geometry.first("capsule")
-    if capsule is not None and version < (1, 1):  # URDF readers skip the capsule
+    if capsule is not None and version < (1, 1):  # URDF readers skip this capsule.
         message = 'a capsule needs version="1.1" and is ignored'
         report.add(GEOMETRY, message, capsule, remedy="use a cylinder and two spheres")
     shape = geometry.children[0] if geometry is not None and geometry.children else None
@@ -244,7 +241,7 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
     """Report each missing mesh file, and each missing package once.
 
-    `beside` is the file of the URDF. For a text, `beside` is None, and only `package://` meshes are searched.
+    `beside` is the file of the URDF. If `beside` is None, only `package://` meshes are searched.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
@@ -292,7 +289,7 @@ def _meshes(root: Element) -> Iterator[Element]:
 
 
 def _is_missing_file(filename: str, beside: Path | None) -> bool:
-    """Return whether the address of a mesh is a file path, relative to the URDF, that does not exist."""
+    """Return whether a mesh address is a path, relative to the URDF, of a missing file."""
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if beside is None or not local:
         return False

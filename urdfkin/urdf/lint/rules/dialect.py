@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quoted(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # The kinematics depends on a macro that is a child of <robot>, or that is inside a joint.
+    # Kinematics uses only macros directly inside <robot> or inside a joint.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
     expressions: list[_Place] = [
@@ -100,7 +100,7 @@ _Place = tuple[Element, str | None]
 def _report_xacro(
     report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
 ) -> bool:
-    """Report unexpanded xacro; return True if kinematics uses it, so that it is an error."""
+    """Report unexpanded xacro; return whether kinematics uses any of it."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
     for group, severity, message in (
@@ -128,11 +128,7 @@ def _more(group: Sequence[object]) -> str:
 
 
 def is_expression(value: str) -> bool:
-    """Return whether a value contains a xacro expression.
-
-    >>> is_expression("${h} 0 0"), is_expression("$(arg side)/hand.stl"), is_expression("5 $")
-    (True, True, False)
-    """
+    """Return whether a value contains a xacro expression."""
     start = value.find("${")
     return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
 
@@ -154,8 +150,8 @@ _COMMON = (
 EXTENSIONS = frozenset(_COMMON.split())
 
 #: Lines of the form `element: attributes > child elements`.
-#: A line without a colon means that the attributes of the element are not checked.
-#: If an element has no line in this table, its content is not checked.
+#: Without a colon, the attributes of the element are not checked.
+#: The content of an element without a line is not checked.
 _TABLE = """
 robot: name version > link joint material
 link: name type > inertial visual collision
@@ -182,7 +178,7 @@ ATTRIBUTES = {
     if colon
 }
 
-#: Tags and attributes that other formats use for a pose or a part of a pose. URDF readers skip them.
+#: Tags and attributes of other formats for a pose or a part of a pose. URDF readers skip these names.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Attributes that `--fix` does not remove, because other elements or formats define them.
@@ -246,7 +242,7 @@ def _check_unknown(report: Reporter, element: Element, known: frozenset[str]) ->
 
 
 def outside_extensions(element: Element) -> Iterator[Element]:
-    """Yield an element and all its descendants, except extension elements and their descendants."""
+    """Yield an element and its descendants, except extension elements and their content."""
     stack = [element]
     while stack:
         element = stack.pop()
@@ -255,7 +251,7 @@ def outside_extensions(element: Element) -> Iterator[Element]:
 
 
 def _is_part(element: Element) -> bool:
-    """Return whether an element is a link or joint, by its tag and its content."""
+    """Return whether an element is probably a link or joint."""
     tag = nearest_tag(element.tag, _PARTS) if len(element.tag) < _LONGEST_PART else None
     if tag == "link":
         return "name" in element.attributes
@@ -294,7 +290,7 @@ def _check_text(report: Reporter, element: Element) -> None:
     if not element.text or element.tag not in _VALUES:
         return
     if element.tag in ("parent", "child") and "link" not in element.attributes:
-        return  # another finding already quotes this text
+        return  # Another finding already quotes this text.
     lost = element.tag in _VECTORS and not element.attributes
     example = _EXAMPLES.get(element.tag)
     message, found = f"text inside <{element.tag}> is skipped", quoted(element.text)
@@ -341,9 +337,8 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 
 def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
-    """Return the elements and attributes with each undeclared prefix, in file order."""
     found: dict[str, list[_Place]] = {}
-    declared = Counter(("xml", "xmlns"))  # XML itself declares these prefixes
+    declared = Counter(("xml", "xmlns"))  # XML itself declares these prefixes.
     stack = [(root, False)]
     while stack:
         element, leaving = stack.pop()
@@ -362,7 +357,7 @@ def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix with the name of its attribute; None for the prefix of the tag."""
+    """Yield each namespace prefix with its attribute; None for the prefix of the tag."""
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:
@@ -381,10 +376,7 @@ LONGEST = 200
 
 
 def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) -> None:
-    """Report names that are reserved, easily confused, or troublesome for other programs.
-
-    If `root_joint` is not None, the robot gets an additional joint `root_joint` below a link `universe`.
-    """
+    """Report names that are reserved, easily confused, or troublesome for other programs."""
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
     for name, element in (*links, *joints):
@@ -437,7 +429,7 @@ def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> Non
     seen: dict[str, str] = {}
     for name, element in named:
         if name.isascii() or len(name) > LONGEST:
-            continue  # a long name has another finding (URDF405), and is slow to compare
+            continue  # Long names are slow to compare, and URDF405 already reports long names.
         key = unicodedata.normalize("NFKC", name)
         first = seen.setdefault(key, name)
         if first != name:
@@ -455,10 +447,7 @@ _BETWEEN = re.compile(r"[,\s]+")
 
 
 def read_comments(report: Reporter, codes: Mapping[str, str]) -> None:
-    """Apply the comments that silence findings, and report invalid comments.
-
-    `codes` maps each name of a rule, in lower case, to the rule's code.
-    """
+    """Apply the comments that silence findings, and report invalid comments."""
     silences = Silences()
     for comment in report.comments:
         if (silence := _read(report, comment, codes)) is not None:
@@ -489,7 +478,7 @@ def _read(report: Reporter, comment: Comment, codes: Mapping[str, str]) -> Silen
 
 
 def check_unused(report: Reporter) -> None:
-    """Report the unused codes in comments that silence findings. Call this after all other rules."""
+    """Report codes in comments that silenced no finding. Call this after all other rules."""
     for silence in report.silences.all:
         for code in silence.codes:
             if code not in silence.used:

@@ -39,14 +39,14 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
-    """Report all reasons why the joints form no tree; return whether the joints form a tree."""
+    """Return whether the joints form a tree; report all reasons why not."""
     edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
     sound = len(edges) == len(robot.joints) and _have_one_parent(report, robot, edges)
     return _one_root(report, robot) and sound and bool(robot.links)
 
 
 def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
-    """Return whether a joint connects two different links that exist; report missing or equal links."""
+    """Return whether a joint connects two different links that exist; report other joints."""
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = ", ".join(report.nearest(link, robot.links))
@@ -62,11 +62,7 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
 
 
 def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
-    """Report the second and all further parent joints of a link; return True if there are none.
-
-    The links are visited depth first. If the child of a joint is on the current path, the joint closes a
-    loop. If the child was already visited on another path, the joint is an additional parent joint.
-    """
+    """Report loops and additional parent joints of a link; return True if there are none."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
@@ -119,8 +115,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     """Return whether exactly one link has no parent; report all further links without a parent.
 
-    If the child of a joint is missing or does not exist, no link is reported, because the joint may be the
-    parent joint of any link.
+    No link is reported if a joint has no valid child, because the joint may be the parent joint of any link.
     """
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
@@ -129,9 +124,8 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # another finding reports the joint with a wrong child
+        return False  # Another finding reports the joint without a valid child.
     parents = {joint.parent for joint in robot.joints}
-    # The main root is the first link that has children and no parent.
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
         if root != main:
@@ -146,21 +140,20 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: If the length of an axis differs from 1 by less than this number, the finding is only a note.
-#: Such differences are usual if an axis is written with few digits.
+#: Smaller deviations of an axis length from 1 are usual for numbers with few digits, so they are notes.
 LENGTH_ROUNDING = 2e-4
 
 #: Maximum difference of a unit vector's length from 1, as in `kinematics.inputs`.
 _ONE = 1e-12
 
-#: A planar joint's axis counts as z if its xy part is at most this fraction of its z component.
+#: An axis counts as the z axis if its xy part is at most this fraction of its z component.
 _LEAN = 1e-9
 
 #: Relative tolerance within which Pinocchio replaces an axis by a coordinate axis.
-#: Eigen's function `isApprox`, which compares squared lengths, has this default tolerance.
+#: The number is the default tolerance of Eigen's function `isApprox`.
 _SNAPPED = 1e-12
 
-#: Smaller tilts (rad) are not reported, because the error bounds in `verify.bounds` include them.
+#: Smaller tilts (rad) are not reported, because the error bounds in `verify.bounds` include these tilts.
 _TILT = 2.0**-52
 
 
@@ -206,15 +199,11 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
-    """Divide a vector by its length. Rounding rotates the result by at most 2**-53 rad.
-
-    >>> unit_vector((0.0, -3.0, 4.0))
-    (0.0, -0.6, 0.8)
-    """
+    """Divide a vector by its length; rounding rotates the result by at most 2**-53 rad."""
     with localcontext(prec=60):
         numbers = [Decimal(x) for x in vector]
         length = sum((x * x for x in numbers), Decimal(0)).sqrt()
-        return tuple(float(x / length) + 0.0 for x in numbers)  # `+ 0.0` turns -0.0 into 0.0
+        return tuple(float(x / length) + 0.0 for x in numbers)  # Adding 0.0 turns -0.0 into 0.0.
 
 
 def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
@@ -230,16 +219,13 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 
 
 def tilts(robot: RobotRecord) -> dict[str, float]:
-    """Return the angle (rad) between a joint's axis in the file and in Pinocchio, if the axes differ."""
+    """Return the angle (rad) by which Pinocchio changes an axis, for each joint with a changed axis."""
     axial = (joint for joint in robot.joints if joint.kind in AXIAL)
     return {joint.name: snapped[1] for joint in axial if (snapped := _snap(joint.axis))}
 
 
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that Pinocchio uses instead of an axis, and the angle (rad) between the two.
-
-    The result is None if Pinocchio uses the axis in the file.
-    """
+    """Return the coordinate axis that replaces an axis in Pinocchio, and their angle (rad), or None."""
     if axis is None:
         return None
     for i in range(3):
@@ -278,7 +264,7 @@ def check_ranges(report: Reporter, robot: RobotRecord) -> None:
 
 
 def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, version: tuple[int, int]) -> None:
-    strict = version >= (1, 2)  # since URDF 1.2, urdfdom applies the rules of limits to all joint types
+    strict = version >= (1, 2)  # Since URDF 1.2, urdfdom checks the limits of all joint types.
     for attribute in ("effort", "velocity", *FURTHER_LIMITS):
         value = getattr(limit, attribute)
         if value is not None and value < 0.0:
@@ -336,13 +322,12 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: A larger multiplier or offset (rad or m) of a mimic joint is reported.
 LARGEST = 1e6
-#: The finding is reported if the limits exclude more than this fraction of the mimicked joint's range.
+#: Limits are reported if they exclude more than this fraction of the mimicked joint's range.
 #: Smaller fractions are common, because limits are often written with few digits.
 LEAST_LOST = 1e-3
 
 
 def check_mimic(report: Reporter, robot: RobotRecord, *, enabled: bool) -> None:
-    """Report problems of mimic joints. If `enabled` is False, every finding is a note."""
     checker = _MimicChecker(report, robot.by_name, enabled)
     for joint in robot.joints:
         if joint.mimic is not None:
@@ -426,7 +411,7 @@ class _MimicChecker:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
-        """Check that the limits of a mimic joint allow the full range of the mimicked joint."""
+        """Report limits that do not allow the full range of the mimicked joint."""
         from urdfkin.model.configuration import allowed_range, range_words
         from urdfkin.model.tree import Limit
 
@@ -454,7 +439,7 @@ class _MimicChecker:
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
         """Return the combined rule of a chain of mimic joints, and the joint at the end of the chain.
 
-        The joint is None if the chain is a circle, or if the last rule names a joint that does not exist.
+        The joint is None if the chain is a circle or ends at a missing joint.
         """
         from urdfkin.model.tree import Mimic
 
@@ -470,7 +455,7 @@ class _MimicChecker:
 
 
 def _range_of(joint: JointRecord) -> tuple[float, float] | None:
-    """Return the limits of a joint (+- pi for a continuous joint), or None without valid limits."""
+    """Return the limits of a joint (+- pi for a continuous joint), or None."""
     if joint.kind == "continuous":
         return -math.pi, math.pi
     if joint.limit is None or joint.kind not in ("revolute", "prismatic"):
@@ -480,7 +465,6 @@ def _range_of(joint: JointRecord) -> tuple[float, float] | None:
 
 
 def _joints_in_loops(joints: dict[str, JointRecord]) -> set[str]:
-    """Return the names of all joints that are in a circle of mimic rules."""
     in_loops: set[str] = set()
     visited: set[str] = set()
     for start in joints:
@@ -520,7 +504,7 @@ NOTICEABLE = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi. The second number is the least number of decimals of a recognized rounded value.
+#: Multiples of pi, each with the least number of decimals of a rounded value that is reported.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -565,7 +549,7 @@ def _written_bounds(limit: LimitRecord) -> str:
 
 
 def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], reach: float) -> None:
-    """Report that an origin has rounded multiples of pi, and name the one with the largest error."""
+    """Report rounded multiples of pi in an origin; the message names the least accurate multiple."""
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
@@ -593,15 +577,15 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
 
 
 def _replace_words(raw: str | None, words: list[str]) -> str:
-    """Replace the words in the text of an attribute value, but keep the white space between the words."""
+    """Replace the words of an attribute value, but keep the white space."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
-    if len(blanks) != len(words) + 1:  # the text contains references such as `&#32;`
+    if len(blanks) != len(words) + 1:  # The text contains references such as `&#32;`.
         return " ".join(words)
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi (and its value) of which a decimal is probably a rounded value; else None.
+    """Return the multiple of pi, and its value, to which a decimal number is close, or None.
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -648,7 +632,6 @@ def _check_lengths(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_neutral(report: Reporter, joint: JointRecord) -> None:
-    """Report a joint (other than a mimic joint) whose limits exclude 0, the neutral joint value."""
     limit = joint.limit
     if limit is None or joint.kind not in ("revolute", "prismatic") or joint.mimic is not None:
         return
@@ -666,7 +649,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_places(report: Reporter, robot: RobotRecord) -> None:
-    """Report joints that have the parent, type, origin and axis of another joint."""
+    """Report joints with the parent, type, origin and axis of another joint."""
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL:

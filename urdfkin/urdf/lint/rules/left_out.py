@@ -39,13 +39,13 @@ REST_POSE = Rule("USD304", "rest-pose", WARNING)
 MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 
 
-#: Number of bytes at the beginning of a file in which elements are searched.
+#: Only this many bytes at the beginning of a file are searched for elements.
 _SEARCHED = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
 #: Tags of MJCF elements that findings mention without a name, each with the printed tag.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: Regular expression for a prim in a USD text file, or for a delimiter of other content.
+#: A prim in a USD text file, or a delimiter of other content.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
 #: Beginnings and ends of comments, arrays, strings and references in a USD text file.
 _NO_PRIM = {
@@ -60,11 +60,6 @@ _Places = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
 def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, ...]:
-    """Return a finding for each part of an MJCF file that the tree does not represent, and for each mistake.
-
-    The finding is a warning if the part affects the motion or is a probable mistake, otherwise a note. `file`
-    is the file's name in messages.
-    """
     parts = tuple(listed)
     places = _positions(data, _elements) if any(part.where for part in parts) else {}
     found = []
@@ -76,7 +71,6 @@ def of_mjcf(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, 
 
 
 def of_usd(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
-    """Return a finding for each remark about a USD stage; the finding names the path of the prim."""
     found = tuple(remarks)
     rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
     is_text = data.startswith(b"#usda") and any(one.where for one in found)
@@ -97,7 +91,7 @@ def _finding(
 
 
 def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
-    """Return the position of each element that `search` yields; of elements with one name, the first."""
+    """Return the position of each element; for equal names, the position of the first element."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_SEARCHED]):
         found.setdefault((element, name), (first, last))
@@ -112,10 +106,10 @@ def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | 
 
 
 def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
-    """Yield the tag, the name and the span (in bytes) of each MJCF element that a finding can name.
+    """Yield tag, name and span (in bytes) of each MJCF element that a finding can name.
 
-    The name of an equality without a name is its index among all equalities. If the file includes other
-    files, the index is unknown, and the equality is skipped.
+    The name of an equality without a name is its index. If the file includes other files, the index is
+    unknown, and the equality is skipped.
     """
     above, equalities, includes = list[str](), 0, False
     at = data.find(b"<")
@@ -149,14 +143,14 @@ def _elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
 
 
 def _prims(data: bytes) -> Iterator[tuple[str, str, int, int]]:
-    """Yield "prim", the path and the span (in bytes) of each prim in a USD text file, including variants."""
+    """Yield "prim", the path and the span (in bytes) of each prim in a USD text file."""
     above, prim, cursor, inside = list[str](), "", 0, 0
     while (found := _USDA.search(data, cursor)) is not None:
         cursor, token = found.end(), found[0]
         if found[1] is not None:
             prim = "/" + found[1].decode("utf-8", "replace")
             yield "prim", "".join(above) + prim, found.start(), found.end()
-        elif token in b"()":  # braces inside parentheses enclose dictionaries, not prims
+        elif token in b"()":  # Braces inside parentheses enclose dictionaries, not prims.
             inside += 1 if token == b"(" else -1
         elif token == b"{":
             above += [] if inside else [prim]
