@@ -191,7 +191,7 @@ def _program(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A table, its coordinates, and Pinocchio's poses of its tip in its base."""
+    """A table, some configurations, and Pinocchio's poses of the table's tip in the table's base."""
 
     name: str
     job: Job

@@ -97,7 +97,7 @@ class Worker:
 
 
 def work(seed: int, pipe: Connection) -> None:
-    """Run in the worker process: receive a family and a number, and send the outcome."""
+    """Run in the worker process: for each family and number that arrive, send the outcome."""
     from scripts.fuzzing.evaluate import evaluate
 
     nothing = os.open(os.devnull, os.O_WRONLY)

@@ -95,7 +95,7 @@ def imports() -> Mapping[str, frozenset[str]]:
 
 @cache
 def _reexported(package: str) -> frozenset[str]:
-    """Return names from a package's `__init__`; each hides a submodule of this name."""
+    """Return the names that a package's `__init__` imports; each name hides a submodule of equal name."""
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
@@ -105,7 +105,7 @@ def _reexported(package: str) -> frozenset[str]:
 
 
 def upwards() -> list[str]:
-    """List the imports of a package that comes later in the order."""
+    """List the forbidden imports: a package must not import a package that comes later in the order."""
     rank = {package.name: number for number, package in enumerate(PACKAGES)}
     return sorted(
         f"{module} imports {other}"

@@ -191,7 +191,7 @@ def acceleration_parts(figure: Any) -> None:
 
 
 def _named(axes: Any, at: FloatArray, along: FloatArray, name: str) -> None:
-    """Write a name beside an arrow, because colour alone is not enough."""
+    """Write a name to the right of an arrow, so that readers need not rely on the arrow's colour."""
     side = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     place = at[:2] + 0.04 * side
     axes.text(*place, name, ha="left" if side[0] > 0.0 else "right", va="center", fontsize=9)

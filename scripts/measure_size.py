@@ -20,7 +20,10 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 
 
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
-    """Return the sizes (bytes) of a package and its dependencies, but not of `without`."""
+    """Return the sizes (bytes) of a package and its dependencies.
+
+    The package `without` is left out, and so are the packages that only `without` needs.
+    """
     found: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()
     waiting = [(name, frozenset(extras))]
@@ -40,6 +43,7 @@ def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[st
 
 
 def own() -> int:
+    """Return the size (bytes) of urdfkin's unpacked wheel."""
     places = (ROOT / "urdfkin", ROOT / "robots", ROOT / "docs" / "questions.md")
     files = (file for place in places for file in (place.rglob("*") if place.is_dir() else (place,)))
     return sum(file.stat().st_size for file in files if file.is_file() and file.suffix != ".pyc")

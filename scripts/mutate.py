@@ -70,7 +70,7 @@ def _texts() -> dict[Path, str]:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Return tests that mention a module, then tests of its package."""
+    """Return tests that mention a module, then tests of its package or of the whole robot."""
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -192,7 +192,7 @@ def _run(change: dict[str, str], tests: list[str], timeout: float) -> tuple[str,
 
 
 def _ask(change: dict[str, str], tests: list[str], output: str) -> None:
-    """Run the tests on a mutant in this process, and exit with pytest's code."""
+    """Run the tests on a mutant in this process and its children, and exit with pytest's code."""
     import pytest
 
     hook = ROOT / "scripts" / "mutating" / "hook"

@@ -136,7 +136,7 @@ def _compared(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> Sa
 
 
 def _without_shapes(urdf: str, folder: Path) -> Path:
-    """Write a URDF without shapes, and with MuJoCo's lenient settings."""
+    """Write a URDF without shapes, and with MuJoCo's lenient settings, which other tools ignore."""
     robot = ElementTree.fromstring(urdf)
     for link in robot.iterfind("link"):
         for shape in [*link.iterfind("visual"), *link.iterfind("collision")]:

@@ -1,6 +1,7 @@
 #!/bin/sh
-# Run the fast tests with the versions that pyproject.toml allows. The first Python runs with the lowest version of
-# each library. Every Python runs with the newest versions. Each environment takes 1.5 GB below .versions.
+# Run the fast tests with the oldest and the newest versions that pyproject.toml allows. The first Python runs with
+# the lowest version of each library that pyproject.toml names. Every Python runs with the newest versions. Each
+# environment takes 1.5 GB below .versions.
 #
 #   scripts/test_versions.sh [PYTHON...]     default: python3.11 and what is found of 3.12, 3.13, 3.14
 cd "$(dirname "$0")/.." || exit 2

@@ -37,7 +37,7 @@ class Contender:
     library: str
     module: str
     calls: Callable[[Subject, str], Iterator[Calls]] | None = None
-    #: If a library has no function for batches, the benchmark calls the library in a loop.
+    #: None if the library has no function for batches; the benchmark then calls the library in a loop.
     batches: Callable[[Subject, str], Iterator[Work]] | None = None
     program: str | None = None  # The library needs this program.
 
@@ -69,7 +69,10 @@ class Contender:
 
 
 def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield the timed tasks for a batch, with different numbers of threads and output arrays."""
+    """Yield the timed tasks for a batch, with different numbers of threads and output arrays.
+
+    The task `FLOOR` computes nothing and only writes the output array.
+    """
     method, n = getattr(subject.robot, quantity), subject.n
     inputs = subject.inputs(quantity, n)
     out, own, floor = np.empty((3, n, *subject.width(quantity)))
@@ -88,7 +91,7 @@ def urdfkin_batches(subject: Subject, quantity: str) -> Iterator[Work]:
 
 
 def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> Iterator[Calls]:
-    """Yield the calls of the robot's method, of a prepared frame and of a compiled frame."""
+    """Yield the calls of the robot's method, of a prepared frame and, without checks, of a compiled frame."""
     robot, frame = subject.robot, subject.frame
     names = {"robot": robot, "frame": frame, "out": np.empty(subject.width(quantity))}
     names["prepared"] = robot.prepare(frame, verify=verify)
@@ -105,6 +108,7 @@ def urdfkin_calls(subject: Subject, quantity: str, *, verify: bool = False) -> I
 
 
 def pinocchio_calls(urdf: str, frame: str, quantity: str) -> Calls:
+    """Return the fastest calls of Pinocchio that compute a quantity."""
     model = pin.buildModelFromXML(urdf)
     names = {
         "model": model,
@@ -182,7 +186,10 @@ def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 
 
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of dynibo, which has rows [angular; linear] and joints in breadth-first order."""
+    """Yield the calls of dynibo, which has rows [angular; linear] and joints in breadth-first order.
+
+    dynibo returns matrices column by column.
+    """
     import dynibo
 
     robot = dynibo.Robot.from_urdf(str(subject.file))
@@ -329,7 +336,10 @@ _SINGLE = 1e-6
 
 
 def torch(subject: Subject, quantity: str) -> Iterator[Work]:
-    """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`."""
+    """Yield Jacobians of PyTorch Kinematics, with and without `torch.compile`.
+
+    PyTorch Kinematics has no function for accelerations.
+    """
     import pytorch_kinematics as pk
     import torch
 

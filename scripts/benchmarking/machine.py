@@ -102,7 +102,7 @@ def _memory(robot: str, frame: str, quantity: str, count: str, kind: str) -> dic
         few = tuple(x[:64] for x in inputs)
         with only("compiled"):
             method(*few, frame, verify=False, threads=2)  # This call loads compiled code and starts threads.
-        Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM.
+        Path("/proc/self/clear_refs").write_text("5")  # Writing 5 resets VmHWM, the maximum of VmRSS.
         before = _bytes("VmRSS")
         result = method(*inputs, frame, out=out, verify=False)
         taken = _bytes("VmHWM") - before + (out.nbytes if out is not None else 0)

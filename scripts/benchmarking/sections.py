@@ -233,7 +233,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     for line in (
         "q",  # A line without a call measures the time of the loop.
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # The check of the arrays rejects a tuple.
+        f"compute({q_v_a}, shape)",  # The array check rejects the tuple `shape`.
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",

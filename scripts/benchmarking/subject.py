@@ -79,7 +79,7 @@ _KEPT = ("origin", "parent", "child", "axis", "limit")
 def bare_urdf(urdf: str, *, flags: dict[str, str] | None = None) -> str:
     """Return a URDF with only the links and joints, without mimic rules, and with equal inertias.
 
-    Some libraries add a body `world`, so a link with this name is renamed.
+    Some libraries need inertias. Some libraries add a body `world`, so a link with this name is renamed.
     """
     whole = ET.fromstring(urdf)
     robot = ET.Element("robot", name=whole.get("name", "robot"))

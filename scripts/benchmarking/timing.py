@@ -23,6 +23,8 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Work:
+    """A timed task; `compute` uses the first `n` configurations of the subject."""
+
     who: str
     n: int
     compute: Callable[[], object]
@@ -59,7 +61,7 @@ class DifferenceError(Exception):
 
 
 def agree(works: Sequence[Work], reference: Work, what: str) -> None:
-    """Compute all results once; raise DifferenceError if one differs from `reference`."""
+    """Compute all results once as a warm-up; raise DifferenceError if one differs from `reference`."""
     if reference.result is None:
         raise ValueError("the reference has no result")
     reference.compute()
@@ -132,7 +134,7 @@ class Calls:
     who: str
     names: Mapping[str, Any]  # The lines use these variables, and `q`, `v` and `a`.
     lines: tuple[str, ...]  # The value of the last line is the result.
-    #: Lines that write the result of configuration k into `out[k]`; by default, the last line's value.
+    #: Lines that write the result of configuration k into `out[k]`; None writes the value of the last line.
     store: tuple[str, ...] | None = None
     #: Index in urdfkin of each coordinate of the library; None if the orders are equal.
     order: list[int] | None = None

@@ -25,7 +25,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a test, which is one of `GOOD` or the name of a failure, and details."""
+    """The outcome of a test: `word` is one of `GOOD`, or the name of a failure."""
 
     word: str
     details: str = ""

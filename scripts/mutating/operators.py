@@ -26,7 +26,7 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Change:
-    """One mutant: a new value in `home`, at a list index or in a field of a node."""
+    """One mutant: a new value at the index `place` of the list `home`, or in a field of the node `home`."""
 
     shown: ast.AST  # The text of this node is printed.
     home: Any
@@ -86,7 +86,7 @@ def function_at(tree: ast.Module, line: int) -> str:
 
 
 def rewritten(source: str, before: str, after: str) -> ast.Module:
-    """Return a file's tree with one text replaced; raise ValueError unless the text occurs once."""
+    """Return a file's tree with one text replaced; raise ValueError unless it occurs exactly once."""
     if source.count(before) != 1:
         raise ValueError(f"found {source.count(before)} times: {before}")
     return ast.parse(source.replace(before, after))

@@ -337,3 +337,14 @@ def test_planar_and_floating_joints_count_as_joints_without_limits(root_joint: s
     robot = urdfkin.load("planar_two_link", root_joint=root_joint, verify=False)
     assert urdfkin.same(robot, robot, bounds=False).unlimited == ("root_joint",)
     assert urdfkin.same("planar_two_link", "planar_two_link", bounds=False).unlimited == ()
+
+
+@pytest.mark.parametrize("single", ["revolute", "prismatic"])
+def test_a_joint_with_a_single_value_and_another_kind_in_b_is_a_difference(single: str) -> None:
+    def arm(kind: str) -> Robot:
+        lift = joint("lift", "revolute", "base", "arm", "", "0 0 1", limit())
+        ends = limit(0.5, 0.5) if kind == single else limit()
+        return loaded(urdf(lift, joint("last", kind, "arm", "tool", "", "0 1 0", ends)), verify=False)
+
+    found = urdfkin.same(arm("revolute"), arm("prismatic"))
+    assert [(one.place, one.what) for one in found.differences] == [("joint last", "kind")]

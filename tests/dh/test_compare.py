@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from urdfkin.dh.compare import compare, document
 from urdfkin.dh.convert import to_convention
 from urdfkin.errors import InputError, RangeError
 from urdfkin.model.chain import chain
-from urdfkin.model.tree import FloatArray, KinematicTree
+from urdfkin.model.tree import FloatArray, KinematicTree, Limit
 
 pytestmark = pytest.mark.slow
 
@@ -43,6 +44,16 @@ def test_tables_with_prismatic_joints_are_fitted(kinds: str) -> None:
     found = compare(chain(tree, "tip"), disguised(dh_table(tree, "tip"), 3))
     assert found.exact
     assert found.differences == ()
+
+
+def test_the_proven_bound_names_prismatic_joints_without_limits() -> None:
+    tree = elbow("PRRRRR")
+    endless, limit = chain(tree, "tip"), Limit(-0.3, 0.2, 1.0, 1.0)
+    first, *others = endless.joints
+    path = replace(endless, joints=(replace(first, limit=limit), *others))
+    texts = [document(compare(one, dh_table(tree, "tip")), units_of()).text() for one in (path, endless)]
+    assert "proven bound for all joint values within limits: " in texts[0]
+    assert "within limits, with j1 within 0.5 m of zero: " in texts[1]
 
 
 @pytest.mark.parametrize("seed", range(2))

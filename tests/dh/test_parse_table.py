@@ -232,7 +232,7 @@ def test_dh_prints_a_table_file_unchanged_or_converted(tmp_path: Path) -> None:
     "header", ["a;alpha,d,theta", "a,alpha;d,theta", "a_i;alpha,d,theta", "a|alpha,d,theta"]
 )
 def test_headings_with_mixed_separators_are_refused(header: str) -> None:
-    words = "the line of column headings has another separator than the other lines"
+    words = "the line of column headings uses a different separator from the other lines"
     with pytest.raises(InputError, match=words):
         table_from_text(f"# convention: standard\n{header}\n0,pi/2,0.1,0\n", ".csv")
 

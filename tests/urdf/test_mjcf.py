@@ -164,7 +164,7 @@ def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(tmp
     for words in (
         "equality 'curve': a constraint (g and f) that is not a linear relation of two joints",
         "equality 'glue': a constraint (weld of tip and base) that a tree cannot represent",
-        "tendons have no effect here",
+        "urdfkin ignores tendons",
         "joint 'root': qpos0 places this body at (0, 0, 1)",
         "joint 'out': a slide joint without limits",
         "2 actuators, 1 tendons",

@@ -4,10 +4,10 @@ A fit that is not plausible (`plausible.py`) is refused. Otherwise the parameter
 two standard deviations are fitted again and written. The other parameters keep their original values.
 
 `read_poses` reads measured poses. A CSV file has a column for each coordinate, with the coordinate's name.
-The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. Instead
-of position and orientation, the columns T00 to T23, or T00 to T33, may contain the pose matrix, as `urdfkin
-placement --format csv` writes it. An .npz file contains q (n, nq) and the poses: either T (n, 4, 4), or p (n,
-3) with an optional quat (n, 4), scalar last.
+The columns x, y, z contain the position. The optional columns qx, qy, qz, qw contain the orientation. The
+columns T00 to T23, or T00 to T33, can contain the pose matrix instead of position and orientation. The
+command `urdfkin placement --format csv` writes such matrices. An .npz file contains q (n, nq) and the poses:
+either T (n, 4, 4), or p (n, 3) with an optional quat (n, 4), scalar last.
 """
 
 from __future__ import annotations
@@ -57,22 +57,20 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general`.
 _GENERAL = 40
-#: A warning is given if the residuals differ from the stated noise by more standard deviations than this.
+#: Number of standard deviations between residuals and stated noise above which a warning is given.
 _UNLIKELY = 4.0
 #: Ratio of uncertainties (`Calibration.weak`) above which a parameter is poorly observable.
 _WEAK = 10.0
-#: Seed of the random configurations for `Calibration.weak`.
 _WEAK_SEED = 1
-#: The columns of J = Q R count as dependent if a diagonal entry of R is at most this fraction of the largest.
+#: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _DEPENDENT = 1e-12
 #: The robot's size divided by these numbers gives the coordinates of a target that lies on no joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding` for the comparison with Pinocchio.
-#: Pinocchio rounds more often: it reads the written file, and computes the poses of base and tip separately.
+#: Pinocchio rounds more often, because it reads the written file and computes base and tip separately.
 _READ_BACK = 4.0
 #: Maximum number of parameters or poses that a warning names.
 _NAMED = 6
-#: Message for a refused fit that no common mistake in the data explains.
 _NO_REASON = (
     "the reason is unknown: degrees, shifted rows of q or reversed signs of joints do not explain the error"
 )
@@ -178,10 +176,7 @@ class Calibration:
 
 
 class ImplausibleError(InputError):
-    """Error for a fit that is not plausible: the measured data or the model contain a gross mistake.
-
-    The attribute `calibration` is the refused calibration.
-    """
+    """The measured data or the model contain a gross mistake; `calibration` is the refused calibration."""
 
     def __init__(self, calibration: Calibration, remedy: str) -> None:
         model, plausibility = calibration.model, calibration.plausibility
@@ -286,10 +281,7 @@ def fitted_model(
     every: bool = True,
     check: bool = True,
 ) -> Calibration:
-    """Fit as `calibrate` does, but also return fits that are not plausible.
-
-    If `check` is False, the plausibility is not checked.
-    """
+    """Fit as `calibrate` does, but also return implausible fits."""
     robot = source if isinstance(source, Robot) else load(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
     model = (
@@ -321,7 +313,7 @@ def fitted_model(
 
 
 def _general_target(model: CalibrationModel) -> FloatArray:
-    """Return initial parameters (p,); a fitted target position lies on no joint axis."""
+    """Return start values (p,); a fitted position of the tool's target lies on no joint axis."""
     at = model.chain.start.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -336,7 +328,7 @@ def _values(model: CalibrationModel, robot: Robot, q: FloatArray) -> FloatArray:
 def _check_measured(
     robot: Robot, model: CalibrationModel, q: ArrayLike, poses: ArrayLike
 ) -> tuple[FloatArray, Measured]:
-    """Check `q` and `poses`; return the path's coordinates (samples, n), and the poses as `Measured`."""
+    """Check the arguments; return the path's coordinates (samples, n) and the measured poses."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
         path_q = model.coupling.checked(q, "q")
@@ -398,7 +390,6 @@ def _fit(
 
 
 def _significant(fit: FitWithData, stated: Noise | None) -> tuple[tuple[int, ...], Fit]:
-    """Return the parameters for the file, and their fit; base and tool are always included."""
     model, kept, found = fit.model, fit.identification.kept, fit.fitted
     is_end = [model.chain.parameters[k].end for k in kept]
     change = found.at[list(kept)] - model.chain.start[list(kept)]
@@ -420,9 +411,9 @@ def _add_identifiable(
 ) -> tuple[Identification, Fit]:
     """Add parameters that are identifiable at the fitted values, if they significantly reduce the residuals.
 
-    In special geometries, fewer parameters are identifiable; the original model often has such a geometry.
-    For example, if the tip lies on the last joint's axis, its position does not depend on the last joint's
-    angle.
+    Fewer parameters are identifiable in special geometries, and the original model often has such a geometry.
+    For example, if the tip lies on the last joint's axis, the tip's position does not depend on the last
+    joint's angle.
     """
     again = identify(model, measured.values, complete=measured.complete, at=found.at)
     more = again.rank - identification.rank
@@ -450,7 +441,6 @@ def _parse_noise(noise: tuple[float, float]) -> Noise:
 def _weak(
     robot: Robot, model: CalibrationModel, measured: Measured, kept: Sequence[int], at: FloatArray
 ) -> dict[int, float]:
-    """Return the poorly observable parameters, each with the ratio that `Calibration.weak` explains."""
     general = _values(model, robot, robot.sample(len(measured), seed=_WEAK_SEED))
     uncertainties = []
     for values in (measured.values, general):
@@ -464,9 +454,9 @@ def _weak(
 
 
 def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
-    """Compare the written model with Pinocchio at the measured configurations.
+    """Compare the written model with Pinocchio: a URDF at the measured configurations, a table at q = 0.
 
-    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison.
+    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison of a URDF.
     """
     model, fitted = found.model, found.written_fit
     if fitted is None:
@@ -474,7 +464,7 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
     at = fitted.at.copy()
     at[[p.end or p.what == "gain" for p in found.parameters]] = 0.0
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the first `load` gave these warnings
+        warnings.simplefilter("ignore")  # The first `load` gave these warnings.
         if (table := found.table) is not None:
             robot = load(table)
             robot.placement(robot.neutral(), robot.tip_frame)
@@ -494,7 +484,6 @@ def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Cer
 
 
 def doubts(found: Calibration) -> list[str]:
-    """Return the warnings about a calibration, one line each."""
     return list(_warnings(found))
 
 
@@ -552,7 +541,6 @@ _WRITTEN = 1e-3
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qx", "qy", "qz", "qw")
 _MATRIX = tuple(f"T{i}{j}" for i in range(3) for j in range(4))
 _LAST_ROW = tuple(f"T3{j}" for j in range(4))
-#: Units of measured positions, each with its length in metres.
 UNITS = {"m": 1.0, "mm": 1e-3}
 
 
@@ -566,16 +554,8 @@ def read_poses(
 ) -> tuple[FloatArray, FloatArray]:
     """Read configurations (s, nq), and poses (s, 4, 4) or positions (s, 3) in metres, from a file.
 
-    A file without the suffix .npz is read as CSV. A file that cannot be read raises SourceError, and wrong
-    content raises InputError.
-
-    Args:
-        path: The file.
-        coordinates: Names of the coordinates of q.
-        needed: Names of the required columns.
-        unit: Unit of the positions: "m" or "mm".
-        units: Unit of each coordinate, from `column_units`. The heading of a column may end with a unit.
-        rest: (nq,) values of coordinates without a column; None: zeros.
+    `needed` names the coordinates that a CSV file must contain. `rest` (nq,) contains the values of
+    coordinates without a column.
     """
     if path.suffix.lower() == ".npz":
         q, T = _archive(path, len(coordinates))
@@ -670,7 +650,7 @@ def _with_exact_rotations(T: FloatArray, where: str) -> FloatArray:
 
 
 def checked_poses(poses: ArrayLike) -> FloatArray:
-    """Return poses (s, 4, 4) or positions (s, 3) as an array; raise InputError for another shape."""
+    """Return poses (s, 4, 4) or positions (s, 3) as an array."""
     array = scalars(poses, "poses")
     if array.ndim == 2 and array.shape[1] == 3:
         return array

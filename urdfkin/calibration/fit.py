@@ -6,8 +6,8 @@ parameters. For each singular value, `urdfkin.verify.singular_values` computes a
 rounding errors into account (Weyl's inequality). The rank is the number of singular values with a positive
 lower bound, so no tolerance is needed.
 
-The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis, if the next
-frame compensates this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
+The frame of a revolute joint can be shifted along the joint's axis and rotated about the axis. The next frame
+can compensate this change. The frame of a prismatic joint can be shifted anywhere and rotated about the
 joint's direction. Therefore, 4 of the 6 parameters of each revolute joint are identifiable, and 2 of the 6
 parameters of each prismatic joint. All 6 parameters of the tip are identifiable (Everett, Driels and Mooring,
 1987). If only positions are measured, 3 fewer parameters are identifiable, because the tool's orientation is
@@ -18,8 +18,8 @@ has a column in the Jacobian. In each step, the elimination subtracts from each 
 projection onto the chosen columns. The length of the remainder measures how independent the column is. A
 column is a candidate if its remainder is at least half as long as the longest remainder. Among the
 candidates, the elimination keeps the first in the model's order of preference, and this parameter is fitted.
-As a result, a fitted parameter never becomes large only to replace a parameter that is not fitted. Without
-this choice, four parameters of nearly parallel axes would become hundreds of metres and cancel each other.
+Without this choice, four parameters of nearly parallel axes would become hundreds of metres and cancel each
+other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -30,22 +30,25 @@ and r the weighted residuals. The covariance of the parameters is
 The hat matrix is H = J C J^T. The redundancy of measurement i is 1 - H_ii.
 
 If you do not state the noise, it is estimated from the residuals, separately for positions and rotations. The
-variance of the positions is the sum of the squared position residuals, divided by the sum of the redundancies
-1 - H_ii of the measured position coordinates. The variance of the rotations is computed in the same way. The
-estimates are repeated until they are constant (Foerstner's variance components).
+variance of the positions is the sum of the squared position residuals, divided by the sum of their
+redundancies 1 - H_ii. The variance of the rotations is computed in the same way. The
+estimation is repeated until the estimates are constant (Foerstner's variance components).
 
 A pose is an **outlier** if r_i^T (1 - H_ii)^-1 r_i is too large. For a correct pose this number is chi^2
-distributed, with 3 degrees of freedom for a position and 6 for a full pose. The limit is chosen so that only
+distributed. A position has 3 degrees of freedom, and a full pose has 6. The limit is chosen so that only
 one of a hundred data sets without outliers exceeds the limit. One outlier can hide another, so each step
 removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
 
 **Start values.** Base and tool are computed from the poses before the fit. The robot's poses T_i, the
-measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. The equations R_B^T R_Mi = R_i R_X are
-linear in the two unknown rotations, which together form the null vector of the equations (Shah, 2013). The
-measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations x and b. If only
-positions are measured, the base and the position of the target on the tip are unknown. The equations for the
-base are linear if the target is known, and the equations for the target are linear if the base is known. The
-module therefore computes base and target alternately.
+measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i and R_X be the
+rotations of these poses. The equations R_B^T R_Mi = R_i R_X are linear in the unknown rotations R_B and R_X.
+Together, R_B and R_X form the null vector of these equations (Shah, 2013). Let p_i be the robot's positions.
+The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations: x of the tool and
+b of the base.
+
+If only positions are measured, the base and the position of the target on the tip are unknown. The equations
+for the base are linear if the target is known. The equations for the target are linear if the base is known.
+The module therefore computes base and target alternately.
 """
 
 from __future__ import annotations
@@ -66,11 +69,11 @@ from urdfkin.kinematics.roundings import NOT_ZERO
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.singular_values import singular_values
 
-#: A column is a candidate if its remainder is at least this fraction of the longest remainder.
+#: A Jacobian column is a candidate if its remainder is at least this fraction of the longest remainder.
 _AS_GOOD = 0.5
 #: Maximum number of fitted parameters that a message lists for one fixed parameter.
 _NAMED = 3
-#: A message lists a fitted parameter only if it has more than this fraction of the fixed parameter's effect.
+#: A message lists fitted parameters whose share of the fixed parameter's effect exceeds this fraction.
 _SHARE = 1e-6
 
 
@@ -79,9 +82,9 @@ class Identification:
     """The parameters that the measurements identify, and the parameters that stay fixed.
 
     Attributes:
-        kept: Indices of the fitted parameters. The effects of these parameters are linearly independent.
+        kept: Indices of the fitted parameters, which have linearly independent effects.
         still: Indices of the fixed parameters, each with the reason.
-        numbers: Total number of measured coordinates; a position has 3 coordinates, and a full pose has 6.
+        numbers: Number of all measured coordinates; a position has 3 coordinates, and a full pose has 6.
     """
 
     kept: tuple[int, ...]
@@ -90,17 +93,13 @@ class Identification:
 
     @property
     def rank(self) -> int:
-        """The number of identifiable parameters."""
         return len(self.kept)
 
 
 def stacked(
     model: CalibrationModel, values: FloatArray, *, complete: bool, at: FloatArray | None = None
 ) -> FloatArray:
-    """Return the Jacobian (rows, p) of all measured coordinates; the arguments are those of `identify`.
-
-    All entries are in metres: the rows for rotations are multiplied by the length `chain.size`.
-    """
+    """Return the dimensionless Jacobian (rows, p) of all measurements, with angles times `chain.size`."""
     L = model.chain.size
     _, columns = model.chain.columns(values, at)
     columns[:, 3:] *= L
@@ -112,10 +111,9 @@ def stacked(
 def identify(
     model: CalibrationModel, values: FloatArray, *, complete: bool = True, at: FloatArray | None = None
 ) -> Identification:
-    """Determine which parameters of a model are identifiable from the joint values (s, n).
+    """Determine which parameters are identifiable at the joint values (s, n) and the parameters `at` (p,).
 
-    `complete` is True if full poses are measured, and False if positions are measured. The Jacobian is
-    computed at the parameters `at` (p,), by default at the model's start values.
+    `complete` is True if full poses are measured, and False if only positions are measured.
     """
     J = stacked(model, values, complete=complete, at=at)
     error = np.full_like(J, model.chain.rounding(values))
@@ -160,12 +158,11 @@ def _reason(model: CalibrationModel, J: FloatArray, error: FloatArray, kept: Seq
 
 
 def first_names(names: Iterable[str], most: int) -> str:
-    """Return the first `most` names for a message, and how many more names there are."""
     every = list(names)
     return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
-#: A fit can be checked if its total redundancy is at least this number; the exact redundancy is an integer.
+#: Smallest total redundancy of a fit that can be checked; the exact total redundancy is an integer.
 _ONE_OR_MORE = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
 #: The residuals do not show pose errors along the eigenvectors of these eigenvalues.
@@ -178,7 +175,6 @@ _CONSTANT = 1e-3
 FALSE_ALARM = 0.01
 #: Number of standard deviations by which a parameter must change to be written.
 SIGMAS = 2.0
-#: Maximum fraction of outliers among all poses.
 _MOST_OUTLIERS = 0.25
 
 
@@ -247,7 +243,6 @@ class Fit:
 
     @property
     def is_judged(self) -> bool:
-        """Whether the redundancy is positive, so that the fit can be checked."""
         return self.freedom >= _ONE_OR_MORE
 
     @property
@@ -270,11 +265,7 @@ class Fit:
 
 
 def errors(model: CalibrationModel, measured: Measured, at: FloatArray) -> FloatArray:
-    """Return the residuals, measured minus computed: (s, 6) for poses or (s, 3) for positions.
-
-    Each row contains the position error (m) and, for full poses, the rotation error (rad), along the axes of
-    the base frame.
-    """
+    """Return the residuals (s, 3) of positions or (s, 6) of poses, in m and rad, along the base's axes."""
     return _residuals(measured, model.chain.poses(measured.values, at))
 
 
@@ -288,10 +279,7 @@ def _residuals(measured: Measured, T: FloatArray) -> FloatArray:
 def best_fit(
     model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, at: FloatArray
 ) -> Fit:
-    """Fit the parameters `kept` to measurements by least squares, from the start values `at` (p,).
-
-    If `noise` is None, the noise is estimated from the residuals.
-    """
+    """Fit the parameters `kept` by least squares, from the start values `at` (p,)."""
     problem = _LeastSquares(model, measured, list(kept), noise or Noise(1.0, 1.0 / model.chain.size))
     for _ in range(1 if noise else _ESTIMATES):
         at = problem.minimum(at)
@@ -328,7 +316,7 @@ def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> 
 
 @dataclass(frozen=True, eq=False)
 class _LeastSquares:
-    """The minimization of the residuals, divided by the noise, over the parameters `kept`."""
+    """The least-squares problem for the parameters `kept`; the residuals are divided by the noise."""
 
     model: CalibrationModel
     measured: Measured
@@ -336,13 +324,11 @@ class _LeastSquares:
     noise: Noise
 
     def residuals(self, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the residuals (rows,) divided by the noise, and the poses along the path."""
         frames = self.model.chain.frames(self.measured.values, at)
         errors = _residuals(self.measured, frames[:, -1])
         return (errors / self.noise.of(self.measured.complete)).ravel(), frames
 
     def jacobian(self, at: FloatArray, frames: FloatArray) -> FloatArray:
-        """Return the Jacobian (rows, k) of the fitted parameters, divided by the noise."""
         scale = self.noise.of(self.measured.complete)
         _, columns = self.model.chain.columns(self.measured.values, at, frames)
         J = columns[:, : len(scale), self.kept] / scale[:, np.newaxis]
@@ -357,7 +343,6 @@ class _LeastSquares:
         return least_squares(at, self.residuals, self.jacobian, moved)[0]
 
     def fit(self, at: FloatArray) -> Fit:
-        """Return the fit with the parameters `at`, without a minimization."""
         r, frames = self.residuals(at)
         J = self.jacobian(at, frames)
         k = self.noise.of(self.measured.complete).size
@@ -366,7 +351,7 @@ class _LeastSquares:
         Q, R = np.linalg.qr(J / units)
         half = np.linalg.solve(R, np.eye(len(R))) / units[:, np.newaxis]
         blocks = Q.reshape(len(self.measured), k, len(self.kept))
-        redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)  # the blocks 1 - H_ii
+        redundancy = np.eye(k) - blocks @ blocks.swapaxes(-1, -2)  # These are the diagonal blocks of I - H.
         own = r.reshape(-1, k)
         inverse = np.linalg.pinv(redundancy, rcond=_UNOBSERVED, hermitian=True)
         chi_squares = np.einsum("si,sij,sj->s", own, inverse, own)
@@ -378,7 +363,6 @@ class _LeastSquares:
 def outliers(
     model: CalibrationModel, measured: Measured, kept: Sequence[int], noise: Noise | None, found: Fit
 ) -> tuple[tuple[int, ...], Fit]:
-    """Return the indices of the outliers of a fit, and the fit without the outliers."""
     out = list[int]()
     # Without the outliers, there must still be more measured numbers than parameters.
     most = len(measured) - 1 - -(-len(kept) // found.errors.shape[1])
@@ -400,10 +384,9 @@ def outliers(
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
     """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
-    Each step resets the least significant parameter to its old value, and adjusts the other parameters by
-    their covariance with the reset parameter. The elimination ends when all remaining parameters are
-    significant. If the measurements determine only a combination of two parameters, one of these two
-    parameters remains selected. A `fixed` parameter is always selected. Unknown entries of the covariance are
+    Each step resets the least significant parameter to its old value. The covariance gives the resulting
+    change of the other parameters. If the measurements determine only a combination of two parameters, one of
+    the two remains selected. A `fixed` parameter is always selected. Unknown entries of the covariance are
     inf.
 
     >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
@@ -414,8 +397,7 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
         return ~free
     x, C = moved.copy(), covariance.copy()
     while (rest := np.flatnonzero(stays & free)).size:
-        # Rounding may make a small variance 0 or negative; a change of a parameter with this variance is
-        # significant.
+        # Rounding may make a small variance 0 or negative; the parameter then counts as significant.
         sizes = np.abs(x[rest]) / np.sqrt(np.maximum(C[rest, rest], NOT_ZERO))
         k = rest[int(np.argmin(sizes))]
         if sizes.min() > SIGMAS:
@@ -428,10 +410,7 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 
 
 def quantile(share: float, freedom: int) -> float:
-    """Return the quantile of the chi^2 distribution, by the approximation of Wilson and Hilferty (1931).
-
-    The relative error is a few per cent, even for probabilities close to 1.
-    """
+    """Return the chi^2 quantile by the approximation of Wilson and Hilferty (1931), to a few per cent."""
     step = 2.0 / (9.0 * freedom)
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
@@ -480,7 +459,6 @@ def _from_poses(
 
 
 def _from_positions(T: FloatArray, p: FloatArray, base: bool, tool: bool) -> tuple[FloatArray, FloatArray]:
-    """Compute the base, and the position of the measured target on the tip, from measured positions."""
     B, X = np.eye(4), np.eye(4)
     for _ in range(_REPETITIONS if base and tool else 1):
         if base:
@@ -523,7 +501,7 @@ def _translations(
 
 
 def demand_metres(model: CalibrationModel, measured: Measured) -> None:
-    """Raise InputError if the measured positions spread 100 times farther than those of the robot's tip."""
+    """Raise InputError if measured positions spread over 100 times farther than the robot's tip positions."""
     T = model.chain.poses(measured.values)
     ours, theirs = (
         float(np.linalg.norm(x - x.mean(axis=0), axis=1).max()) for x in (T[:, :3, 3], measured.p)

@@ -3,20 +3,20 @@
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
 origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
 an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
-joint's value by (1 + g). The derivative of the tip's pose with respect to g is the derivative with respect to
-the motion's angle or length, multiplied by the joint's value.
+joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the motion's angle or
+length, multiplied by the joint's value.
 
-**URDF.** Each joint of the path has six parameters of its origin. Let A be the rotation that maps the z axis
-to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the
-parameter z always shifts the origin along the joint's axis. A change of rz changes the zero position of a
-revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
-store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
-robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
-the tip's frame.
+**URDF.** Each joint of the path has six parameters of its origin. Let T be the joint's original origin, and
+let A be the rotation that maps the z axis to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z)
+Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the parameter z always shifts the origin along the joint's axis. A
+change of rz changes the zero position of a revolute joint. The other four parameters move the axis. The gain
+is a seventh parameter, which a URDF cannot store. `base` and `tool` have six parameters each. The path begins
+with the motions of `base`: the pose of the robot's base in the instrument's frame. The path ends with the
+motions of `tool`: the pose of the target in the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
 `PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
-parameters of other rows, and a tilt of the axis in any direction needs both alpha and beta.
+parameters of other rows. A tilt of the axis in any direction needs both alpha and beta.
 """
 
 from __future__ import annotations
@@ -80,10 +80,7 @@ class Drive(ElementaryMotion):
 class ParametricChain:
     """The pose of a tip as a function of parameters and joint values.
 
-    Attributes:
-        path: Constant transforms and elementary motions (`Drive`), from base to tip.
-        parameters: The parameters; each occurs once in the path.
-        start: (p,) values of the parameters in the original model.
+    Each parameter occurs once in the path. `start` (p,) contains the values in the original model.
     """
 
     path: Path
@@ -118,7 +115,7 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
-        `frames` is the result of the method `frames` for `values` and `at`, if the caller has computed it.
+        `frames`, if given, must be the result of the method `frames` for `values` and `at`.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
@@ -152,15 +149,13 @@ class ParametricChain:
 #: Parallel axes of a real arm deviate by some milliradians.
 PARALLEL = math.radians(5.0)
 
-#: Names of the sets of parameters.
 FITTED = ("base", "tool", "offsets", "origins", "gains")
 #: For each parameter of an origin: name, whether it is a rotation, and index of the coordinate axis.
 #: The motions are multiplied in this order.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
 #: Order in which parameters are fitted if their effects are equal, for revolute (True) and prismatic joints.
-#: The order of preference is: the joint's zero, motions that move the joint axis, motions that move only the
-#: frame.
+#: The joint's zero comes first, then motions of the joint axis, then motions of the frame only.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
@@ -168,15 +163,9 @@ _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")
 
 @dataclass(frozen=True, eq=False)
 class CalibrationModel:
-    """A parametric chain, with its parameters grouped by joint.
+    """A parametric chain whose parameters are grouped by joint, base and tool.
 
-    Attributes:
-        chain: The chain from base to tip.
-        groups: Indices of the parameters of each joint, base or tool, in order of preference.
-        coupling: The map from the path's coordinates to joint values.
-        base: Name of the base frame.
-        tip: Name of the tip frame.
-        source: The tree or table of the model.
+    Each group contains parameter indices in order of preference.
     """
 
     chain: ParametricChain
@@ -210,7 +199,6 @@ class CalibrationModel:
         return found
 
     def table(self, at: FloatArray) -> DHTable | None:
-        """Return the table with the parameter values `at`; None if the model describes a URDF."""
         if not isinstance(self.source, DHTable):
             return None
         cells = {(p.where, p.what): float(at[k]) for k, p in enumerate(self.chain.parameters) if not p.end}
@@ -277,7 +265,6 @@ class _ModelBuilder:
         ends: tuple[str, str],
         kept: Mapping[str, tuple[str, ...]],
     ) -> CalibrationModel:
-        """Return the model; `kept` lists the parameters of each joint in order of preference."""
         at = {(p.where, p.end, p.what): k for k, p in enumerate(self.parameters)}
         # Base and tool come first because they are unknown; the parameters of the joints are nearly known.
         owners = sorted(dict.fromkeys((p.where, p.end) for p in self.parameters), key=lambda one: not one[1])
@@ -290,11 +277,10 @@ class _ModelBuilder:
 
 
 def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -> CalibrationModel:
-    """Make a parametric model of a URDF's path; `fit` selects the sets of parameters.
+    """Make a parametric model of a URDF's path; `fit` names the sets of parameters.
 
     A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
-    parameters of the neighbouring moving joints have the same effect. An unknown frame or set raises
-    UnknownNameError; a planar or floating joint on the path raises InputError.
+    parameters of the neighbouring moving joints have the same effect.
     """
     path: FrameChain = chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
@@ -329,11 +315,7 @@ def _parameters_to_fit(fit: Collection[str], joint: Joint, *, is_last: bool) -> 
 
 
 def table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
-    """Make the model of a table; an unknown set of parameters raises UnknownNameError.
-
-    The set "origins" contains all cells. The set "offsets" contains the cells to which joint values are
-    added.
-    """
+    """Make a parametric model of a table; `fit` names the sets of parameters."""
     builder = _ModelBuilder(fit)
     builder.end("base")
     builder.steps.append(table.base)

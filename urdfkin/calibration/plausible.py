@@ -1,8 +1,8 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
-A fit always has some result, even if joint angles are in degrees, rows of q are shifted, or the sign of a
-joint is reversed. A fit is refused if its residuals are a large fraction of the robot's reach, or if it
-hardly improves the original model. A fit that tilts a joint's axis by a large angle, or that has no
+Joint angles in degrees, shifted rows of q or the reversed sign of a joint do not prevent a fit. A fit is
+refused if the residuals are a large fraction of the robot's reach, or hardly smaller than the residuals of
+the original model. A fit that tilts a joint's axis by a large angle, or that has no
 redundancy, is refused too. To find the reason, the module corrects common mistakes in the data, one at a
 time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest one.
 """
@@ -33,43 +33,36 @@ from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTr
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: An rms error is not plausible if it exceeds this fraction of the reach and this fraction of the positions'
-#: spread.
+#: An rms error above both fractions, of the reach and of the positions' spread, is not plausible.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: An rms error above both of these fractions, of the reach and of the error before the fit, is not plausible.
+#: An rms error above both fractions, of the reach and of the error before the fit, is not plausible.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
-#: If an rms error exceeds its limit, the fit is repeated to find common mistakes in the data. Limits:
-#: fraction of the reach, and rad.
+#: Root mean square errors (fraction of the reach, and rad) above which common mistakes are searched for.
 _SUSPECT, _SUSPECT_ORIENTATION = 0.002, 0.005
 #: Largest plausible tilt of a joint's axis (rad), and largest plausible gain.
 _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Difference of joint values (rad, m) below which two configurations count as one.
 _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is compared with a limit.
-#: Changes that the data determine poorly, such as the tilt of an axis near the target, then pass.
+#: Changes that the data determine poorly, such as the tilt of an axis near the target, are then accepted.
 _UNCERTAIN = 5.0
-#: Maximum ratio of the error after a correction to the error before it: for accepted fits, and for refused
-#: fits.
+#: Maximum error after a correction, divided by the error before: for accepted fits, and for refused fits.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted; the most promising corrections are fitted first.
+#: Number of corrections that are fitted, beginning with the most promising.
 _FITTED = 4
 #: Numbers of rows by which a correction shifts q relative to the poses.
 _SHIFTS = (1, -1, 2, -2)
-#: Return at most four names of joints for a message.
 _list = partial(first_names, most=4)
 
 
 @dataclass(frozen=True)
 class Plausibility:
-    """The reasons why a fit is refused.
+    """The reasons why a fit is refused; `reason` is the likeliest mistake and its remedy.
 
-    Attributes:
-        objections: A message for each reason; empty for a plausible fit.
-        reason: The likeliest mistake and its remedy; None if no correction makes the fit plausible.
-        is_in_degrees: Whether joint angles look like degrees although `radians` is false. The fit is then
-            always refused.
+    `reason` is None if no correction of the data makes the fit plausible. If `is_in_degrees` is True, the fit
+    is always refused.
     """
 
     objections: tuple[str, ...] = ()
@@ -79,16 +72,7 @@ class Plausibility:
 
 @dataclass(frozen=True, eq=False)
 class FitWithData:
-    """A fit with its model and its data.
-
-    Attributes:
-        model: The model with the fitted parameters.
-        q: (s, c) coordinates of the path.
-        measured: The poses that were measured at `q`.
-        identification: The identifiable and the fixed parameters.
-        before: The fit of only base and tool; all other parameters are fixed.
-        fitted: The fit of all identifiable parameters.
-    """
+    """A fit with its data; `q` (s, c) are path coordinates, and `before` is the fit of base and tool only."""
 
     model: CalibrationModel
     q: FloatArray
@@ -112,7 +96,7 @@ class FitWithData:
         return _norm(self.fitted.errors, reach) / math.sqrt(max(self.fitted.freedom, 1.0))
 
     def too_few(self) -> list[str]:
-        """Return a message if there are not more measured numbers than fitted parameters."""
+        """Return a message if the measured values have no redundancy, else an empty list."""
         steps = np.round(self.measured.values / _ONE_CONFIGURATION)
         distinct, each = len(np.unique(steps, axis=0)), self.fitted.errors.shape[1]
         rank = self.identification.rank
@@ -125,7 +109,6 @@ class FitWithData:
         ]
 
     def misfits(self) -> Iterator[str]:
-        """Yield a message if position residuals or orientation residuals are too large."""
         reach = self.reach
         (metres, radians), (metres_before, _) = self.fitted.rms(), self.before.rms()
         p = self.measured.p
@@ -142,7 +125,6 @@ class FitWithData:
             yield f"a large rms error of the orientations, {angle(radians)}"
 
     def extreme_parameters(self) -> Iterator[str]:
-        """Yield a message if fitted tilts or gains are larger than those of any real robot."""
         tilted, gained = dict[str, str](), dict[str, str]()
         for parameter, change, least in self._changes():
             if parameter.what in ("rx", "ry", "alpha", "beta") and least > _LARGEST_TILT:
@@ -168,11 +150,7 @@ class FitWithData:
         ]
 
     def _changes(self) -> Iterator[tuple[Parameter, float, float]]:
-        """Yield each fitted parameter of a moving joint, its change, and a lower bound of the change's size.
-
-        The lower bound is the absolute value of the change, minus `_UNCERTAIN` standard deviations. If only
-        positions were measured, joints with an axis near the tip of the original model are skipped.
-        """
+        """Yield each fitted parameter of a moving joint, its change, and a lower bound of |change|."""
         model, fitted = self.model, self.fitted
         near = set[str]()
         if not self.measured.complete:
@@ -190,10 +168,7 @@ class FitWithData:
 
 
 def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
-    """Check whether a fit is plausible, and find the likeliest mistake if it is not.
-
-    The argument `radians` is true if large joint angles are known to be radians.
-    """
+    """Check whether a fit is plausible, and find the likeliest mistake if it is not."""
     few = fit.too_few()
     misfits = [*fit.misfits(), *fit.extreme_parameters()]
     like_degrees, outside = _out_of_range(fit.model, fit.q)
@@ -222,7 +197,6 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
 
 
 def _out_of_range(model: CalibrationModel, q: FloatArray) -> tuple[list[str], list[str]]:
-    """Return joints with values that look like degrees, and other joints with values far outside limits."""
     like_degrees, outside = list[str](), list[str]()
     for (name, is_angle, lower, upper), column in zip(_coordinates(model), q.T, strict=True):
         largest = float(np.abs(column).max(initial=0.0))
@@ -254,7 +228,7 @@ def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, fl
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """Configurations with one possible mistake corrected, for the poses `first` to `last`."""
+    """Configurations with one possible mistake corrected; they belong to the poses [first:last]."""
 
     reason: str
     q: FloatArray
@@ -300,7 +274,6 @@ def _with_signs(model: CalibrationModel, q: FloatArray, signs: FloatArray) -> _C
 
 
 def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
-    """Return the first correction that gives a plausible fit with an error below the limit; else None."""
     trials = [_Trial(fit, correction) for correction in _corrections(fit.model, fit.q)]
     trials.sort(key=lambda trial: trial.error_before)
     for trial in trials[:_FITTED]:
@@ -311,11 +284,7 @@ def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
 
 
 def _several_signs(fit: FitWithData) -> _Trial | None:
-    """Try two or more reversed signs.
-
-    Each step reverses the joint whose reversal gives the smallest error of a fit of only base and tool. The
-    search ends when no reversal reduces the error.
-    """
+    """Reverse signs of joints one by one while the error decreases; return None for fewer than two."""
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
     for _ in signs:
@@ -344,7 +313,6 @@ class _Trial:
 
     @cached_property
     def fit(self) -> FitWithData:
-        """The fit of all identifiable parameters."""
         model, measured = self.original.model, self.measured
         noise = Noise(1.0, 1.0 / self.original.reach)
         ends = [k for k in self.original.identification.kept if model.chain.parameters[k].end]
@@ -364,7 +332,7 @@ class _Trial:
 
 
 def _norm(residuals: FloatArray, reach: float) -> float:
-    """Return the norm of residuals (s, 6) or (s, 3), metres; angles are multiplied by the reach."""
+    """Return the norm (m) of residuals (s, 6) or (s, 3); angles are multiplied by the reach."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))
 
 

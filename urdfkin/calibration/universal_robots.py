@@ -9,7 +9,7 @@ joint: x, y, z, roll, pitch and yaw.
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
 Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn and another angle is small (1e-5 to 1e-4 rad), the
-two products differ by the small angle. The order "driver" agrees with the robot's controller. With the order
+products differ by the small angle. The order "driver" agrees with the robot's controller. With the order
 "urdf", the result agrees with the URDF that the ROS package generates from the file.
 """
 
@@ -51,22 +51,15 @@ ORDERS = {"driver": "XYZ", "urdf": "xyz"}
 _SIX = ("x", "y", "z", "roll", "pitch", "yaw")
 #: Number of random configurations for the fit of the origins, and for its check.
 _CONFIGURATIONS = 40
-#: Seeds of these random configurations.
 _FIT_SEED, _CHECK_SEED = 2, 3
 #: Largest residual of the fit, in metres and in radians.
 #: The numbers in the file have nine digits, and rounding causes residuals of this size.
 _MOST_RESIDUAL = 1e-8
-#: Number of configurations on which two calibrations are compared.
 _COMPARED = 1000
 
 
 def read_calibration(path: Path, order: str = "driver") -> dict[str, FloatArray]:
-    """Read the (4, 4) origin of each joint; the keys are joint names without a prefix.
-
-    The file is the driver's YAML, or a `default_kinematics.yaml` of its robot description. A file that cannot
-    be read raises SourceError. A file that is not a calibration, or lacks a link or a number, raises
-    InputError. An order other than "driver" and "urdf" raises UnknownNameError.
-    """
+    """Read the origin (4, 4) of each joint from the driver's YAML, or from a `default_kinematics.yaml`."""
     if order not in ORDERS:
         raise UnknownNameError("order of rotations", order, ORDERS)
     try:
@@ -103,7 +96,6 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
 
 
 def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
-    """Return the calibrated arm as a tree: `base` to `tool0`, six revolute joints about z."""
     z, rows, parent = np.array([0.0, 0.0, 1.0]), [], "base"
     for joint, T in origins.items():
         child = "tool0" if joint == "wrist_3_joint" else f"{joint}_link"
@@ -115,11 +107,9 @@ def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all six joints turn about z, as in the current ROS description, the joint origins are replaced by the
-    origins in the calibration file. In other URDFs, for example of the older ROS description, the joint
-    origins are fitted, so that the poses of `tool0` in `base` are those of the calibrated arm. A robot that
-    is not a Universal Robots arm raises InputError; a wrong file raises the same errors as in
-    `read_calibration`.
+    If all six joints turn about z, as in the current ROS description, the file's origins replace the joint
+    origins. In other URDFs, such as the older ROS description, the joint origins are fitted. After the fit,
+    the poses of `tool0` in `base` are those of the calibrated arm.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)
@@ -194,7 +184,10 @@ def _verify_written(result: Rewritten, calibrated: FrameChain, prefix: str) -> C
 
 
 def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> tuple[float, float]:
-    """Return the largest distance (m) and angle (rad) between two arms' `tool0` at sampled configurations."""
+    """Return the largest sampled distance (m) and angle (rad) between the `tool0` frames of two arms.
+
+    The angle is computed as 2 sin(angle / 2), which is accurate only for small angles.
+    """
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
     q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)

@@ -34,11 +34,10 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """Return the URDF's bytes with new joint origins; `origins` contains them (4, 4) by joint name.
 
     A number that is unchanged up to rounding keeps its digits. A rotation has several triples of roll, pitch
-    and yaw angles; the triple nearest to the old angles is written. Errors in the text, or a joint that does
-    not exist, raise InputError.
+    and yaw angles; the triple nearest to the old angles is written.
     """
     report = Reporter("<text>", data)
-    urdf = read_urdf(report, mimic=False)  # mimic rules do not affect origins
+    urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
     if urdf is None or report.failed:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
         raise InputError("a URDF with errors is not edited", found=str(errors[0]))
@@ -105,21 +104,18 @@ class Rewritten:
 
     @cached_property
     def text(self) -> bytes:
-        """The original text of the URDF with the new origins; every other byte is unchanged."""
         return with_origins(self.robot.urdf.encode(), self.origins)
 
     @cached_property
     def loaded(self) -> Robot:
-        """The robot of the new text, loaded with the same options as the original."""
         mimic = self.robot.verifier.mimic
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the first load gave these warnings
+            warnings.simplefilter("ignore")  # The first load gave these warnings.
             lock = dict(self.robot.origin.lock)
             return load(self.text, mimic=mimic, root_joint=self.robot.root_joint, lock=lock)
 
     @cached_property
     def changes(self) -> Changes:
-        """The changes, as listed by `urdfkin.diff`."""
         return diff(self.robot, self.loaded)
 
     @cached_property

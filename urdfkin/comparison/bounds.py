@@ -60,7 +60,8 @@ class DistanceSearch:
     """Search for the configurations at which two aligned robots differ most.
 
     If `as_written` is true, the pose of B's root in A's root frame is constant. Otherwise, the pose of B's
-    base link in the frame of A's base link is constant.
+    base link in the frame of A's base link is constant. The base links are the two links at which the search
+    for matching joints starts.
     """
 
     def __init__(
@@ -97,7 +98,10 @@ class DistanceSearch:
         )
 
     def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return configurations (n, nq) of A and B; `moved` draws planar and floating joints at random."""
+        """Return configurations (n, nq) of A and B for values `z` (n, variables).
+
+        A's planar and floating joints are neutral, or random if `moved` is true.
+        """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
         q_a = sample(tree_a, len(z), self.rng) if moved else np.tile(neutral(tree_a), (len(z), 1))
@@ -220,9 +224,9 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        flat = z.reshape(
-            math.prod(z.shape[:-1]), z.shape[-1]
-        )  # NumPy rejects the size -1 for an empty array.
+        """Return distances (frames, starts, values), m, for `z` (frames, starts, values, variables)."""
+        # NumPy rejects the size -1 for an empty array.
+        flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
         distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
         n = np.arange(len(frames))
         return np.asarray(distances[n, :, :, n])
@@ -256,14 +260,17 @@ def pinocchio_poses(robot: Robot, q: FloatArray, frames: Sequence[str]) -> Float
     return robot.verifier.oracle().placements(QueryBatch(frames, (q,)))
 
 
-#: Maximum number of boxes in memory; one frame then takes one or two seconds.
+#: Maximum number of boxes in memory. The search for the bound of one frame then takes one or two seconds.
 MOST_BOXES = 2**17
 #: Number of boxes in one batch; the Jacobians of more boxes would take gigabytes of memory.
 BATCH = 2**16
 
 
 class Boxes:
-    """Upper bounds on the distance between a frame's origins in A and B, for boxes of configurations."""
+    """Upper bounds on the distance between a frame's origins in A and B, for boxes of configurations.
+
+    `names` must contain every variable that changes the distance.
+    """
 
     def __init__(self, search: DistanceSearch, frame: FramePair, names: Sequence[str]) -> None:
         self.search = search
@@ -289,7 +296,7 @@ class Boxes:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
 
     def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
-        """Bound the first-order part of the distance in boxes with middles `c` and half widths `h`."""
+        """Bound |D + sum_i D_i x_i|, (n,), in boxes with middles `c` (n, variables) and half widths `h`."""
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
         along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
@@ -323,8 +330,8 @@ def tighten(
 ) -> float:
     """Prove an upper bound (m) on a frame's distance, with at most `most` boxes in memory.
 
-    `upper` is a proven bound, and is returned if no smaller bound is proven. The search for smaller bounds
-    ends at `target`.
+    `upper` must be a proven bound. The function returns the smallest bound that it proves, or `upper`. The
+    search ends when it proves `target`.
     """
     variables = search.variables
     steps, pairs = relevant_joints(search.alignment, variables, frame)

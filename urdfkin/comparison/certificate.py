@@ -232,7 +232,8 @@ def words_of(entry: DifferenceEntry) -> str:
 def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models, and return a line of text for each wrong statement.
 
-    If the verdict is "differs", the function also searches for other pairs of joints that agree better.
+    The check uses the pairs of joints that the certificate states. If the verdict is "differs", the function
+    also searches for other pairs of joints, for which the models do not differ.
     urdfkin and Pinocchio both compute the distance of each lower bound. Each upper bound is proven again.
 
     Raises:

@@ -111,10 +111,13 @@ class Changes:
     """The changes between two versions of a description; the result of `urdfkin.diff`.
 
     Attributes:
+        sources: The sources of the old and the new version, as the user gave them.
+        changes: The changes of the robot's name, then of joints, then of links, in the order of the file.
         effects: For each joint whose changes move links, the effect if only this joint is changed.
         total: The frame with the largest displacement if all changes are applied; None if no frame moves.
-        rounding: Bound (m, rad) on the pose error from the single precision of USD files. `changes` omits
-            this error. None if the files also have other differences; infinite if the bound was not computed.
+        rounding: (m, rad) bound on the pose error that the single precision of USD files causes in any frame.
+            `changes` does not list this error. None if the files also have other differences; infinite if the
+            bound was not computed.
     """
 
     sources: tuple[str, str]
@@ -128,6 +131,7 @@ class Changes:
 
     @property
     def effect_of(self) -> dict[str, Effect]:
+        """The effect for each changed joint, by the element's name, for example "joint elbow"."""
         return {effect.element: effect for effect in self.effects}
 
 
@@ -216,6 +220,7 @@ def _changes_of(result: Sameness, formats: tuple[str, str]) -> Iterator[ModelCha
 
 
 def _differences_in_size(result: Sameness) -> Iterator[ModelChange]:
+    """Yield the differences that `same` finds if the models cannot be compared joint by joint."""
     if result.up_to_single or (result.unexplained and all(one.what for one in result.unexplained)):
         return
     listed = {one.place for one in result.unexplained if one.what}

@@ -42,7 +42,10 @@ _MOST_CHARACTERS = 200
 
 @dataclass(frozen=True, slots=True)
 class ReaderDifference:
-    """A joint that a library reads differently; `size` is the largest difference in its pose."""
+    """A joint that a library and urdfkin read differently.
+
+    `size` is the largest difference between entries of the child link's pose in the parent link's frame.
+    """
 
     joint: str
     element: str
@@ -176,7 +179,7 @@ def _reading(
 
 
 def _source(robot: Robot) -> tuple[str, str]:
-    """Return a library's input (a URDF text, or an MJCF or USD path) and its format."""
+    """Return a library's input (a URDF text without shapes, or an MJCF or USD path) and its format."""
     source = robot.origin.source
     if is_usd(source):
         if robot.origin.variants or robot.origin.articulation is not None:
@@ -233,7 +236,11 @@ def _differences(
 def _cause(
     joint: Joint, T: FloatArray, T_theirs: FloatArray, element: Any, own: Sequence[str], tolerance: float
 ) -> tuple[str, str]:
-    """Return the element that causes a difference, and a description; the first pose is at q = 0."""
+    """Return the element that causes a difference, and a description of the difference.
+
+    `T` (urdfkin) and `T_theirs` (library) are poses of the child link in the parent link's frame. The first
+    pose is at q = 0.
+    """
     difference = np.abs(T - T_theirs)
     if joint.mimic is not None:
         is_free = np.abs(T_theirs - joint.T_parent_joint).max() <= tolerance

@@ -63,9 +63,11 @@ BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
 
 @dataclass(frozen=True, slots=True)
 class SameQuestion:
-    """The question whether two models are equivalent, or within a distance (m and rad) of each other.
+    """The question whether two models are equivalent, or whether their frames are close enough.
 
-    With `strict`, changes of B and remarks count as differences.
+    `within` is the largest allowed distance (m) and angle (rad) between matching frames of the unchanged
+    models. With None, the question is whether the models are equivalent. With `strict`, changes of B and
+    remarks count as differences.
     """
 
     within: float | None = None
@@ -74,10 +76,20 @@ class SameQuestion:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """Bounds on the largest distance between matching frames, over all configurations within limits.
+    """An interval that contains the largest distance between a frame of A and the matching frame of B.
 
-    `lower` is the distance (m) at `q_a` and `q_b`, less the rounding error. `radians_seen` is the angle at
-    `q_a` and `q_b`. `upper` (m; inf without a bound) and `radians` are proven upper bounds.
+    The largest distance is taken over all configurations within the joint limits.
+
+    Attributes:
+        frame: The link of A.
+        frame_b: The link of B.
+        lower: Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding
+            error.
+        upper: Proven upper bound of the distance, metres; inf if there is no bound.
+        radians: Proven upper bound of the angle between the two orientations of the frame.
+        radians_seen: The angle between the two orientations at `q_a` and `q_b`.
+        q_a: Configuration of A.
+        q_b: The corresponding configuration of B.
     """
 
     frame: str
@@ -101,8 +113,12 @@ class Difference:
     Attributes:
         place: The joint or link of A, for example "joint elbow".
         what: The parameter: "axis", "place", "mimic rule", "only in A", ...
+        a: The parameter's value in A. None if the parameter has no value, for example a missing limit.
+        b: The parameter's value in B. None if the parameter has no value.
+        radians: Angular part of the difference, radians; 0 if the difference has no angular part.
+        metres: Linear part of the difference, metres; 0 if the difference has no linear part.
         detail: "alone" if the joint's axis differs, but the links after the joint agree. "converted" if the
-            limits of B are in A's coordinate. Otherwise empty.
+            limits of B were converted to the coordinate of A. Otherwise empty.
     """
 
     place: str
@@ -115,6 +131,7 @@ class Difference:
 
     @property
     def values(self) -> tuple[str | float | None, str | float | None]:
+        """The parameter's values in A and in B, as numbers or words; None if a model has no value."""
         if self.what == "limits":
             return _range(self.a), _range(self.b)
         if self.what == "idle":
@@ -124,6 +141,7 @@ class Difference:
 
     @property
     def words(self) -> str:  # noqa: PLR0911, PLR0912  each kind of difference has its own return
+        """The difference as one line of text."""
         place, what, a, b = self.place, self.what, self.a, self.b
         match what:
             case "axis":
@@ -190,11 +208,13 @@ class JointDifference:
     """A difference at one joint or link that is too large to be caused by rounding.
 
     Attributes:
+        place: The joint or link of A, for example "joint elbow".
         what: The parameter: "origin", "axis", "mimic multiplier", "mimic offset", "mimic joint" or "base";
             empty if the models cannot be compared at this joint or link.
-        b: The parameter's value in B. If `a` is None, the text states the size of the difference, or why the
-            models cannot be compared here.
-        explained: The largest difference that rounding can cause; empty if no number is rounded.
+        a: The parameter's value in A; None if `b` contains no value.
+        b: The parameter's value in B. If `a` is None, `b` is a text: the size of the difference, or the
+            reason why the models cannot be compared here.
+        explained: A text with the largest difference that rounding can cause; empty if no number is rounded.
     """
 
     place: str
@@ -211,7 +231,10 @@ class JointDifference:
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """Matched links that `same` reports as different tools; `pose` (4, 4) is B's link in A's link frame."""
+    """Two matched links that `same` reports as different tools (end-effector frames).
+
+    `pose` (4, 4) is the pose of B's link `b` in the frame of A's link `a`.
+    """
 
     a: str
     b: str
@@ -227,7 +250,11 @@ _WORDS = {"not asked": "not checked by Pinocchio", "not verified": "not verified
 
 @dataclass(frozen=True, slots=True)
 class Confirmation:
-    """Pinocchio's confirmation; `metres` is the largest distance that Pinocchio computed."""
+    """Pinocchio's confirmation of the bounds, or the reason why there is none.
+
+    `metres` is the largest distance that Pinocchio computed; `configurations` is the number of
+    configurations.
+    """
 
     state: ConfirmationState
     by: str = ""
@@ -244,9 +271,10 @@ class Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class JointMap:
-    """Joints that match: value_b = sense * value_a + offset (rad, m).
+    """A joint of A and the matching joint of B: value_b = sense * value_a + offset (rad, m).
 
-    `conversion` converts the pose of a planar or floating joint, if A and B define different joint frames.
+    For a planar or floating joint, `sense` is 1 and `offset` is 0. If A and B define the joint's frames
+    differently, `conversion` converts the pose in A to the pose in B.
     """
 
     a: str
@@ -540,7 +568,11 @@ class Sameness(Displayable):
 
 
 def length(metres: float) -> str:
-    """Return a length as text with a unit prefix, for example "1.9 mm"."""
+    """Return a length as text with a unit prefix.
+
+    >>> length(0.0019), length(math.inf)
+    ('1.9 mm', 'without bound')
+    """
     return _with_prefix(metres, "m")
 
 
@@ -572,7 +604,11 @@ def _with_prefix(value: float, unit: str) -> str:
 
 
 def size_words(metres: float, radians: float) -> str:
-    """Return text such as "1.9 mm off and turned by 0.3 mrad"."""
+    """Return the size of a difference as text; a part that is 0 is omitted.
+
+    >>> size_words(0.0019, 0.0003), size_words(0.0, 0.0003)
+    ('1.9 mm off and turned by 0.3 mrad', 'turned by 0.3 mrad')
+    """
     parts = [f"{length(metres)} off"] if metres else []
     parts += [f"turned by {angle(radians)}"] if radians else []
     return " and ".join(parts)
@@ -589,10 +625,10 @@ def demand_joint_names(tree: KinematicTree, names: list[str], which: str) -> Non
 def changes_of_b(
     alignment: Alignment, rounding: Tolerance, *, tables: bool = False
 ) -> tuple[tuple[str, str], ...]:
-    """Return the changes that make B equal to A, as (kind, text); set the tools in `alignment`.
+    """Return the changes that make B equal to A, as (kind, text).
 
-    With `tables`, every frame that differs counts as a tool. The frames of a Denavit-Hartenberg table depend
-    on its convention.
+    The function also stores the tool poses in `alignment`. With `tables`, every frame that differs
+    counts as a tool, because the frames of a Denavit-Hartenberg table depend on the table's convention.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -627,7 +663,11 @@ def changes_of_b(
 
 
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
-    """Yield the changed tools: frames without children, and frames of the robot's mounting."""
+    """Yield ("tools", text) for each tool whose pose differs.
+
+    A frame without children counts as a tool. A frame that only describes the robot's mounting also counts
+    as a tool.
+    """
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
         is_mount = (frame.a, frame.b) in mounts
@@ -709,6 +749,7 @@ def _rounded(x: float, rounding: float) -> float:
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
+    # A mimic joint with the multiplier 0 can be stored as a fixed joint, but the child link is not a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
             return False
@@ -793,7 +834,10 @@ def remarks(
     *,
     as_written: bool = False,
 ) -> tuple[Difference, ...]:
-    """Return differences without effect on motion; `single` is the relative error of single precision."""
+    """Return the differences that do not affect motion.
+
+    `single` is the relative error of a number in single precision, or 0.
+    """
     some = list[Difference]()
     for step in alignment.steps:
         if not step.unlike:
@@ -836,7 +880,8 @@ def limit_differences(
     """Yield the differences between two joints' kinds and limits.
 
     `tolerance` is relative to the larger of 1 (rad or m) and the limit's absolute value. `single` is the
-    relative error of a limit. `zero` is (sign, offset): value in B = sign * (value in A) + offset.
+    relative error of a limit in single precision, or 0. `zero` is (sign, offset), with
+    (value in B) = sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

@@ -297,7 +297,8 @@ class Comparator:
     def _compared_links(self, alignment: Alignment) -> list[tuple[int, int]]:
         links = self.trees[0].links, self.trees[1].links
         pairs = ((frame.a, frame.b) for frame in alignment.frames)
-        # In a Denavit-Hartenberg table, the poses of links with other names depend on the convention.
+        # The poses of a Denavit-Hartenberg table's frames depend on the table's convention.
+        # For a table, only links with equal names in A and B are therefore compared.
         return [(a, b) for a, b in pairs if not self.has_table or links[0][a] == links[1][b]]
 
     def _check_map(self, alignment: Alignment) -> None:
@@ -404,6 +405,7 @@ class Comparator:
         search = self.search(written, variables, as_written=True)
         distances = search.sampled_distances(written.frames)[0].max(axis=0)
         far = [written.frames[k] for k in np.argsort(-distances, kind="stable")[:FARTHEST]]
+        # If no position differs, the frame with the largest angle counts.
         if distances.max() <= metres:
             far = [max(written.frames, key=lambda frame: upper_bounds(written, variables, frame)[1])]
         worst = zip(search.largest_distances(far), far, strict=True)
@@ -706,6 +708,7 @@ class JointComparison:
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
             yield JointDifference(name, "", None, "is carried by other joints in the other model")
             return
+        # `paths[1][0]` contains the joints of B between the common ancestor and P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
             yield JointDifference(name, "", None, "is carried by joints without a common link between them")
             return
@@ -736,6 +739,7 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
+        """Return the angle (rad) between two axes, and the distance (m) of a point of one from the other."""
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 
@@ -765,7 +769,7 @@ class JointComparison:
         return screws, T_P_common @ T, errors_in_P()
 
     def _errors_after(self, which: int, joint: int, errors: FloatArray) -> FloatArray:
-        """Return the error bounds (m, rad) after a joint; `errors` are the bounds before it."""
+        """Return the error bounds (m, rad) after a joint; `errors` are the bounds before the joint."""
         metres, radians = self.errors[which][joint, :2]
         lever = self.trees[which].joints[joint].length
         return np.array([errors[0] + errors[1] * lever + metres, errors[1] + radians])

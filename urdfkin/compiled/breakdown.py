@@ -1,9 +1,9 @@
 """The acceleration of a frame as a sum of contributions, one for each joint and each kind of acceleration.
 
 Consider joint k, and assume that all later joints are fixed. The frame's origin then moves relative to link
-k-1 with the velocity u_k, which is v_k z x d for a revolute joint k and v_k z for a prismatic joint k. Link
-k-1 itself rotates with the angular velocity w_{k-1}. Equation 7.125 gives the acceleration of a moving point
-in a moving frame. Equation 7.130 is the sum of its terms over all joints:
+k-1 with the velocity u_k. The velocity u_k is v_k z x d for a revolute joint, and v_k z for a prismatic
+joint. Link k-1 itself rotates with the angular velocity w_{k-1}. Equation 7.125 gives the terms of the
+acceleration of a moving point in a moving frame. Equation 7.130 is the sum of these terms over all joints:
 
 | kind | term | cause |
 |---|---|---|
@@ -13,7 +13,8 @@ in a moving frame. Equation 7.130 is the sum of its terms over all joints:
 | sliding | a_k z | acceleration of a prismatic joint |
 
 The vector d from the joint's origin to the frame's origin is the sum of the interorigin vectors after the
-joint (7.110). A difference of two positions in the world would lose digits far from the world's origin.
+joint (7.110). A difference of two positions in the world would lose digits if the robot
+is far from the world's origin or has a long link.
 
 The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
 planar or floating joint with the linear velocity s and the angular velocity o has one more Coriolis term,
@@ -46,10 +47,14 @@ _MOST_SHOWN = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AccelerationBreakdown(Displayable):
-    """Contributions of the joints to a frame's acceleration; six-vectors are [linear; angular].
+    """Contributions of the joints to a frame's acceleration.
 
-    `base` (..., 6) is the acceleration that the frame would have if only the base moved. `terms` (...,
-    joints, 4, 6) are the contributions of the joints, with the kinds in the order of `KINDS`.
+    Attributes:
+        joints: Names of the moving joints from the base to the frame.
+        base: (..., 6) acceleration that the frame would have if all joints were fixed and only the base
+            moved.
+        terms: (..., joints, 4, 6) contributions of the joints. The four kinds are in the order of `KINDS`,
+            and the six numbers are [linear; angular].
     """
 
     joints: tuple[str, ...]
@@ -100,7 +105,7 @@ class AccelerationBreakdown(Displayable):
 
 
 class _Moves(NamedTuple):
-    """Linear and angular velocity or acceleration (n, 3) of a joint, in world axes."""
+    """Velocity or acceleration (n, 3) of a joint relative to its parent link, in world axes."""
 
     slide: FloatArray
     turn: FloatArray

@@ -1,7 +1,8 @@
 """Compute placements, velocities, accelerations and Jacobians of arrays of configurations.
 
-Inputs have the shapes (n, nq) and (n, nv). A few configurations are computed with Python numbers, and more
-configurations by a compiled kernel (`preload`). Both methods give exactly the same doubles.
+Inputs have the shapes (n, nq) and (n, nv). `urdfkin.robot` checks the shapes; the functions of this module do
+not. A few configurations are computed with Python numbers, and more configurations by a compiled kernel
+(`preload`). Results are exactly the same doubles for each method and for any number of threads.
 """
 
 from __future__ import annotations
@@ -50,8 +51,9 @@ _STRIDES = KernelArgs.STRIDE_BASE, KernelArgs.STRIDE_Q, KernelArgs.STRIDE_V, Ker
 class EvaluateOptions(TypedDict, total=False):
     """Keyword arguments of every function of this module.
 
-    `base` is the state of the base, (n, 24) or (1, 24). `out` is a C-contiguous array for the result. `read`
-    is true if the caller reads the results immediately, so that the results stay in the caches.
+    `base` is the state of the base, (n, 24) or (1, 24). `out` is a C-contiguous float64 array of the
+    result's size. `read` is true if the caller reads the results immediately, so that the results stay in the
+    caches.
     """
 
     base: FloatArray
@@ -61,7 +63,7 @@ class EvaluateOptions(TypedDict, total=False):
 
 
 def placements(plan: CompiledTree, q: FloatArray, **how: Unpack[EvaluateOptions]) -> FloatArray:
-    """Return T_world_frame (n, frames, 4, 4) by equation 7.77."""
+    """Return T_world_frame (n, frames, 4, 4); equation 7.77 gives the positions."""
     program = program_of(plan, turned=True)
     return _compute("placements", plan, program, [q], _ALIGNED, (4, 4), **how)
 
@@ -317,7 +319,10 @@ def in_blocks(compute: Compute, inputs: Sequence[FloatArray], out: FloatArray, t
 
 
 def in_parts(compute: Callable[[slice], None], n: int, threads: int | None) -> None:
-    """Compute `n` rows in parts, so that the memory for intermediate results does not grow with n."""
+    """Compute `n` rows in parts, so that the memory for intermediate results does not grow with n.
+
+    If n is 0, `compute` is called once, with an empty slice.
+    """
     threads = default_threads(n) if threads is None else whole_number(threads, "threads", 1)
     parts = [slice(i, min(i + PART, n)) for i in range(0, max(n, 1), PART)]
     count = min(threads, len(parts), _processors())

@@ -38,7 +38,10 @@ class JointMotion(IntEnum):
 
 
 class Geometry(IntEnum):
-    """Columns of `CompiledTree.geometry`; the offset is in the axes of the previous moving joint."""
+    """Columns of `CompiledTree.geometry`.
+
+    The offset leads from the previous moving joint to this joint, in the previous joint's axes.
+    """
 
     R = 0
     OFFSET = 9
@@ -80,18 +83,23 @@ class CompiledTree:
         joints: Indices of the moving joints in the tree's list of joints.
         steps: (steps, 3) integers, columns `StepField`.
         geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2) index of the last moving joint before the frame, or -1; the frame's output index.
-        offsets: (frames, 12) rotation matrix and translation from the last moving joint to each frame.
+        frames: (frames, 2) row in `steps` of the last moving joint before the frame, or -1, and the frame's
+            index in the output; sorted by the row in `steps`.
+        offsets: (frames, 12) rotation matrix and translation of each frame, relative to its last moving
+            joint, in the order of `frames`.
         columns: (columns, 4) integers, columns `ColumnField`; one row for each Jacobian column.
         multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
         leaders: (frames, columns) index of the column to which each column is added; -1 if the column's joint
-            does not move the frame. The columns of a joint and of its mimic joints are added.
+            does not move the frame. The columns of a joint and of its mimic joints are added. Their sum is
+            stored in the first of these columns on the path to the frame.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
-        lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints, from the
-            previous moving joint to each moving joint, and then to each frame.
+        lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints. The first
+            sums are from the previous moving joint to each moving joint. The other sums are from the last
+            moving joint to each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
-        tilts: (frames,) sum of `Joint.tilt` (rad) of these joints, in output order.
+        tilts: (frames,) sum of `Joint.tilt` (rad) over the URDF joints between the root and each frame, in
+            output order.
     """
 
     nq: int
@@ -268,7 +276,11 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 
 
 class Op(IntEnum):
-    """Instructions of a program: CARRY translates, TURN rotates, and the suffix X, Y or Z is the axis."""
+    """Instructions of a program; the suffix X, Y or Z is the axis, and CARRY and TURN allow any axis.
+
+    CARRY is a constant translation, and TURN is a constant rotation. Instructions for a coordinate axis are
+    faster. STORE stores the data that the Jacobian column of a joint needs.
+    """
 
     END = 0
     CARRY_X = 1
@@ -338,7 +350,10 @@ _JOINTS = {
 
 @dataclass(frozen=True, eq=False)
 class KernelProgram:
-    """A program: `words` are the integers that `Head` names, then lists, and then the instructions."""
+    """A program: `words` are the integers that `Head` names, then lists, and then the instructions.
+
+    `rows` is the number of rows of scratch memory that the program needs.
+    """
 
     words: IntArray
     constants: FloatArray
@@ -360,8 +375,9 @@ def program_of(
 ) -> KernelProgram:
     """Return the program for the frames of a compiled tree; the tree stores the program.
 
-    If `turned` is true, the program also computes the orientation of each frame. If `pairs` is true, mimic
-    joints have separate Jacobian columns, as a Hessian requires.
+    If `turned` is true, the program also computes the orientation of each frame. Placements, and results in
+    the frame's own axes, require `turned`. If `pairs` is true, mimic joints have separate Jacobian columns,
+    as a Hessian requires.
     """
     key = turned, columns, pairs
     program: KernelProgram | None = plan.cache.get(key)
@@ -512,7 +528,7 @@ class _Writer:
         return sources.ravel().tolist()
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the number of columns, `PAIR_WIDTH` integers for each column, and the scratch rows."""
+        """Return the number of columns, `PAIR_WIDTH` integers for each, and the result's scratch rows."""
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]

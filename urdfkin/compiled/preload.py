@@ -1,7 +1,8 @@
 """Decide when a kernel is loaded or compiled; this decision does not import Numba.
 
 For a few configurations, Python is faster than loading or compiling a kernel. This module therefore measures
-how long Python has computed without each kernel, and estimates the time of the next computations.
+how long Python has computed without each kernel. The time in the table also includes an estimate for the next
+computations.
 
 | time without a kernel | action |
 |---|---|
@@ -39,7 +40,7 @@ _SAVED = 5e-5
 _AGAIN = 0.05
 
 RECURSIONS, SINGLE = "urdfkin.compiled.machine.kernels", "urdfkin.compiled.machine.single"
-#: The kernels that each of two processes compiles; the compile times are about equal.
+#: Two groups of kernels with about equal compile times; each of two processes compiles one group.
 _ONE_HALF = "accelerations", "local_accelerations", "velocities"
 _OTHER_HALF = "jacobians", "jacobian_rates", "local_velocities", "placements"
 
@@ -89,7 +90,10 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 
 
 def single_pays(name: str) -> bool:
-    """Return whether to load the function that computes one configuration with the kernel `name`."""
+    """Return whether to load the function that computes one configuration with the kernel `name`.
+
+    Each call adds the time that this function would save to a running total.
+    """
     if _only:
         return _only[-1] == "compiled"
     if name not in _loaded and f"local_{name}" not in _loaded:
@@ -129,7 +133,10 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Start at most one second process for each kernel; return whether the caller computes without it."""
+    """Start a second process that compiles a kernel; return whether the caller goes on without the kernel.
+
+    At most one second process runs at a time, and at most one is started for each kernel.
+    """
     if cache_folder() is None:
         return False
     if not compiling.acquire(blocking=False):

@@ -1,6 +1,7 @@
 """Number types for the recursion of one configuration in plain Python, without compilation.
 
-Results are exactly the same doubles as those of compiled kernels (`urdfkin.compiled.machine.numbers`).
+Results are exactly the same doubles as those of compiled kernels, which use the types of
+`urdfkin.compiled.machine.numbers`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ LARGE = 1e45
 
 LARGEST_ANGLE = 2.0**20 * math.pi / 2.0
 _2_PI, PI_2, PI_2_REST = 2.0 / math.pi, math.pi / 2.0, 6.123233995736766e-17
-#: If this constant is added to a number below 2^51, the sum is rounded to an integer.
+#: If this constant is added to a number between -2^51 and 2^51, the sum is rounded to an integer.
 #: The lowest bits of the sum's mantissa then contain the number, rounded to the nearest integer.
 NO_FRACTION = 1.5 * 2.0**52
 SINE = (

@@ -19,7 +19,8 @@ world axes. The joint axis and the interorigin vector have constant components i
 The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
 add the rounding errors of another rotation.
 
-A vector that a result does not need is `nothing()` and costs no time.
+A vector that a result does not need is `nothing()` and costs no time. `urdfkin.compiled.machine.kernels`
+compiles copies of these functions with Numba's number types.
 """
 
 from __future__ import annotations
@@ -147,9 +148,10 @@ def prismatic(axes, state, slide, v, a):
 
 
 def free(axes, state, o, u, o_rate, u_rate):
-    """Add the velocity and the acceleration of a planar or floating joint, in the child link's axes.
+    """Add the velocity and the acceleration of a planar or floating joint to the state.
 
-    The state already contains the joint's translation and rotation.
+    The velocity and the acceleration are in the child link's axes. The state already contains the joint's
+    translation and rotation.
     """
     R, p, w, vel, alpha, acc = state
     o, u, o_rate, u_rate = seen(axes, R, o), seen(axes, R, u), seen(axes, R, o_rate), seen(axes, R, u_rate)
@@ -259,7 +261,9 @@ def _resume(s, row, state):
 def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read the listed blocks of eight numbers of `m` configurations into scratch memory.
 
-    A block may contain surplus numbers of the next configuration; later inputs overwrite the surplus numbers.
+    A whole block is read faster than a part of a block. The last block of a configuration may therefore
+    contain surplus numbers of the next configuration. Later inputs overwrite the surplus numbers,
+    or no instruction uses them.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -284,6 +288,7 @@ def _start(axes, m, s, task, row, b):
 
 
 def _sines_and_cosines(s, program, g):
+    """Compute the sines and cosines of all joint angles before the recursion, which needs all registers."""
     for i in range(program[_ANGLES], program[_ANGLES_END], ANGLE_WIDTH):
         angle = _coordinate(s, program[i], g, program[i + 2], program[i + 3])
         sine, cosine = sine_cosine(s, ANGLE_ROW, angle)

@@ -1,4 +1,4 @@
-"""Derive exact Denavit-Hartenberg tables of chains, and check each table; docs/dh.md explains the theory."""
+"""Derive, compare, convert, read and export Denavit-Hartenberg tables; docs/dh.md explains the theory."""
 
 from urdfkin.dh.convert import to_convention, to_tree, to_urdf
 from urdfkin.dh.export import FORMATS, export

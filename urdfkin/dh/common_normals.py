@@ -10,11 +10,10 @@ Rz(phi_next) and Tz(delta_next) commute with the motion of the second joint, so 
 joint's row. For skew axes, beta is 0, and the other six numbers are unique except for the direction of x
 (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
-Some numbers of a table can be chosen freely; `steps_like` chooses them as in another table (the reference).
 The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
-angles theta about coinciding axes. For parallel or coinciding axes, `steps_like` copies d or theta from the
-reference in all rows except one. It chooses d or theta of the remaining row so that the sum is correct. In a
-Hayati row, d can also be chosen freely, because the two axes do not determine it.
+angles theta about coinciding axes. In all rows of such axes except one, `steps_like` copies d or theta from a
+reference table. It chooses d or theta of the remaining row so that the sum is correct. In a Hayati row, d can
+also be chosen freely, because the two axes do not determine it.
 """
 
 from __future__ import annotations
@@ -31,21 +30,16 @@ from urdfkin.kinematics.roundings import ANGLE, AXES, CONSTANT, DIGITS, EPS, SUM
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint
 
-#: Tilt (rad) below which two axes are nearly parallel.
-#: Below this tilt, an error in the URDF moves the common normal by more than 100 times the error.
+#: Below this tilt (rad), an error in the URDF moves the common normal by more than 100 times the error.
 NEARLY_PARALLEL = 1e-2
 
-#: Largest tilt (rad) of nearly parallel axes.
-#: Two axes with a tilt above `NEARLY_PARALLEL` are nearly parallel only if their common normal is far away.
+#: Axes with a larger tilt (rad) never get a Hayati row, even if their common normal is far away.
 LARGEST_HAYATI_TILT = 0.35
 
 
 @dataclass(frozen=True, slots=True)
 class AxisTransform:
-    """The seven parameters (metres and radians) of the transform between two joint axes.
-
-    Coinciding axes do not determine phi; `phi_is_free` is then True.
-    """
+    """Transform between two axes (m, rad); `phi_is_free` is true if the axes do not determine phi."""
 
     phi: float = 0.0
     delta: float = 0.0
@@ -69,7 +63,6 @@ class AxisTransform:
 
 
 def shifted_along_z(A: FloatArray, distance: float) -> FloatArray:
-    """Return Tz(distance) A."""
     shifted = A.copy()
     shifted[2, 3] += distance
     return shifted
@@ -84,17 +77,11 @@ def step_between(
     delta_each: bool = False,
     noise: PoseTolerance | None = None,
 ) -> AxisTransform:
-    """Factor the constant pose between two joint axes into the seven numbers of an `AxisTransform`.
+    """Factor the (4, 4) pose A of the next joint's frame in this joint's frame.
 
-    Args:
-        A: (4, 4) pose of the next joint's frame in this joint's frame.
-        reach: Length of the path (metres). A common normal is far away if its distance from a joint frame
-            exceeds `reach`.
-        phi_free: Value of phi for coinciding axes, because they do not determine phi.
-        hayati: Whether nearly parallel axes get a Hayati row instead of a row of four parameters.
-        delta_each: For parallel axes: True if `delta` contains the offset, False if `delta_next` contains it.
-        noise: Limits for tilts and lengths; smaller values are set to zero. If None, the limits for the
-            origin of a single URDF joint are used.
+    `reach` is the length of the path (m). If the axes do not determine phi, phi is `phi_free`. The offset
+    along parallel axes is in `delta` if `delta_each` is true, otherwise in `delta_next`. Tilts and lengths
+    within `noise` are set to zero.
     """
     noise = noise or pose_tolerance(1, 0.0, reach)
     sine = tilt_of(A)
@@ -109,7 +96,6 @@ def step_between(
 
 
 def _along_common_normal(A: FloatArray, sine: float, reach: float, noise: PoseTolerance) -> AxisTransform:
-    """Return the transform along the common normal of two axes that are not parallel, with a >= 0."""
     phi = math.atan2(A[0, 2], -A[1, 2])
     along = math.cos(phi) * A[0, 3] + math.sin(phi) * A[1, 3]
     across = math.cos(phi) * A[1, 3] - math.sin(phi) * A[0, 3]
@@ -123,7 +109,7 @@ def _along_common_normal(A: FloatArray, sine: float, reach: float, noise: PoseTo
 def _parallel(
     A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float, delta_each: bool
 ) -> AxisTransform:
-    """Return the transform between two parallel axes, along the normal through this joint's origin."""
+    """Return the transform between parallel axes, along a common normal through one joint's origin."""
     sign = math.copysign(1.0, A[2, 2])
     alpha = 0.0 if sign > 0.0 else math.pi
     offset = cleaned_length(A[2, 3], reach, noise.metres)
@@ -135,11 +121,7 @@ def _parallel(
 
 
 def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: float) -> AxisTransform:
-    """Return the transform between two axes for a Hayati row (Hayati, 1983).
-
-    The next axis intersects the xy plane of this joint's frame in a point. The x axis of the row's frame
-    points from the origin to this point.
-    """
+    """Return the transform for a Hayati row; x points to the next axis's intersection with the xy plane."""
     z = A[:3, 2]
     delta_next = cleaned_length(A[2, 3] / z[2], reach, noise.metres)
     across = A[:2, 3] - delta_next * z[:2]
@@ -154,20 +136,17 @@ def hayati_step(A: FloatArray, reach: float, noise: PoseTolerance, phi_free: flo
 
 
 def _phi_next(A: FloatArray, phi: float, alpha: float, beta: float) -> float:
-    """Return phi_next (rad) of the pose A, given phi, alpha and beta; it is accurate for every tilt."""
+    """Return phi_next (rad) of the pose A; the formula is accurate for every tilt."""
     Rz = np.array([[math.cos(phi), -math.sin(phi), 0], [math.sin(phi), math.cos(phi), 0], [0, 0, 1.0]])
     M = (Rz @ between_axes(0.0, alpha, beta)[:3, :3]).T @ A[:3, :3]
     return math.atan2(M[1, 0] - M[0, 1], M[0, 0] + M[1, 1])
 
 
 def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
-    """Remove rounding errors from a length (metres) that was computed from lengths of up to `reach`.
+    """Remove rounding errors from a length (m) that was computed from lengths of up to `reach`.
 
-    The length becomes 0 if it is at most `noise` or within rounding errors. If only rounding errors separate
-    the length from a decimal number of twelve digits, this decimal number is returned.
-
-        >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
-        (0.0, 0.076, -5e-12)
+    >>> cleaned_length(-5e-17, 1.0), cleaned_length(0.07599999999999998, 1.0), cleaned_length(-5e-12, 1.0)
+    (0.0, 0.076, -5e-12)
     """
     if abs(length) <= max(SUMMED * EPS * reach, noise):
         return 0.0
@@ -177,7 +156,7 @@ def cleaned_length(length: float, reach: float, noise: float = 0.0) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PairWithReference:
-    """Two consecutive joint axes of a path, and the row of the first joint in a reference table.
+    """Two consecutive joint axes of a path, and the first joint's row in a reference table.
 
     `A` is the (4, 4) pose of the next joint's frame in this joint's frame.
     """
@@ -194,7 +173,7 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether d of the row can be chosen freely, because the next row can compensate for the choice."""
+        """Whether the offset d of the row is free, because the next row can compensate for every d."""
         return tilt_of(self.A) <= self.noise.radians or self._has_hayati_row
 
     @property
@@ -207,12 +186,12 @@ class PairWithReference:
 
     @property
     def normal_offset(self) -> float:
-        """Distance (metres) along the first axis from its joint's frame to the common normal of the axes."""
+        """Distance (m) along the first axis from its joint's frame to the common normal."""
         return step_between(self.A, self.reach, hayati=False, noise=self.noise).delta
 
     @property
     def hayati_offset(self) -> float | None:
-        """Distance (metres) along the first axis from the joint's frame to the x axis of a Hayati row.
+        """Distance (m) along the first axis from the joint's frame to the x axis of a Hayati row.
 
         The tilt direction is the projection of the second axis onto the xy plane of the first joint's frame.
         Let v be the vector of length a along the x axis of the row. The component of v in the tilt direction
@@ -236,8 +215,8 @@ class PairWithReference:
     def step(self, carry: float, d: float, phi_free: float = 0.0) -> AxisTransform:
         """Return the transform between the two axes.
 
-        `carry` is the offset (metres) along the first axis from the DH frame to the joint's frame. `d` is the
-        offset for the row; it is ignored if the two axes determine the offset.
+        `carry` is the offset (m) along the first axis from the DH frame to the joint's frame. `d` is the
+        offset for the row (m); it is ignored if the two axes determine the offset.
         """
         if not self.offset_is_free:
             A = shifted_along_z(self.A, carry)
@@ -250,18 +229,18 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, carry: float) -> float:
-        """Return the `carry` (see `step`) of this joint for d = 0 from the `carry` of the next joint."""
+        """Return the `carry` of this joint for d = 0 if the next joint has the given `carry`."""
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
 def steps_like(
     pairs: Sequence[PairWithReference], phi_in: float, carry: float, tip: float | None
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Compute transforms between a path's axes, and theta of each row, as close to a reference as possible.
+    """Return the transforms between the axes, and theta of each row, as close to a reference as possible.
 
-    `phi_in` (rad) is the angle about the first axis, and `carry` (metres) is the offset along it, from frame
-    0 to the first joint's frame. `tip` is the `carry` (metres) of the last row for which d equals the
-    reference's d; None if d may differ.
+    `phi_in` is the angle (rad) about the first axis from frame 0 to the first joint's frame. `carry` is the
+    offset (m) along this axis. `tip` is the `carry` (m) with which the last row has the reference's d; None
+    if d may differ.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -292,7 +271,7 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
         # Any d is possible, because a later prismatic joint or the tool compensates for it.
-        # If a row up to that joint is a Hayati row, the reference's cell a in this row determines d.
+        # If a row before that joint or tool is a Hayati row, its cell a in the reference determines d.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -308,7 +287,7 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
 def _free_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Choose phi so that theta of this row, or of later rows of prismatic joints, equals the reference."""
+    """Choose phi so that theta of this row, or of later prismatic rows, equals the reference."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -325,7 +304,7 @@ def _free_phi(
 
 
 def _closer_direction(step: AxisTransform, pair: PairWithReference, phi_in: float = 0.0) -> AxisTransform:
-    """Choose the direction of x that gives cells closer to the reference; if equally close, compare theta."""
+    """Choose the direction of x that gives cells closer to the reference."""
     row = pair.row
 
     def difference(step: AxisTransform) -> tuple[float, float]:
@@ -341,18 +320,16 @@ def theta_like(theta: float, reference: float) -> float:
     return reference if abs(angle_difference(theta, reference)) <= ANGLE * EPS else cleaned_angle(theta)
 
 
-#: Largest length (metres); sums of the squares of longer lengths may overflow.
+#: Sums of the squares of longer lengths (m) may overflow.
 LONGEST = 1e150
 
 
 def check_lengths(joints: Iterable[Joint]) -> None:
-    """Raise RangeError unless the square of each joint's offset is a finite double."""
     for joint in joints:
         _check_length(f"joint {joint.name}", float(np.abs(joint.T_parent_joint[:3, 3]).max()))
 
 
 def check_lengths_of_table(chain: FrameChain, table: DHTable) -> None:
-    """Raise RangeError unless the square of each length of a path and of a table is a finite double."""
     for i, row in enumerate(table.rows):
         for name, length in (("a", row.a), ("d", row.d)):
             _check_length(f"the table, row {i + 1}, {name}", abs(length))
@@ -374,21 +351,21 @@ def _check_length(where: str, length: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class PoseTolerance:
-    """Largest angle (radians) and length (metres) that are attributed to rounding in a constant pose."""
+    """Largest angle (rad) and length (m) in a constant pose that are attributed to rounding."""
 
     radians: float
     metres: float
 
 
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
-    """Return the tolerance for a constant pose that is the product of the origins of `joints` URDF joints.
+    """Return the rounding tolerance of a constant pose that is the product of `joints` joint origins.
 
-    `length` is the sum of the offsets of these joints (metres), and `reach` is the length of the whole path.
-    The tolerance covers angles that a program rounded to fifteen digits.
+    `length` is the sum of the offsets of these joints (m), and `reach` is the length of the whole path. The
+    tolerance covers angles that a program rounded to fifteen digits.
 
-        >>> tolerance = pose_tolerance(1, 0.1, 1.0)
-        >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)
-        (63.7, 4.0)
+    >>> tolerance = pose_tolerance(1, 0.1, 1.0)
+    >>> round(tolerance.radians / EPS, 1), round(tolerance.metres / EPS, 1)
+    (63.7, 4.0)
     """
     computed = (AXES + CONSTANT * joints) * EPS
     return PoseTolerance(computed + WRITTEN * joints * EPS, max(SUMMED * EPS * reach, computed * length))
@@ -402,7 +379,7 @@ def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
 
 
 def left_out(chain: FrameChain) -> float:
-    """Return the sum (rad) of the tilts of z and x axes that are so small that a table sets them to zero.
+    """Return the sum (rad) of the tilts that a table sets to zero as rounding errors.
 
     The orientation error that these tilts cause is at most this sum.
     """

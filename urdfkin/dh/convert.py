@@ -1,17 +1,12 @@
 """Convert a table to the other convention, to a kinematic tree, or to a URDF.
 
-The standard and the modified convention group the same factors S and X of `urdfkin.dh.table` differently:
-
-    standard   base . (S_1 X_1) (S_2 X_2) ... (S_n X_n) . tool
-    modified   base' . (X_0 S_1) (X_1 S_2) ... (X_{n-1} S_n) . tool'
-
-The conversion to the modified convention moves X_n into the tool. If the base has the form Tx(a) Rx(alpha), a
-and alpha move from the base into the first modified row. The conversion to the standard convention does the
-opposite, so that a conversion to the other convention and back gives the original table.
+`urdfkin.dh.table` defines the conventions and the factors X. The conversion to the modified convention moves
+X_n into the tool. If the base has the form Tx(a) Rx(alpha), a and alpha move from the base into the first
+modified row. The conversion to the standard convention does the opposite, so that a conversion to the other
+convention and back gives the original table.
 
 In a tree, the frame of joint i is the Denavit-Hartenberg frame whose z axis is the joint's axis: frame i - 1
-of a standard table, or frame i of a modified table. The pose of frame i in frame i - 1 is S_i X_i or X_{i-1}
-S_i. With the joint at zero, the translation of S_i X_i is d_{i-1,i} = d_i z_{i-1} + a_i x_i (7.64).
+of a standard table, or frame i of a modified table.
 """
 
 from __future__ import annotations
@@ -36,7 +31,7 @@ from urdfkin.urdf.writer import to_urdf as write_urdf
 
 
 def to_convention(table: DHTable, convention: str) -> DHTable:
-    """Return a table in another convention; raise InputError for an unknown convention."""
+    """Return the table in the convention "standard" or "modified"."""
     wanted = convention_of(convention)
     if wanted is table.convention or not table.rows:
         return replace(table, convention=wanted)
@@ -56,17 +51,15 @@ def to_convention(table: DHTable, convention: str) -> DHTable:
     return replace(table, convention=wanted, rows=rows, base=base, tool=tool)
 
 
-#: A prismatic joint without limits gets these limits in a URDF: -1 km to 1 km, 1000 m/s and 1000 N.
+#: URDF requires limits of prismatic joints, so a joint without limits gets these (m, m/s and N).
 UNBOUNDED_SLIDE = Limit(-1000.0, 1000.0, 1000.0, 1000.0)
 
 
 def to_tree(table: DHTable) -> KinematicTree:
     """Return the table's robot as a tree from the base frame to the tip.
 
-    The tree contains the joint names, joint directions, limits and mimic rules from the rows. If a mimicked
-    joint is not on the path, it becomes a separate joint on the base, so that the tree has the same
-    coordinates as the table. A revolute joint without limits becomes continuous. A prismatic joint without
-    limits gets -1 km to 1 km, because URDF requires limits.
+    A mimicked joint without a row becomes a separate joint on the base, so that the tree has the same
+    coordinates as the table. A revolute joint without limits becomes continuous.
     """
     links = link_names(table)
     joints = _serial_joints(table, [(_kind(row), _limit(row), row.mimic) for row in table.rows])
@@ -82,12 +75,12 @@ def to_tree(table: DHTable) -> KinematicTree:
 
 
 def to_urdf(table: DHTable) -> str:
-    """Return a URDF with the names and limits of `to_tree`, and without shapes and masses."""
+    """Return a URDF of the tree from `to_tree`, without shapes and masses."""
     return write_urdf(to_tree(table))
 
 
 def free_tree(table: DHTable) -> KinematicTree:
-    """Return the tree of `to_tree` without mimic rules: each row has its own coordinate, in row order."""
+    """Return the tree without limits and mimic rules: each row has its own coordinate, in row order."""
     kinds = [JointKind.CONTINUOUS if row.kind.turns else JointKind.PRISMATIC for row in table.rows]
     joints = _serial_joints(table, [(kind, None, None) for kind in kinds])
     return serial_tree(table.robot, link_names(table), joints)
@@ -101,7 +94,6 @@ def serial_tree(robot: str, links: Sequence[str], joints: Sequence[Joint]) -> Ki
 def _serial_joints(
     table: DHTable, details: list[tuple[JointKind, Limit | None, Mimic | None]]
 ) -> list[Joint]:
-    """Return the joints of the rows and the fixed joint of the tip."""
     *poses, T_tip = frame_poses(table)
     joints = [
         Joint(row.joint, kind, 0, T, np.array([0.0, 0.0, float(row.sense)]), limit, mimic)
@@ -112,7 +104,7 @@ def _serial_joints(
 
 
 def frame_poses(table: DHTable) -> list[FloatArray]:
-    """Return the pose of each joint frame and of the tip in the frame before it, with all joints at zero."""
+    """Return the pose of each joint frame and of the tip in the frame before it, with joints at zero."""
     if not table.rows:
         return [table.base @ table.tool]
     if table.convention is DHConvention.STANDARD:
@@ -123,7 +115,6 @@ def frame_poses(table: DHTable) -> list[FloatArray]:
 
 
 def link_names(table: DHTable) -> list[str]:
-    """Return unique link names: the base, a link for each row, and the tip."""
     names = [table.base_frame]
     names += [_new(f"{row.joint}_link", [*names, table.tip_frame]) for row in table.rows]
     return [*names, _new(table.tip_frame, names)]
@@ -136,7 +127,6 @@ def _new(name: str, taken: list[str]) -> str:
 
 
 def _kind(row: DHRow) -> JointKind:
-    """Return the kind of the row's joint in a URDF; a revolute joint without limits is continuous."""
     unbounded = row.kind is JointKind.REVOLUTE and not is_bounded(row.limit)
     return JointKind.CONTINUOUS if unbounded else row.kind
 

@@ -40,12 +40,9 @@ from urdfkin.kinematics.roundings import ANGLE, ENTRY, EPS
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Tolerance (rad) by which |theta| may exceed a right angle before x is reversed.
-#: The rounded right angle 1.571 is within this tolerance.
+#: Tolerance (rad) of a right angle; the rounded angle 1.571 still counts as a right angle.
 RIGHT_ANGLE_SLACK = 1e-3
 
-
-#: Allowed values of the options of a derivation; `urdfkin.dh.make.dh_table` explains them.
 _OPTIONS = {
     "near_parallel": ("hayati", "strict"),
     "last": ("tip", "flange"),
@@ -58,7 +55,7 @@ _OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """The options of a derivation; an unknown value raises InputError."""
+    """The options of a derivation; `urdfkin.dh.make.dh_table` explains them."""
 
     convention: DHConvention = DHConvention.STANDARD
     near_parallel: str = "hayati"
@@ -81,11 +78,9 @@ class Choices:
 
 
 def derive(chain: FrameChain, choices: Choices, like: DHTable | None = None) -> DHTable:
-    """Return a table of a chain; it gives the pose of the chain's tip for every q, up to rounding errors.
+    """Return a table that gives the pose of the chain's tip for every q, up to rounding errors.
 
-    `like` is a standard table of the same joints. The result copies the table's directions of x, offsets
-    along parallel axes, and zero positions of the first and the last joint. `like` has priority over
-    `choices`.
+    `like` is a standard table of the same joints; its frames have priority over `choices`.
     """
     constants = _reversed_axes(chain, choices.flip)
     reach = chain.reach + float(np.linalg.norm(constants[0][:3, 3]))
@@ -146,7 +141,7 @@ def _table(
 
 
 def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]:
-    """Return the chain's constant poses, with the z axes of some joints reversed by a half turn about x."""
+    """Return the constant poses, with the z axes of the joints `flip` reversed."""
     constants = [np.array(A) for A in chain.constants]
     half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
     for i, joint in enumerate(chain.joints):
@@ -159,15 +154,7 @@ def _reversed_axes(chain: FrameChain, flip: Collection[str]) -> list[FloatArray]
 def _place_prismatic_axes(
     chain: FrameChain, constants: list[FloatArray], choices: Choices, reach: float
 ) -> None:
-    """Shift the axis lines of prismatic joints; a prismatic joint defines only the direction of its axis.
-
-    - With slide = "minimal", the line passes through the origin of a neighbouring revolute joint.
-    - In a table without Hayati rows, a line that is nearly parallel to a neighbouring axis passes through the
-      neighbouring joint's origin. Otherwise, the common normal would be far from the robot.
-    - The line of a first prismatic joint passes through the base's origin, so that the base can be the
-      identity.
-    - The line of a last prismatic joint passes through the tip if the table then needs no tool.
-    """
+    """Shift the axes of prismatic joints; such a joint defines only the direction of its axis."""
     is_prismatic = [not joint.kind.turns for joint in chain.joints]
     prismatic = [k for k, slides in enumerate(is_prismatic) if slides]
     noise = pose_tolerances(chain, reach)
@@ -187,7 +174,7 @@ def _place_prismatic_axes(
 
 
 def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: list[bool]) -> bool:
-    """Shift the axis of joint k to the origin of a neighbouring revolute joint, preferably the next joint."""
+    """Shift the axis of joint k to the origin of a neighbouring revolute joint, if there is one."""
     if k + 1 < len(is_prismatic) and not is_prismatic[k + 1]:
         _shift(constants, k, constants[k + 1][:3, 3].copy())
         return True
@@ -198,7 +185,7 @@ def _shift_to_revolute_joint(constants: list[FloatArray], k: int, is_prismatic: 
 
 
 def _shift_to_parallel_axis(constants: list[FloatArray], k: int, noise: list[PoseTolerance]) -> bool:
-    """Shift the axis of joint k to the origin of a neighbouring joint if the two axes are nearly parallel."""
+    """Shift the axis of joint k so that its common normal with a nearly parallel axis is near the robot."""
     if k > 0 and noise[k].radians < tilt_of(constants[k]) < NEARLY_PARALLEL:
         _shift_to_previous_origin(constants, k)
         return True
@@ -228,11 +215,12 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
     offset = cleaned_length(float(z @ p), reach, noise.metres)
     base = np.eye(4)
     base[:3, 3] = p - offset * z
-    if tilt_of(A) <= noise.radians:  # z_0 is parallel or opposite to the base's z axis
+    if tilt_of(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
     # Projection e - (e . z) z of the base's x axis e, without cancellation for z close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
-    if np.linalg.norm(x) < NEARLY_PARALLEL:  # if z_0 is along the base's x axis, project the y axis
+    # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
+    if np.linalg.norm(x) < NEARLY_PARALLEL:
         x = np.array([0.0, 1.0, 0.0]) - z[1] * z
     x /= np.linalg.norm(x)
     base[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -259,8 +247,7 @@ def _steps(
     choices: Choices,
     noise: Sequence[PoseTolerance],
 ) -> tuple[list[AxisTransform], list[float]]:
-    """Return the transforms between consecutive axes, and theta of each row."""
-    # For "first", each row gets its own offset here; `_sum_offsets_in_first_row` adds the offsets later.
+    # For parallel_offset="first", `_sum_offsets_in_first_row` later adds the offsets along parallel axes.
     each = choices.parallel_offset != "last"
     steps, thetas = list[AxisTransform](), list[float]()
     for A, rounding in zip(constants, noise, strict=True):
@@ -294,7 +281,7 @@ def _has_no_tool(table: DHTable) -> bool:
 def _first_like(
     row: DHRow, base: FloatArray, first: tuple[float, float]
 ) -> tuple[FloatArray, tuple[float, float]]:
-    """Copy theta from another table's first row, and a zero d; change the base to compensate."""
+    """Copy theta, and d if it is 0, from the first row of `like`; change the base to compensate."""
     theta, d = first
     angle, offset = angle_difference(theta, row.theta), 0.0 if row.d else d
     if abs(angle) > ANGLE * EPS or offset:
@@ -306,10 +293,7 @@ def _first_like(
 def _last_like(
     like: DHTable, theta: float, d: float, last: AxisTransform, tool: FloatArray
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Copy theta, a, alpha, and d if it is 0, from the last row of `like`; change the tool accordingly.
-
-    The last row is unchanged if neither table has a tool and theta is equal in the two tables.
-    """
+    """Copy theta, a, alpha, and d if it is 0, from the last row of `like`; change the tool to compensate."""
     row = like.rows[-1]
     no_tools = _has_no_tool(like) and is_identity(tool)
     if no_tools and abs(angle_difference(theta, row.theta)) < RIGHT_ANGLE_SLACK:
@@ -324,11 +308,6 @@ def _last_like(
 
 
 def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
-    """Whether the rule `sign` requires the opposite direction of x.
-
-    The rules "a" and "alpha" require that the cell of this name is not negative. If the cell is 0 (or alpha
-    is pi), the other of the two cells must not be negative.
-    """
     by_alpha = 0.0 if step.alpha == math.pi else step.alpha
     if sign == "theta" or (not step.a and not by_alpha):
         return abs(theta) > math.pi / 2.0 + RIGHT_ANGLE_SLACK
@@ -336,7 +315,7 @@ def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
 
 
 def _representable(A: FloatArray, choices: Choices, noise: PoseTolerance) -> bool:
-    """Whether A is a product Rz Tz Tx Rx (standard) or Rz Tz (modified), so that no tool is needed."""
+    """Whether A is Rz Tz Tx Rx (standard) or Rz Tz (modified), so that the table needs no tool."""
     if choices.last == "flange":
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
@@ -349,7 +328,7 @@ def _representable(A: FloatArray, choices: Choices, noise: PoseTolerance) -> boo
 def _last(
     A: FloatArray, phi_in: float, carry: float, reach: float, choices: Choices, noise: PoseTolerance
 ) -> tuple[float, float, AxisTransform, FloatArray]:
-    """Return theta and d of the last row, the `AxisTransform` with its other cells, and the tool.
+    """Return theta and d of the last row, its other cells, and the tool.
 
     `A` is the tip's pose in the last joint's frame, shifted along z to the origin O_{n-1}.
     """
@@ -373,7 +352,6 @@ def _last(
 def _sum_offsets_in_first_row(
     rows: list[tuple[float, float]], steps: list[AxisTransform]
 ) -> list[tuple[float, float]]:
-    """Move the offsets along consecutive parallel axes (alpha = 0 or pi) to the first row of these axes."""
     rows = list(rows)
     for i in range(len(steps) - 1, -1, -1):
         if steps[i].beta == 0.0 and steps[i].alpha in (0.0, math.pi):

@@ -1,8 +1,6 @@
 """Make the Denavit-Hartenberg table of the path between two frames of a robot.
 
-The frames can be chosen as in a published table. The author of a published table has chosen the positive
-direction of each joint: in Kinova's table, for example, the positive direction of the first joint is opposite
-to that in the URDF.
+A published table may reverse positive joint directions of the URDF: Kinova's table reverses the first joint.
 """
 
 from __future__ import annotations
@@ -24,8 +22,7 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.tree import KinematicTree
 
-#: If cells of two tables differ by more than this number, the tables describe different robots.
-#: The unit is rad for angles, and the reach for lengths.
+#: Tables with a larger difference of cells (rad, or relative to the reach) describe different robots.
 _SAME_ROBOT = 0.1
 #: Largest difference at which zero positions (rad), and entries of rotations, are treated as equal.
 _SAME_ZERO = 1e-2
@@ -34,27 +31,19 @@ _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """Return a chain's table with the frames of a reference table.
-
-    `choices.flip` must be the result of `reversed_like`.
-    """
+    """Return a chain's table with the frames of a reference; `choices.flip` comes from `reversed_like`."""
     standard = replace(choices, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
 
 
 def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tuple[str, ...]:
-    """Return the names of the joints that have opposite positive directions in the table and in the URDF.
-
-    The function derives a table for each likely combination of directions, and selects the closest table. If
-    the reference has other joints, or describes another robot, InputError is raised.
-    """
+    """Return the joints whose positive direction in the reference is opposite to the URDF's."""
     check_joints(chain, reference)
     standard = to_convention(reference, "standard")
     without_ends = replace(standard, base=np.eye(4), tool=np.eye(4))
     names = [joint.name for joint in chain.joints]
     patterns = [fit.senses for fit in align(chain, without_ends)]
-    # A change of base or tool can compensate for a reversed sign of the first or of the last joint.
-    # Therefore, both signs are tried for each of these two joints.
+    # Base and tool can compensate for a reversed first or last joint, so both signs of each are tried.
     patterns += [(-first, *rest) for first, *rest in patterns]
     patterns += [(*rest, -last) for *rest, last in patterns]
     best, best_flip = (math.inf, 0, 0, 0.0, 0), tuple[str, ...]()
@@ -75,21 +64,13 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
 
 
 def _difference_key(table: DHTable, reference: DHTable, reach: float) -> tuple[float, int, int, float, int]:
-    """Return a key that ranks tables by their difference from a reference; the smallest key is best.
-
-    The entries of the key are, in this order:
-
-    - the largest difference of cells that do not depend on the position of a prismatic axis,
-    - the exponent of the next power of ten above the largest difference of all compared cells,
-    - the number of rows with different zero positions, plus the number of rows with different signs of d,
-    - the number of different rotations of base and tool,
-    - the number of joints with reversed positive direction.
-    """
+    """Return a key that ranks tables by their difference from a reference; the smallest key is best."""
     n, unique, shiftable, zeros = len(table.rows), 0.0, 0.0, 0
     for i, (row, other) in enumerate(zip(table.rows, reference.rows, strict=True)):
         a = abs(row.a - other.a) / reach
         theta = abs(angle_difference(row.theta, other.theta))
-        if i < n - 1:  # The tool compensates for differences of a and alpha in the last row.
+        # The tool compensates for differences of a and alpha in the last row.
+        if i < n - 1:
             is_unique = row.kind.turns and table.rows[i + 1].kind.turns
             unique = max(unique, abs(angle_difference(row.alpha, other.alpha)), a * is_unique)
             shiftable = max(shiftable, abs(row.beta - other.beta), a)

@@ -33,8 +33,7 @@ def jacobian(
 ) -> FloatArray:
     """Return the (..., 6, coordinates) Jacobian of the tip, [linear; angular] (equation 7.85).
 
-    `q` (..., coordinates) is in the order of `joint_names` (rad or m), or a mapping by name. The world is the
-    table's base frame. A wrong length of `q` raises InputError.
+    `q` (..., coordinates) is in the order of `joint_names` (rad or m). The world is the table's base frame.
     """
     shape, (values,) = _flat(table, table.coupling.values(q))
     J = jacobians(_compiled_tree(table), values, Reference.of(reference))[:, 0] @ table.coupling.matrix
@@ -44,9 +43,9 @@ def jacobian(
 def velocity(
     table: DHTable, q: Given, v: Given, reference: Reference | str = Reference.LOCAL_WORLD_ALIGNED
 ) -> FloatArray:
-    """Return the (..., 6) velocity of the tip, [linear; angular] (equations 7.127, 7.128); batches broadcast.
+    """Return the (..., 6) velocity of the tip, [linear; angular] (equations 7.127, 7.128).
 
-    The arguments are as in `jacobian`, with `v` in rad/s or m/s.
+    `v` is in rad/s or m/s.
     """
     shape, (values, rates) = _flat(table, table.coupling.values(q), _joint_derivatives(table, v, "v"))
     return velocities(_compiled_tree(table), values, rates, Reference.of(reference)).reshape(*shape, 6)
@@ -57,7 +56,7 @@ def acceleration(
 ) -> FloatArray:
     """Return the (..., 6) classical acceleration of the tip, [linear; angular] (equations 7.129, 7.130).
 
-    The arguments are as in `velocity`, with `a` in rad/s^2 or m/s^2.
+    `a` is in rad/s^2 or m/s^2.
     """
     arrays = (table.coupling.values(q), _joint_derivatives(table, v, "v"), _joint_derivatives(table, a, "a"))
     shape, (values, velocities_, accelerations_) = _flat(table, *arrays)
@@ -68,12 +67,11 @@ def acceleration(
 
 
 def _joint_derivatives(table: DHTable, rates: Given, what: str) -> FloatArray:
-    """Convert velocities or accelerations of the coordinates to those of all joints (..., rows)."""
     return table.coupling.checked(rates, what) @ table.coupling.matrix.T
 
 
 def _flat(table: DHTable, *arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Broadcast the arrays; return their common batch shape, and the arrays with shape (n, rows)."""
+    """Return the common batch shape, and the broadcast arrays with shape (n, rows)."""
     shape = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     rows = len(table.rows)
     flat = [np.broadcast_to(array, (*shape, rows)).reshape(math.prod(shape), rows) for array in arrays]

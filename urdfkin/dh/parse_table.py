@@ -33,15 +33,14 @@ from urdfkin.kinematics.rotation import ROUNDED, polar_factor
 from urdfkin.system.files import exists, read_text
 from urdfkin.system.resources import robots_dir
 
-#: Largest error of a rotation that is printed with six digits.
+#: Tolerance of a rotation that is printed with six digits.
 _PRINTED = 1e-5
-#: Maximum number of lines from the heading of a pose to its third row, including blank lines and fences.
+#: Blank lines and Markdown fences may separate the heading and the three rows of a printed pose.
 _POSE_LINES = 6
-#: Pattern of a line that states a property, such as `convention: modified`, with or without a comment mark.
+#: A line such as `convention: modified`, with or without a comment mark.
 _SETTING = re.compile(r"^\W*(convention|angles|lengths|robot|base_frame|tip_frame)\s*[:=]\s*(.+)$")
-#: Pattern of a line `# key: value` in CSV; `table_from_mapping` rejects an unknown key.
+#: A line `# key: value` in CSV; `table_from_mapping` rejects unknown keys.
 _CSV_SETTING = re.compile(r"^#?\s*(\w+)\s*:\s*([^,;\t].*)$")
-#: Names of columns by their headings.
 _NAMES = {
     **{name: name for name in ("leader", "multiplier", "sense", *LIMIT_KEYS)},
     **dict.fromkeys(("a", "link length", "length"), "a"),
@@ -54,7 +53,6 @@ _NAMES = {
     **dict.fromkeys(("kind", "type", "sigma", "joint type"), "kind"),
 }
 _KINDS = {"0": "R", "1": "P"}
-#: Headings of columns with row numbers
 _ROW_NUMBERS = ("", "i", "j", "n", "#", "no", "row", "link", "index")
 _CONVENTIONS = {
     "modified": r"\b(?:modified|craig(?:'s)?|proximal|mdh)\b",
@@ -67,18 +65,14 @@ _RULE = re.compile(r"[\s|:+=_\-\u2500-\u257f]*")
 
 
 def from_sheet(text: str) -> dict[str, Any]:
-    """Find the table in a text, and return it as plain data.
-
-    Raises:
-        InputError: there is no line of headings, a row has too few or too many cells, or a cell is invalid.
-    """
+    """Find the table in a text, and return it as plain data; raise InputError without a valid table."""
     lines = text.lstrip("\ufeff").splitlines()
     for form in (_latex, _bars, _separated, _aligned):
         if (grid := form(lines)) is not None:
             break
     else:
         raise _no_header(lines)
-    # A title line is skipped, because a name such as "robot" would look like a property.
+    # The title of a robot with the name "robot" begins with "robot:", like a line that states a property.
     without_title = [line for line in grid.around if not _TITLE.search(line)]
     data = _settings(without_title, _CSV_SETTING if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(grid)):
@@ -97,11 +91,9 @@ def from_sheet(text: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A column of a table in text.
+    """A column of a table in text; `name` is "" for an unknown heading.
 
-    Attributes:
-        name: Name of the cells in `urdfkin.dh.rows`; "" for an unknown heading.
-        previous: Whether the heading has the index i-1, as in modified tables.
+    `previous` is true if the heading has the index i-1, as in modified tables.
     """
 
     name: str
@@ -112,12 +104,9 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Grid:
-    """The cells of a table in a text.
+    """The cells of a table in a text; `around` contains all lines outside the table.
 
-    Attributes:
-        around: All lines outside the table.
-        decimal_commas: Whether a comma in a cell is a decimal comma.
-        strict: Whether an unknown column is an error.
+    If `strict` is true, an unknown column is an error.
     """
 
     columns: tuple[_Column, ...]
@@ -161,7 +150,6 @@ def _grid(lines: list[str], split: Callable[[str], list[str]], mark: str = "") -
 
 
 def _no_header(lines: list[str]) -> InputError:
-    """Return the error for missing headings, with the line that has most of the required headings."""
     split = [re.split(r"[,;|&\t]|\s{2,}", line.strip()) for line in lines if not line.startswith("#")]
     rows = [[cell.strip() for cell in cells if cell.strip()] for cells in split]
     best = max(rows, key=lambda cells: sum(_column(cell).name in COLUMNS for cell in cells), default=[])
@@ -169,7 +157,7 @@ def _no_header(lines: list[str]) -> InputError:
     missing = next((name for name in COLUMNS if name not in names), None)
     if missing is None:
         return InputError(
-            "the line of column headings has another separator than the other lines",
+            "the line of column headings uses a different separator from the other lines",
             where="header",
             found=", ".join(best)[:200],
             remedy="separate the cells of all lines by the same character: a comma, a semicolon, a tab"
@@ -211,10 +199,7 @@ def _bars(lines: list[str]) -> _Grid | None:
 
 
 def _separated(lines: list[str]) -> _Grid | None:
-    """Parse cells separated by semicolons, tabs or commas.
-
-    If semicolons or tabs separate the cells, a comma inside a cell is a decimal comma.
-    """
+    """Parse CSV; if semicolons or tabs separate the cells, a comma in a cell is a decimal comma."""
     lines = [line for line in lines if not re.fullmatch(r'"?sep=.?"?', line.strip())]
     grids = (_grid(lines, partial(_csv_cells, mark=mark), mark) for mark in (";", "\t", ","))
     return next(filter(None, grids), None)
@@ -225,7 +210,7 @@ def _csv_cells(line: str, mark: str) -> list[str]:
 
 
 def _aligned(lines: list[str]) -> _Grid | None:
-    """Parse cells that are separated by two or more blanks, or by one blank if no cell contains a blank."""
+    """Parse cells that are separated by two or more blanks, or by one blank if no cell contains blanks."""
 
     def loose(line: str) -> list[str]:
         return [cell for cell in re.split(r"\s{2,}", line.strip()) if cell]
@@ -305,7 +290,7 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Replace a printed rotation with the nearest exact rotation if it differs only by the printed digits."""
+    """Replace a rotation by the nearest exact rotation if they differ only by rounding in the text."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
@@ -316,7 +301,7 @@ def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
 
 
 def _coordinate_names(lines: list[str]) -> list[str]:
-    """Return the joint names in a line such as `with q1 = left, q2 = right`; [] without such a line."""
+    """Parse the joint names in a line such as `with q1 = left, q2 = right`."""
     line = next((line for line in lines if line.startswith("with q1 = ")), "")
     return [_unescaped(name).strip("`") for name in re.findall(r"q[0-9]+ = ([^,]+)", line)]
 
@@ -325,7 +310,6 @@ def _coordinate_names(lines: list[str]) -> list[str]:
 
 
 def _row(grid: _Grid, cells: list[str], index: int) -> dict[str, Any]:
-    """Return a row as a mapping from column names to cells with units; omit empty optional cells."""
     row: dict[str, Any] = {}
     for column, cell in zip(grid.columns, cells, strict=True):
         if not column.name and grid.strict and column.heading not in _ROW_NUMBERS:
@@ -360,15 +344,12 @@ def _with_unit(original: str, column: _Column, where: str, decimal_commas: bool)
 
 
 def _unescaped(name: str) -> str:
-    r"""Remove the escapes of Markdown and LaTeX from a name: `a\_b` is a_b."""
+    r"""Remove the escapes of Markdown and LaTeX from a name: `a\_b` becomes a_b."""
     return re.sub(r"\\([_&%$#{}])", r"\1", name)
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Put the cells of a mimic rule into a mapping `mimic`, and the cells of limits into a mapping `limit`.
-
-    If the row has no mimic rule, `offset` is added to theta or d.
-    """
+    """Group mimic rule and limits into mappings; without a mimic rule, add `offset` to theta or d."""
     mimic: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
@@ -416,11 +397,7 @@ _T = TypeVar("_T")
 
 
 def is_table_file(source: object) -> TypeGuard[str | os.PathLike[str]]:
-    """Whether a robot's source is the path of a table file; a .txt file may also be a URDF.
-
-    >>> is_table_file("arm.toml"), is_table_file("arm.urdf"), is_table_file("<robot/>")
-    (True, False, False)
-    """
+    """Whether a robot's source is the path of a table file; a .txt file may also be a URDF."""
     if isinstance(source, str) and source.lstrip().startswith("<"):
         return False
     if not isinstance(source, str | os.PathLike) or (suffix := Path(source).suffix.lower()) not in _PARSERS:
@@ -451,12 +428,10 @@ def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExp
 
 
 def read_mapping(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """Return the plain data of a table file; errors as for `read_table`."""
     return mapping_from_text(read_text(Path(path), pipes=True), Path(path).suffix.lower(), where=str(path))
 
 
 def table_from_text(text: str, suffix: str, where: str = "table") -> DHTable:
-    """Parse a table from the text of a file with this suffix; errors as for `read_table`."""
     return table_of(mapping_from_text(text, suffix, where), where)
 
 
@@ -473,7 +448,6 @@ def _with_place(make: Callable[[Mapping[str, Any]], _T], data: Mapping[str, Any]
 
 
 def mapping_from_text(text: str, suffix: str, where: str) -> Mapping[str, Any]:
-    """Parse the text of a table file into plain data; errors as for `read_table`."""
     if suffix not in _PARSERS:
         raise InputError(
             f"a table file must have the suffix {', '.join(_PARSERS)}",
@@ -528,7 +502,7 @@ def published(robot: str) -> list[str]:
 
 
 def reference_path(name: str) -> Path:
-    """Return the file of a table with this path or published name; raise UnknownNameError if unknown."""
+    """Return the path of a table file, given as a path or as the name of a published table."""
     path = Path(name)
     if path.suffix or exists(path):
         return path

@@ -18,15 +18,7 @@ from urdfkin.model.tree import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class PrintedPrecision:
-    """The tip error of a printed table.
-
-    Attributes:
-        digits: Number of printed significant digits.
-        metres: Largest distance on the samples between the tip of the printed table and the tip of the exact
-            table.
-        bound: Guaranteed bound (metres) of this distance within the joint limits; None if no bound is known.
-        samples: Number of sampled configurations.
-    """
+    """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits."""
 
     digits: int
     metres: float
@@ -42,14 +34,11 @@ class PrintedPrecision:
 
 
 def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
-    """Parse the printed form of a table, and compare the printed table with the exact table.
-
-    `pose_digits` is the number of significant digits of base and tool; None means `units.digits`.
-    """
+    """Return the tip error of a printed table with `pose_digits` significant digits in base and tool."""
     rows = tuple(_printed_row(row, units) for row in table.rows)
     base, tool = (_printed_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
     q = samples_within_limits(table)
-    # A DHTable accepts only exact rotations, so the rounded base and tool are multiplied separately.
+    # DHTable rejects coarsely rounded rotations, so the printed base and tool are multiplied separately.
     T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
@@ -85,7 +74,7 @@ def _printed_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Return the sum of the largest tip errors (metres) that the rounding of each number can cause.
+    """Return the sum of the largest tip errors (m) that the rounding of each number can cause.
 
     The rounding error of an angle moves the tip by at most this error times `lever`, the largest distance
     from the row's frame to the tip.
@@ -107,7 +96,7 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
 
 
 def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
-    """Return the largest position error of any link due to rounding in the table, at `q` (n, coordinates)."""
+    """Compare the link positions of a printed and an exact table at `q` (n, coordinates)."""
     again = replace(table, rows=tuple(_printed_tree_row(row, units) for row in table.rows))
     distances = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
     return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), None, len(q))

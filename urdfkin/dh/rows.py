@@ -57,8 +57,7 @@ _TABLE_KEYS = (
     *("convention", "angles", "lengths", "robot", "base_frame", "tip_frame", "base", "tool"),
     *("coordinates", "rows"),
 )
-#: Keys for information about a table, for example the source of its numbers.
-#: These keys do not change the table.
+#: These keys contain information about a table, and do not change the table.
 _NOTES = ("source", "source_kind", "note", "name", "urdf", "snap", "last", "fit_sign", "checked")
 _BY_NAME = "write {a = ..., alpha = ..., d = ..., theta = ...}, where the order does not matter"
 
@@ -75,9 +74,9 @@ class Literal(float):
 
 
 def last_digits(data: Mapping[str, Any]) -> tuple[dict[str, float], ...]:
-    """Return, for each row, half a unit of the last digit of each cell, in metres and radians.
+    """Return half a unit of the last digit of each cell (metres or radians), for each row.
 
-    `data` is the mapping that `urdfkin.dh.parse_table.mapping_from_text` returns for a valid table.
+    `data` must come from `urdfkin.dh.parse_table.mapping_from_text`, which keeps the text of the numbers.
     """
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     rows = []
@@ -114,15 +113,11 @@ def half_a_digit(value: object, whole_is_rounded: bool = False) -> float:
 
 
 def by_column(row: Sequence[Any]) -> dict[str, Any]:
-    """Convert a row from a list to a mapping."""
     return dict(zip((*COLUMNS, "kind"), row, strict=False))
 
 
 def parse_row(row: Any, index: int, units: Units) -> DHRow:
-    """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list; `index` counts from 0.
-
-    The message of an InputError names the row and the column.
-    """
+    """Parse a handwritten row: a `DHRow`, a mapping of its fields, or a list; `index` counts from 0."""
     if isinstance(row, DHRow):
         return row
     row = row.tolist() if isinstance(row, np.ndarray) else row
@@ -145,8 +140,6 @@ def _check_order(rows: Sequence[Any]) -> None:
     """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
 
     Angles in a table are nearly always multiples of 15 degrees; lengths hardly ever look like such multiples.
-    The rows are rejected if all numbers in the first and the fourth column look like multiples of 15 degrees,
-    and no number in the second column does.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):
@@ -163,7 +156,6 @@ def _check_order(rows: Sequence[Any]) -> None:
 
 
 def name_of(value: Any, where: str) -> str:
-    """Return a name; raise InputError unless the name is a non-empty text."""
     if not isinstance(value, str) or not value.strip():
         raise InputError("a name must be text", where=where, found=repr(value), remedy="write it in quotes")
     return value
@@ -174,7 +166,6 @@ def _has_order(row: Sequence[Any]) -> bool:
 
 
 def _looks_round(value: Any) -> bool:
-    """Whether a cell looks like a multiple of 15 degrees in radians or in degrees."""
     if isinstance(value, str):
         return "pi" in value
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -242,7 +233,6 @@ def _split_variable(fields: Mapping[str, Any], index: int, where: str) -> Mappin
 
 
 def units_in(cell: Cell, units: Units) -> Units:
-    """Return the units of a cell: the cell's own unit if it has one, and otherwise the table's units."""
     if cell.unit in ("m", "mm"):
         return units_of(units.angles, cell.unit, units.digits)
     return units_of(cell.unit or units.angles, units.lengths, units.digits)
@@ -261,7 +251,6 @@ def _parse_cell(text: str, where: str) -> Cell:
 
 
 def _cell(name: str, value: Any, units: Units, where: str) -> float:
-    """Parse a cell into metres or radians; an angle in radians that exceeds one turn is an error."""
     is_length, at, unit = name in ("a", "d"), f"{where}, {name}", None
     if isinstance(value, str):
         cell = _parse_cell(value, at)
@@ -309,7 +298,6 @@ def _sense(value: Any, where: str) -> int:
 
 
 def _joint_value(name: str, value: Any, fields: Mapping[str, Any], units: Units, where: str) -> float:
-    """Parse a value of the joint's variable: an angle if the joint is revolute, otherwise a length."""
     number = read_number(value, f"{where}, {name}")
     return cell_in_si("theta" if _kind(fields.get("kind", "R"), where).turns else "d", number, units)
 
@@ -415,10 +403,7 @@ def table_from_rows(
 
 
 def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
-    """Make a table from a mapping with the keys of a TOML file (`urdfkin.dh.rows` shows them).
-
-    A missing convention or an unknown key raises InputError; other errors are as in `table_from_rows`.
-    """
+    """Make a table from a mapping with the keys of a TOML file (`urdfkin.dh.rows` shows them)."""
     if "convention" not in data:
         raise InputError(
             "the table does not name its convention",
@@ -431,7 +416,6 @@ def table_from_mapping(data: Mapping[str, Any]) -> DHTable:
 
 
 def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
-    """Check that each mimicked joint has a row or is in `coordinates`, and is not itself a mimic joint."""
     if not isinstance(coordinates, Sequence) or isinstance(coordinates, str):
         raise InputError(
             "`coordinates` must be a list of names", where="coordinates", found=repr(coordinates)
@@ -447,7 +431,7 @@ def _check_leaders(rows: Sequence[DHRow], coordinates: Any) -> None:
                 "a joint cannot mimic a mimic joint",
                 where=where,
                 found=repr(row.mimic.leader),
-                remedy=f"name the joint that {row.mimic.leader!r} mimics; use the product of the multipliers",
+                remedy=f"mimic the leader of {row.mimic.leader!r}, with the product of the two multipliers",
             )
         error = UnknownNameError("joint", row.mimic.leader, known, where=where)
         error.remedy = f"{error.remedy}; name a mimicked joint without a row in coordinates = [...]"

@@ -42,7 +42,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Largest deviation of the length of a handwritten axis from 1, and of its pitch (m/rad) from 0.
+#: Tolerance of handwritten screws: the axis has length 1, and the pitch (m/rad) is 0.
 _WRITTEN = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 
@@ -143,7 +143,7 @@ class ProductOfExponentials(Displayable):
 
     @cached_property
     def path(self) -> Path:
-        """The product of exponentials as a path of rotations about z axes and translations along z axes.
+        """The product of exponentials, written as rotations about z axes and translations along z axes.
 
         For a revolute joint, exp([S] q) = A Rz(q) A^-1. For a prismatic joint, exp([S] q) = A Tz(q) A^-1. The
         z axis of the pose A is along the joint's axis. The constant pose between two motions is A_i^-1
@@ -242,7 +242,6 @@ def screws_document(screws: ProductOfExponentials, digits: int = 10) -> TextDocu
 
 
 def screws_of(path: FrameChain) -> ProductOfExponentials:
-    """Return the screws of a robot's path in the zero configuration."""
     frames, rows = path.path.frames(np.zeros(len(path.joints)))[::2], list[FloatArray]()
     for joint, T in zip(path.joints, frames, strict=False):
         z, p = T[:3, 2], T[:3, 3]
@@ -277,19 +276,10 @@ def screws_from(
 ) -> ProductOfExponentials:
     """Make a product of exponentials from handwritten screws; a joint is revolute if w is not zero.
 
-    Args:
-        screws: (n, 6) a row (w, v) for each joint, with the angular part first. An array (6, n) with a column
-            for each joint, as in Modern Robotics, is also accepted if n is not six.
-        M: (4, 4) or (3, 4) pose of the tip in the zero configuration (metres).
-        frame: Frame of the screws: "space" (the base) or "body" (the tip).
-        joints: Names of the joints; joint_1, joint_2, ... by default.
-        robot: The robot's name.
-        base_frame: Name of the base frame.
-        tip_frame: Name of the tip frame.
-
-    Raises:
-        InputError: an array has a wrong shape, the length of an axis is not 1, or a screw has a pitch (w . v
-            is not 0). URDF has no joint with a pitch.
+    `screws` has a row (w, v) for each joint. An array (6, n) with a column for each joint, as in Modern
+    Robotics, is also accepted if n is not six. `M` is the (4, 4) or (3, 4) pose of the tip in the zero
+    configuration (metres). `frame` is the frame of the screws: "space" (the base) or "body" (the tip). A
+    screw with a pitch (w . v is not 0) raises InputError, because URDF has no joint with a pitch.
     """
     S = np.array(screws, dtype=np.float64)
     S = S.T if S.ndim == 2 and S.shape[0] == 6 != S.shape[1] else S
@@ -337,7 +327,7 @@ def screws_from(
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
-    """Make screws from a file's plain data, with the keys M and space or body; errors as in `screws_from`."""
+    """Make screws from plain data with the keys M and "space" or "body"."""
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
     check_keys(data, known, "the table of screws")
     frame = next((key for key in ("space", "body") if key in data), None)

@@ -36,22 +36,17 @@ from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
 
-#: Largest tolerance (rad) for rounding a table's angles: 5 degrees.
-#: Above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
+#: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
-#: Number of configurations at which a rounded table is compared with the exact chain or table.
 SAMPLES = 500
 #: Assumed range (rad or metres) of a mimicked joint that is not on the path.
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: Largest deviation of an angle (rad) from a multiple of 15 degrees that `noisy_cells` reports.
-#: The largest length that `noisy_cells` reports is this number times the table's span.
+#: Largest deviation (rad, or relative to the span) of a noisy cell.
 _LARGEST_NOISE = 1e-4
-#: Tolerances (rad) that `snap_hint` tries, in ascending order.
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
 
 def check_tolerance(snap: float) -> float:
-    """Return the tolerance (rad) as a float; raise InputError unless it is between 0 and 5 degrees."""
     tolerance = real_number(snap, "snap")
     if not 0.0 <= tolerance <= LARGEST_TOLERANCE:
         raise InputError(
@@ -63,7 +58,7 @@ def check_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the chain with snapped angles, and pairs: the index of a constant pose, and its change."""
+    """Return the snapped chain, and the changes, each with the index of its constant pose."""
     exact = chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
     path = chain(snapped_tree, tip, base)
@@ -123,7 +118,6 @@ def snap_report(
 
 
 def samples_within_limits(table: DHTable) -> FloatArray:
-    """Return `SAMPLES` random configurations of a table."""
     ranges = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
     return values_within([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SAMPLES)
 
@@ -138,7 +132,7 @@ def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:
 
 
 def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree, dict[str, float]]:
-    """Snap roll, pitch and yaw of all joint origins; also return the angle by which each origin rotated."""
+    """Snap roll, pitch and yaw of all joint origins; return the tree and the rotation of each origin."""
     joints, rotations = list(tree.joints), dict[str, float]()
     for i, joint in enumerate(joints):
         T = np.array(joint.T_parent_joint)
@@ -155,7 +149,8 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
     """Factor R into Rz(yaw) Ry(pitch) Rx(roll), and snap each angle to a multiple of pi/12."""
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
-    if level <= tolerance:  # Gimbal lock: set roll to 0.
+    # In gimbal lock, only the sum or difference of roll and yaw is defined, so roll is set to 0.
+    if level <= tolerance:
         roll, yaw = 0.0, math.atan2(-R[0, 1], R[1, 1])
     else:
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -181,7 +176,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
 
 
 def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
-    """Multiply rotations about coordinate axes, with each angle snapped if it is within the tolerance."""
+    """Multiply rotations about coordinate axes, with each angle snapped within `tolerance`."""
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
@@ -224,7 +219,7 @@ def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Return the index of the row that contains the chain's constant A_k; -1 is the base, n is the tool."""
+    """Return the row that contains the chain's constant A_k; -1 is the base, n is the tool."""
     n = len(table.rows)
     if k == 0:
         return -1
@@ -234,15 +229,12 @@ def row_of_constant(table: DHTable, k: int) -> int:
 
 
 def travel(limit: Limit | None) -> float:
-    """Return the largest distance of a prismatic joint from zero (metres); one metre without limits."""
+    """Return the largest distance of a prismatic joint from zero (m); 1 m without limits."""
     return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
-    """Return the angles near a multiple of 15 degrees, and the lengths near 0, as (joint, cell, deviation).
-
-    The cell with the smallest deviation (rad or m) is first.
-    """
+    """Return (joint, cell, deviation) for angles near multiples of 15 degrees, and lengths near 0."""
     noisy = []
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
@@ -256,11 +248,10 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
 
 
 def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None:
-    """Recommend the tolerance that leaves the fewest noisy cells, in one line; None if no tolerance helps.
+    """Recommend the tolerance that leaves the fewest noisy cells; None if no tolerance helps.
 
     A noisy cell differs slightly from 0 or from a multiple of 15 degrees, because an angle in the file is
-    rounded. For example, 1.5708 may cause a tilt of 5e-12 rad and offsets of about 1e-12 m. `snapped` is
-    a function that returns the table for a snapping tolerance (rad).
+    rounded, for example to 1.5708.
     """
     noisy = noisy_cells(table) if table.snap is None else []
     if not noisy:

@@ -1,19 +1,16 @@
-"""Find the structure of an arm and export it for closed-form inverse kinematics solvers.
+"""Find the structure of an arm, and export it for closed-form inverse kinematics solvers.
 
 Six revolute joints have a closed-form solution if three consecutive axes are parallel or intersect in one
-point (Pieper, 1968). A calibrated robot has such a property only approximately. Distances and angles of
-consecutive axes are the same in every configuration, so they are computed in the zero configuration.
+point (Pieper, 1968). Distances and angles of consecutive axes are the same in every configuration, so they
+are computed in the zero configuration.
 
-`opw_of` returns the seven parameters of an ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et
-al., 2014). An OPW arm is the standard table
+An ortho-parallel arm with a spherical wrist (OPW, Brandstoetter et al., 2014) has the standard table
 
     a1 -90 c1 q1    c2 0 0 q2-90    a2 90 b q3+90    0 -90 c3 q4    0 90 0 q5    0 0 c4 q6
 
-with cells in the order a, alpha, d, theta. `opw_of` derives a table of the URDF with the frames of an OPW
-table; the cells of the derived table give the parameters. OPW has no parameter for the small tilts of a
-calibrated arm.
+with cells in the order a, alpha, d, theta. OPW has no parameter for the small tilts of a calibrated arm.
 
-`axes_and_vectors` returns H and P, the input of solvers by subproblem decomposition (IK-Geo, EAIK):
+Solvers by subproblem decomposition (IK-Geo, EAIK) take the axes h_i and the vectors P_i of the tip's pose:
 
     p(q) = P_0 + R(h_1, q_1) (P_1 + R(h_2, q_2) (P_2 + ... + P_n)),    R(q) = R(h_1, q_1) ... R(h_n, q_n) R_6T
 """
@@ -39,17 +36,15 @@ from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind
 
-#: Largest deviations (rad and metres) of a reported property.
+#: A property is reported if its deviation is at most this angle (rad) and this length (m).
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
-#: Largest deviation (rad and metres) from a property, such as parallel axes, that counts as exact.
+#: A property with at most this deviation (rad and m) counts as exact.
 EXACT = 1e-9
-#: Singular value below which the Jacobian loses rank; rounding errors are far smaller.
+#: Smaller singular values count as zero; rounding errors are far below this number.
 _RANK = 1e-6
-#: Number of random configurations, within the limits and without mimic rules, to estimate the reach.
 _SAMPLES = 2000
 #: Default tolerance of `opw_of` (metres and rad).
 TOLERANCE = 1e-6
-#: Number of configurations at which `opw_of` computes the tip error.
 SAMPLES = 200
 _H = math.pi / 2.0
 _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
@@ -57,10 +52,7 @@ _ALPHA, _THETA = (-_H, 0.0, _H, -_H, _H, 0.0), (0.0, -_H, _H, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class AxisPair:
-    """The angle (at most pi/2) and the distance between two consecutive joint axes.
-
-    The distance is 0 if one of the two joints is prismatic.
-    """
+    """Angle (at most pi/2) and distance (m) of two axes; the distance is 0 if one joint is prismatic."""
 
     first: str
     second: str
@@ -70,12 +62,10 @@ class AxisPair:
 
 @dataclass(frozen=True, slots=True)
 class StructureKind:
-    """A geometric property of some consecutive joints, for example "spherical wrist".
+    """A geometric property of consecutive joints, for example "spherical wrist".
 
-    Attributes:
-        radians: Angle between the actual axes and axes for which the property holds exactly.
-        metres: Distance between the actual axes and axes for which the property holds exactly.
-        at: (3,) position of the intersection in the base at the zero configuration (metres), or None.
+    `radians` and `metres` are the deviation from the exact property. `at` is the intersection of the axes in
+    the base frame, in the zero configuration (metres).
     """
 
     name: str
@@ -93,14 +83,8 @@ class StructureKind:
 class Structure:
     """The geometric structure of a path.
 
-    Attributes:
-        joints: R or P for each joint.
-        freedoms: Degrees of freedom of the tip: the Jacobian's rank at a random configuration.
-        kinds: Exact and approximate properties; the property with the smallest deviation is first.
-        reach: Upper bound (metres) of the tip's distance from the point of the first axis that is nearest to
-            the second axis.
-        reached: Largest distance of the tip from this point in sampled configurations (metres).
-        solvers: Closed-form solutions, with libraries that implement them.
+    `reach` is an upper bound (m) of the tip's distance from the point of axis 1 that is nearest to axis 2.
+    `reached` is the largest such distance in sampled configurations.
     """
 
     robot: str
@@ -158,7 +142,7 @@ def _pair(screws: ProductOfExponentials, i: int) -> AxisPair:
 
 
 def intersection(screws: ProductOfExponentials, indices: tuple[int, ...]) -> tuple[FloatArray, float]:
-    """Return the point with the least squared distances from some axes, and its largest distance (m)."""
+    """Return the least-squares intersection of axes, and the distance (m) of the farthest axis from it."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     for i in indices:
         across = np.eye(3) - np.outer(_axis(screws, i), _axis(screws, i))
@@ -222,7 +206,8 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
         ik_geo = f", ik-geo's spherical{suffix}" if "spherical wrist" in names else ""
         solutions.append(f"Pieper, three axes meet: EAIK{ik_geo}")
     if "three parallel axes" in names:
-        # ik-geo requires that axes 2, 3 and 4 are parallel and that axes 5 and 6 intersect.
+        # ik-geo's solvers for three parallel axes require that axes 2, 3 and 4 are parallel.
+        # The solver with the suffix _two_intersecting also requires that axes 5 and 6 intersect.
         ik_geo = f"ik-geo's three_parallel{'_two_intersecting' if intersect[4] else ''}"
         solvers = ["EAIK"] * any(intersect) + [ik_geo] * (parallel[1] and parallel[2])
         if solvers:
@@ -237,7 +222,7 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
 def _origin(screws: ProductOfExponentials) -> FloatArray:
     """Return the point of the first axis that is nearest to the second axis.
 
-    If a joint is prismatic, or if the axes are nearly parallel, return the first point in `screws.points`.
+    If one joint is prismatic, or if the axes are nearly parallel, return `screws.points[0]`.
     """
     if not screws.joints:
         return np.zeros(3)
@@ -252,9 +237,9 @@ def _origin(screws: ProductOfExponentials) -> FloatArray:
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Return an upper bound of the tip's distance (metres) from `origin`, a point of the first axis.
+    """Bound the tip's distance (m) from `origin`, a point of the first axis, within the joint limits.
 
-    The bound is the length of the polygonal chain from `origin` to the tip. Each vertex is the point of the
+    The bound is the length of a polygonal chain from `origin` to the tip. Each vertex is the point of the
     next axis that is nearest to the previous vertex. Travel of prismatic joints is added.
     """
     point, total = origin, 0.0
@@ -270,7 +255,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the tip's positions in random configurations, and the Jacobian in the first of them."""
+    """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
     ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
     values = values_within(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
@@ -278,16 +263,10 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opw:
-    """The OPW parameters of an arm.
+    """The OPW parameters of an arm; q_opw = sign * q - offset, where q are the URDF's joint values.
 
-    The solver's joint values are q_opw = sign * q - offset, where q are the URDF's joint values.
-
-    Attributes:
-        lengths: a1, a2, b, c1, c2, c3, c4 in metres.
-        offsets: Constant `offset` of each joint (rad).
-        signs: Factor `sign` of each joint, +1 or -1.
-        base: (4, 4) pose of the solver's base in the URDF's base.
-        tool: (4, 4) pose of the URDF's tip in the solver's flange frame.
+    `base` is the pose of the solver's base in the URDF's base. `tool` is the pose of the URDF's tip in the
+    solver's flange frame.
     """
 
     joints: tuple[str, ...]
@@ -329,13 +308,9 @@ class Opw:
 
 
 def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
-    """Return the OPW parameters of a path of six revolute joints.
+    """Return the OPW parameters of a path; raise InputError if the path is not an OPW arm.
 
-    `tolerance` is the largest allowed error of the tip on `SAMPLES` configurations, in metres and in radians.
-
-    Raises:
-        InputError: the path does not have exactly six revolute joints, or is not an OPW arm. The message
-            contains the tip error.
+    `tolerance` is the largest allowed error of the tip on `SAMPLES` configurations (metres and radians).
     """
     where = f"{path.robot}, {path.base} to {path.tip}"
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
@@ -385,7 +360,7 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _parameters(table: DHTable) -> Opw:
-    """Return the OPW parameters of a table that has the frames of an OPW table; ignore all other cells."""
+    """Read the OPW parameters from a table with the frames of an OPW table."""
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -395,10 +370,10 @@ def _parameters(table: DHTable) -> Opw:
 
 
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
-    """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) between points on these axes, in metres.
+    """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) in metres; all joints must be revolute.
 
-    All joints must be revolute. The first vector begins at the base, and the last vector ends at the tip. The
-    vector between two intersecting axes is zero; solvers detect the intersection by this zero.
+    The first vector begins at the base, and the last vector ends at the tip. The vector between two axes with
+    a common point in `_points` is exactly zero; solvers detect an intersection by this zero.
     """
     points = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)

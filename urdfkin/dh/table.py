@@ -46,7 +46,6 @@ class DHConvention(StrEnum):
 
 
 def convention_of(name: str) -> DHConvention:
-    """Return the convention with this name; raise InputError for an unknown name."""
     try:
         return DHConvention(name)
     except (ValueError, TypeError):
@@ -155,7 +154,7 @@ class DHRow:
 
 #: Largest deviation of a handwritten angle from a multiple of 15 degrees, as a fraction of 15 degrees.
 _WRITTEN = 1e-3
-#: Largest error of a rotation matrix in a handwritten pose, which often has only seven digits.
+#: Tolerance of handwritten rotation matrices, because they often have only seven digits.
 _TYPED = 1e-6
 
 
@@ -216,14 +215,16 @@ def wrapped(angle: float) -> float:
 
 
 def cleaned_angle(angle: float) -> float:
-    """Return the equivalent angle in (-pi, pi], without rounding error if it is a multiple of pi/12."""
+    """Wrap an angle into (-pi, pi], and remove the rounding error of a multiple of pi/12."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
-    """Whether an angle is nearly a multiple of 15 degrees, but not 0; `twelfth` is 15 degrees in its unit.
+    """Whether an angle is nearly a multiple of 15 degrees, but not 0.
+
+    `twelfth` is 15 degrees in the unit of the angle.
 
     >>> looks_round(1.571), looks_round(0.0), looks_round(0.25), looks_round(90.0, twelfth=15.0)
     (True, False, False, True)
@@ -232,23 +233,19 @@ def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
 
 
 def nearest_twelfth(angle: float) -> float:
-    """Return the multiple of pi/12 (15 degrees) nearest to an angle."""
+    """Return the multiple of pi/12 that is nearest to an angle (rad)."""
     return round(angle * 12.0 / math.pi) * math.pi / 12.0
 
 
 @dataclass(frozen=True, slots=True)
 class SnapChange:
-    """One rounded angle, and the rotation of the chain that the rounding causes.
+    """One angle that was rounded to a multiple of 15 degrees; the rounding rotates the rest of the chain.
 
     Attributes:
-        row: Index of the row that contains the angle, from 0; -1 is the base, and the number of rows is the
-            tool.
-        what: The joint and the snapped quantity, as text.
-        angle: Angle (rad) by which the change rotates the rest of the chain.
-        lever: Largest distance (metres) from the centre of this rotation to the tip, with all prismatic
-            joints at zero.
-        sliders: Names of the prismatic joints between this centre and the tip; their travel increases the
-            distance.
+        row: Index of the row, from 0; -1 is the base, and the number of rows is the tool.
+        angle: Angle (rad) of this rotation.
+        lever: Largest distance (m) from the rotation's centre to the tip, with prismatic joints at zero.
+        sliders: Prismatic joints between the centre and the tip; their travel increases the distance.
     """
 
     row: int
@@ -259,7 +256,7 @@ class SnapChange:
 
     @property
     def tip(self) -> float:
-        """Bound of the tip's displacement by this change, with the prismatic joints at zero (metres)."""
+        """Bound of the tip's displacement by this change (m), with prismatic joints at zero."""
         return self.angle * self.lever
 
 
@@ -268,12 +265,13 @@ class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
 
     Each change rotates the rest of the chain about a joint's origin. The tip moves by at most the angle times
-    its distance from this origin. The sum of these bounds is valid in every configuration.
+    its distance from this origin. The sum of these bounds holds for all angles.
 
     Attributes:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
-        metres: Guaranteed bound of the tip's displacement within the limits of prismatic joints (metres).
+        metres: Guaranteed bound of the tip's displacement (metres), with prismatic joints within their
+            limits, or within 1 m of zero without limits.
         radians: Guaranteed bound of the tip's rotation (radians).
         per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
         measured_metres: Largest displacement of the tip in sampled configurations (metres).
@@ -317,7 +315,7 @@ class DHTable(Displayable):
         robot: The robot's name.
         base_frame: Name of the base frame.
         tip_frame: Name of the tip frame.
-        snap: The snapped angles and their effect on the tip; None for an exact table.
+        snap: The rounded angles and their effect on the tip; None for an exact table.
 
     Raises:
         InputError: two rows name the same joint, or base or tool is not a rigid transform.
@@ -479,9 +477,9 @@ class DHTable(Displayable):
         return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
-        """Return bounds (...,), in m and rad, of the difference between the tip's poses in table and URDF.
+        """Return bounds (...,), in m and rad, of the difference between the table's and the URDF's tip pose.
 
-        The bounds cover rounding errors, and the effect of snapped angles if the table has any.
+        The bounds cover rounding errors, and the effect of rounded angles if `snap` is not None.
 
         >>> import urdfkin
         >>> table = urdfkin.load("planar_two_link").dh("tip", "base")
@@ -521,10 +519,7 @@ class DHTable(Displayable):
 
     @cached_property
     def _path(self) -> Path:
-        """The table's path without the tool: the base, then a motion and a constant pose for each row.
-
-        In a modified table the constant pose of a row comes before its motion.
-        """
+        """The path from the base to frame n, with a motion and a constant pose for each row."""
         steps: list[FloatArray | ElementaryMotion] = [self.base]
         for row in self.rows:
             motion = ElementaryMotion(2, row.kind.turns)
@@ -553,7 +548,6 @@ class DHTable(Displayable):
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:
-    """Return a read-only (4, 4) rigid transform; raise InputError for any other matrix."""
     pose = frozen(T)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(

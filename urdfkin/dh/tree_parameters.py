@@ -46,18 +46,13 @@ _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1
 
 @dataclass(frozen=True, slots=True)
 class TreeRow:
-    """One joint and its child link, in metres and radians.
+    """One joint and its child link, in metres and radians; the module's equation defines the cells.
+
+    The joint's value is added to theta if sigma is 0, and to r if sigma is 1.
 
     Attributes:
         antecedent: Index of the row of the antecedent link, from 0; -1 is the root.
         sigma: 0 revolute, 1 prismatic, 2 fixed.
-        gamma: Rotation about the antecedent's z.
-        b: Offset along the antecedent's z.
-        alpha: Rotation about x, the common normal.
-        d: Length along x.
-        beta: Rotation about y after alpha; 0 except between nearly parallel axes.
-        theta: Rotation about the joint's own z; the joint's value is added if sigma is 0.
-        r: Offset along the joint's own z; the joint's value is added if sigma is 1.
         leader: Name of the mimicked joint; the joint's own name if it mimics no other joint.
         multiplier: Factor of the mimic rule: the joint's value is multiplier * q_leader + offset.
     """
@@ -85,8 +80,8 @@ class TreeParameters:
     Attributes:
         path_lengths: (joints,) sum of the URDF's offsets (metres) from the root to each joint.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        left_out: Tilts within rounding errors are set to zero (`urdfkin.dh.common_normals`). This is the
-            largest sum (rad) of such tilts on a path from the root.
+        left_out: Largest sum (rad), on a path from the root, of tilts that are set to zero as rounding
+            errors.
     """
 
     robot: str
@@ -103,7 +98,7 @@ class TreeParameters:
 
     @property
     def roundings(self) -> float:
-        """Estimated rounding error of the poses on the longest path, in eps * reach; not a proven bound.
+        """Estimated rounding error of the poses, in eps * reach; not a proven bound.
 
         The estimate does not include Pinocchio's rounding errors.
         """
@@ -127,7 +122,6 @@ class TreeParameters:
         return reach
 
     def _path(self, j: int) -> list[int]:
-        """Return the indices of the rows from row j to the root."""
         path = []
         while j >= 0:
             path.append(j)
@@ -164,12 +158,7 @@ class TreeParameters:
 
 
 def tree_parameters(tree: KinematicTree) -> TreeParameters:
-    """Return Khalil and Kleinfinger's parameters of a whole robot, exact to rounding.
-
-    Raises:
-        InputError: the robot has a planar or floating joint, which has no single axis.
-        RangeError: the square of a length is outside the range of doubles.
-    """
+    """Return Khalil and Kleinfinger's parameters of a whole robot, exact to rounding."""
     check_lengths(tree.joints)
     for joint in tree.joints:
         if joint.kind not in _SIGMA:
@@ -196,15 +185,10 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
 
 @dataclass(frozen=True, slots=True)
 class _LinkAxis:
-    """The axis frame of a link.
+    """The axis frame of a link, with z along the axis of the link's joint.
 
-    Attributes:
-        antecedent: Index of the nearest moving link towards the root; -1 is the root.
-        T_antecedent_axis: (4, 4) pose of this axis frame in the axis frame of the antecedent.
-        T_link_axis: (4, 4) pose of the axis frame in the link's URDF frame.
-        noise: Rounding errors of `T_antecedent_axis`.
-        left_out: Sum (rad) of the tilts between the root and this link that are set to zero as rounding
-            errors.
+    `T_antecedent_axis` is the pose in the antecedent's axis frame. `T_link_axis` is the pose in the link's
+    URDF frame. `left_out` is the sum (rad) of the tilts from the root to the link that are set to zero.
     """
 
     antecedent: int
@@ -215,9 +199,9 @@ class _LinkAxis:
 
 
 def _links(tree: KinematicTree, lengths: list[float]) -> list[_LinkAxis]:
-    """Return the axis frame of each joint, with z along the axis; a fixed joint has its link's own frame."""
+    """Return the axis frame of each link; the link of a fixed joint keeps its own frame."""
     links = list[_LinkAxis]()
-    # For each link: its antecedent, T_antecedent_link, and the number of joints without an axis between them.
+    # Each link has its antecedent, T_antecedent_link, and the number of fixed joints between the two links.
     carriers = [(-1, np.eye(4), 0)]
     for j, (joint, length) in enumerate(zip(tree.joints, lengths, strict=True)):
         antecedent, T, folded = carriers[joint.parent]
@@ -236,13 +220,13 @@ def _steps(
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
-    The transform leads from the axis of the antecedent (`_LinkAxis`) to the joint's axis. The angle and the
-    offset lead from the axis frame of a link to the frame of its row. The first moving child of a link
-    defines the link's x axis. For a link without a moving child, x is chosen so that theta = 0.
+    The transform leads from the axis of the antecedent to the joint's axis. The angle and the offset lead
+    from the axis frame of a link to the frame of its row.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
         i = link.antecedent
+        # The first moving child of a link defines the link's x axis.
         defines_x = joint.kind.has_axis and i not in offsets
         phi_next = steps[i].phi_next if i >= 0 else 0.0
         phi, _ = offsets.get(i, (-phi_next, 0.0))
@@ -252,6 +236,7 @@ def _steps(
         if defines_x:
             offsets[i] = (step.phi, step.delta)
         steps.append(step)
+    # For a link without a moving child, x is chosen so that theta is 0.
     for j, joint in enumerate(tree.joints):
         if joint.kind.has_axis and j not in offsets:
             offsets[j] = (-steps[j].phi_next, 0.0)
@@ -289,7 +274,7 @@ def _row(
 
 
 def _path_lengths(tree: KinematicTree) -> list[float]:
-    """Return the path length from the root to each joint's origin: the sum of all offsets (metres)."""
+    """Return the sum of all offsets (m) from the root to each joint's origin."""
     lengths = [0.0]
     for joint in tree.joints:
         lengths.append(lengths[joint.parent] + joint.length)
@@ -335,7 +320,7 @@ def _cells(row: TreeRow, j: int, units: Units) -> list[str]:
 
 
 def as_csv(table: TreeParameters) -> str:
-    """Return CSV in metres and radians: each row of the table, and the entries T11 to T34 of T_frame_link."""
+    """Return CSV (m, rad): the rows, each followed by the entries T11 to T34 of T_frame_link."""
     entries = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
     lines: list[list[object]] = [[*(field.name for field in fields(TreeRow)), *entries]]
     for row, T in zip(as_mapping(table)["rows"], table.T_frame_link[:, :3], strict=True):

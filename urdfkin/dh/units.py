@@ -31,20 +31,16 @@ class Lengths(StrEnum):
     MILLIMETRES = "millimetres"
 
 
-#: Default order of the four columns; a row that is a list has its cells in this order.
+#: A row that is a list has its cells in this order.
 #: The order in Craig's book is alpha, a, d, theta; in the Robotics Toolbox, theta, d, a, alpha.
 COLUMNS = ("a", "alpha", "d", "theta")
 _UNIT_NAMES = {"rad": "radians", "deg": "degrees", "m": "metres", "mm": "millimetres"}
-#: Maximum number of characters in a cell.
 _LONGEST = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """Format of the numbers in a printed table, with `digits` significant digits.
-
-    Exact multiples of pi/12 in radians are written as fractions of pi.
-    """
+    """Format of printed numbers; exact multiples of pi/12 in radians are written as fractions of pi."""
 
     angles: Angles = Angles.RADIANS
     lengths: Lengths = Lengths.METRES
@@ -64,11 +60,7 @@ class Units:
         return "m" if self.lengths is Lengths.METRES else "mm"
 
     def angle(self, radians: float, pi: str = "pi") -> str:
-        """Format an angle; `pi` is the text for pi.
-
-        >>> Units().angle(-math.pi / 2), Units(Angles.DEGREES).angle(math.pi / 12)
-        ('-pi/2', '15')
-        """
+        """Format an angle (rad); `pi` is the text for pi."""
         fraction = pi_fraction(radians)
         if self.angles is Angles.DEGREES:
             return str(fraction * 180) if fraction is not None else self._number(math.degrees(radians))
@@ -103,11 +95,7 @@ def units_of(angles: str = "radians", lengths: str = "metres", digits: int = 10)
 
 
 def pi_fraction(radians: float) -> Fraction | None:
-    """Return an angle as a multiple of pi if it is exactly a multiple of pi/12; None for any other angle.
-
-    >>> pi_fraction(math.pi / 2), pi_fraction(1.5708)
-    (Fraction(1, 2), None)
-    """
+    """Return an angle as a multiple of pi if it is exactly a multiple of pi/12; None for any other angle."""
     twelfths = round(radians * 12.0 / math.pi)
     return Fraction(twelfths, 12) if twelfths * math.pi / 12.0 == radians else None
 
@@ -121,11 +109,7 @@ def fraction_text(fraction: Fraction, pi: str = "pi") -> str:
 
 
 def read_number(value: object, where: str) -> float:
-    """Parse a number, or the text of a number or of a multiple of pi; InputError contains `where`.
-
-    >>> read_number("-pi/2", "alpha") == -math.pi / 2
-    True
-    """
+    """Parse a number, or the text of a number or of a multiple of pi."""
     try:
         number = _number(value)
     except (ValueError, TypeError, OverflowError, ZeroDivisionError):
@@ -155,7 +139,6 @@ def cell_in_si(name: str, number: float, units: Units) -> float:
     return number if units.angles is Angles.RADIANS else in_radians(number)
 
 
-#: Plain-text replacements for characters that occur in web pages, PDFs and LaTeX.
 _PLAIN_TEXT = str.maketrans(
     {
         **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63", "-"),
@@ -191,19 +174,19 @@ _TOKEN = re.compile(
 
 
 class InvalidCellError(ValueError):
-    """Error for a text that is not a valid cell; the message names the invalid token."""
+    """The text is not a valid cell; the message states the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """The content of a cell.
+    """The content of a cell, for example -q2 + 90 deg.
 
     Attributes:
         number: The constant, in `unit`; in the table's unit if `unit` is None.
         unit: "rad" (also for a multiple of pi), "deg", "m" or "mm"; None without a unit.
         factor: Factor of the joint's variable; None if the cell has no variable.
-        variable: Number in the variable's name, for example 3 for q3. None if the name has no number.
-        text: Text of the constant if it is a single number; "" if it is computed from several numbers.
+        variable: Number in the variable's name, for example 2 for q2.
+        text: Text of the constant if it is a single number, otherwise "".
     """
 
     number: float
@@ -214,7 +197,6 @@ class Cell:
 
     @property
     def constant(self) -> str:
-        """Text of the cell, without the joint variable."""
         return f"{self.number!r} {self.unit or ''}"
 
 
@@ -283,7 +265,6 @@ class _Term:
         return self.size is None and not self.variable
 
     def append(self, token: str, kind: str) -> None:
-        """Add a token to the term; raise InvalidCellError if it cannot follow the tokens before it."""
         if kind == "sign" and not self.is_empty and not self.operator:
             self.operator = token
             return

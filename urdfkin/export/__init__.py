@@ -30,7 +30,10 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return code with exact constants for sympy-exact; raise VerificationError if results differ."""
+    """Return the code, with exact constants for the language sympy-exact.
+
+    Raise VerificationError if Pinocchio's results differ from those of the exact expressions.
+    """
     return code.exact() if to == "sympy-exact" and code.exact is not None else code
 
 

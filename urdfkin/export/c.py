@@ -23,7 +23,7 @@ _PLACEHOLDER = re.compile(r"@(\w+)@")
 
 
 def write(code: FrameCode, to: str = "c") -> str:
-    """Return the text of a C file; with `NAME_DECLARATIONS`, it contains declarations only."""
+    """Return a C file; if the macro `NAME_DECLARATIONS` is defined, only declarations are compiled."""
     return c_file(code, comment(_head(code)), "\n".join([*vectors(code), main(code, "check_one.c")]))
 
 
@@ -238,7 +238,7 @@ def _numbers(values: Sequence[str]) -> str:
 
 
 def main(code: FrameCode, *frames: str) -> str:
-    """Return a program, such as "check_one.c", that runs the test vectors."""
+    """Return a program that runs the test vectors; `frames` are templates such as "check_one.c"."""
     checks = (_check(code, function, frame) for function in code.functions for frame in frames)
     return fill_template("check.c", checks="".join(checks))
 

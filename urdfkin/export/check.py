@@ -93,7 +93,10 @@ def _has_gpu() -> bool:
 
 
 def _run_compiled(file: Path, text: str, folder: Path) -> Iterator[str]:
-    """Run a compiled file in both precisions; without a GPU, only the CPU functions are checked."""
+    """Compile a file and run its test vectors, in double and in single precision.
+
+    Without a GPU, only the CPU functions of a CUDA file are checked.
+    """
     name = _name_of_program(_MAIN, text, file)
     copy = _copy(text, folder / f"checked{file.suffix}")
     command = _COMPILE_FOR_GPU if file.suffix == ".cuh" and _has_gpu() else _COMPILE[file.suffix]

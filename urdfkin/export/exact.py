@@ -181,7 +181,7 @@ def exact_functions(
     proof: Proof,
     verify: bool | None,
 ) -> tuple[tuple[Function, ...], ExactProof]:
-    """Return functions with exact constants, compared with Pinocchio; `proof` has the test vectors."""
+    """Return functions with exact constants, compared with Pinocchio; `proof` contains the test vectors."""
     tree, found, angles = verifier.tree, list[Function](), dict[Fraction, PiMultiple]()
     with precision(DIGITS):
         for other in functions:

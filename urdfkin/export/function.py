@@ -129,7 +129,10 @@ def _without_minus(node: Node) -> Node:
 def function_of(
     plan: CompiledTree, quantity: Quantity, reference: Reference, graph: Graph | None = None
 ) -> Function:
-    """Return the function of one quantity; exact constants need the `graph` that created them."""
+    """Return the function that computes a quantity for the only frame of `plan`.
+
+    If `plan` has exact constants, `graph` is the graph that created these constants.
+    """
     graph = graph or Graph()
 
     def begin_step(place: int) -> None:

@@ -62,5 +62,8 @@ def comment_text(text: str) -> str:
     r"""Return a text as printable ASCII that does not end a comment in any language.
 
     Question marks are replaced too, because C's trigraphs, such as ??/, contain question marks.
+
+    >>> comment_text("*/ int x; ??/")
+    '_/ int x; __/'
     """
     return plain(text).replace("?", "_")

@@ -41,6 +41,7 @@ from urdfkin.verify.exact.recursion import move
 from urdfkin.verify.verifier import Verifier
 
 #: Number of random configurations that are compared with Pinocchio.
+#: The neutral configuration and the joint limits are compared too.
 CHECKED = 100
 VECTORS = 4
 
@@ -146,7 +147,10 @@ def compare(
     evaluate: Callable[[Function, Sequence[FloatArray]], FloatArray],
     verify: bool | None,
 ) -> Certificate:
-    """Compare the results of `evaluate` with Pinocchio; raise VerificationError for a difference."""
+    """Compare the results of `evaluate` with Pinocchio.
+
+    Raise VerificationError if a difference exceeds the error bound.
+    """
     checker = copy(verifier)  # The copy keeps these checks out of the user's certificate.
     drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:

@@ -128,7 +128,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` for immutable arrays, which stacks the numbers."""
+    """Return a `Dialect.result` that stacks the numbers, for libraries with immutable arrays."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -176,8 +176,9 @@ def _demand(
 ) -> str:
     """Return the code of the function `_demand`, which checks an input.
 
-    `wrong` and `is_array` are code: expressions that are true for a wrong number type and for an accepted
-    container. `given` are further parameters of `_demand`.
+    The arguments `wrong` and `is_array` are Python expressions as text. `wrong` is true for numbers of a
+    wrong type. `is_array` is true for an accepted container; "" means no test. `given` contains further
+    parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)

@@ -4,8 +4,7 @@ At each joint, the recursion translates along the rigid link, applies a constant
 the motion of the joint about or along z. Placements and Jacobians are computed in the axes of the world
 frame, as in the textbook. Velocities and accelerations are computed in the axes of each link's frame, where
 joint axes are (0, 0, 1) and link vectors are constant. A result in the axes of the world frame is then
-rotated joint by joint, which needs a third fewer operations than the computation of the
-rotation matrix R.
+rotated joint by joint, which needs a third fewer operations than the computation of the rotation matrix R.
 """
 
 from __future__ import annotations
@@ -27,7 +26,8 @@ class NumberKind:
     """A kind of number, and callbacks of the recursion; `chapter` contains the textbook's equations.
 
     `begin_step` is called before each joint, before the final frame and before the results. `end_step` is
-    called after each joint and after the final frame. Their integer argument is the number of earlier calls.
+    called after each joint and after the final frame. The integer argument of a callback is the number of
+    earlier calls of this callback.
     """
 
     chapter: Any

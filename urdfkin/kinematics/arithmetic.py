@@ -1,4 +1,7 @@
-"""Copies of the textbook's equations with other basic operations, for example for NumPy arrays or LaTeX."""
+"""Copies of the textbook's equations with other basic operations, for example for NumPy arrays or LaTeX.
+
+This module does not import NumPy.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +32,9 @@ def rebound(
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    Inside a copy, each name refers to its entry in `others`, or to another copy. List a module after the
-    modules whose functions it uses.
+    A copy calls other copies instead of the original functions. An entry of `others` replaces the function or
+    the module of the same name. `decorate` is applied to each copy. List a module after the modules whose
+    functions it uses.
     """
     copies: dict[str, Any] = {}
     for module in modules:

@@ -100,7 +100,7 @@ def compose_all(frames: Iterable[MovingFrame]) -> MovingFrame:
 
 
 def seen_from(T_0_1: FloatArray, T_0_2: FloatArray, out: FloatArray | None = None) -> FloatArray:
-    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), the pose of frame 2 in frame 1 (7.77)."""
+    """Return T_1_2 = T_0_1^-1 T_0_2 (..., 4, 4), the pose of frame 2 in frame 1."""
     T = np.empty(np.broadcast_shapes(T_0_1.shape, T_0_2.shape)) if out is None else out
     back = T_0_1[..., :3, :3].swapaxes(-1, -2)
     T[..., :3, :3] = back @ T_0_2[..., :3, :3]

@@ -145,7 +145,7 @@ def coriolis(w, u):
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration after a joint; w and alpha belong to the link before the joint."""
+    """7.129, rotary: angular acceleration of the link after a joint; the link before it has w and alpha."""
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 

@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 #: A vector that is normalised in double precision deviates by 4e-16 at most.
 #: For a vector with only six digits, the rotation formulas give a matrix that is not a rotation.
 UNIT_TOLERANCE = 1e-12
-#: Largest accepted entry of R R^T - I for a rotation matrix R.
+#: Largest accepted absolute entry of R R^T - I for a rotation matrix R.
 #: If the entries of R are rounded to nine decimals, each has an error of 5e-10 at most.
 #: An entry of R R^T - I is then at most 1e-9 times the sum of the absolute values of a row of R.
 #: The sum of the absolute values of a row is at most sqrt(3).
@@ -98,7 +98,10 @@ def rotations(value: ArrayLike, name: str) -> FloatArray:
 
 
 def rotation_defect(R: FloatArray) -> FloatArray:
-    """Return the largest absolute entry of R R^T - I; inf for a reflection or an overflow."""
+    """Return the largest absolute entry of R R^T - I for each matrix R.
+
+    The result is inf if the determinant is not positive, or if R R^T overflows.
+    """
     with np.errstate(over="ignore", invalid="ignore"):  # If R R^T overflows, R is not a rotation.
         defect = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1))
         return np.where((defect >= 0.0) & (determinant(R) > 0.0), defect, np.inf)

@@ -24,7 +24,7 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: For each function of `equations`, the symbols that differ from `_SYMBOLS`.
+#: Symbols of some functions of `equations` that differ from the symbols in `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
@@ -46,7 +46,7 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression; its `kind` decides whether a larger expression puts it in brackets."""
+    """A LaTeX expression; `kind` decides whether the text has brackets inside a larger expression."""
 
     text: str
     kind: int = _ATOM

@@ -17,9 +17,11 @@ The dots stand for any batch shape; results have the batch shape of the argument
 `ArrayLike` raise InputError for a wrong shape, a value that is not finite, a matrix that is not a rotation,
 an axis or a quaternion whose length is not 1, and an unknown `frame`.
 
-`nearest_rotation` and `polar_factor` return the rotation that is nearest to a matrix in the Frobenius norm.
-`nearest_rotation` requires small errors; `polar_factor` accepts errors of any size. The nearest rotation is
-unique: it is the orthogonal factor U of the polar decomposition M = U H.
+A user's matrix often has only a few digits. A conversion to a quaternion, a conversion to Euler angles, and
+Gram-Schmidt then give different rotations. `nearest_rotation` and `polar_factor` return the rotation that is
+nearest to a matrix M in the Frobenius norm. `nearest_rotation` requires small errors; `polar_factor` accepts
+errors of any size. The nearest rotation is unique: it is the orthogonal factor U of the polar decomposition
+M = U H.
 
 A quaternion is (qx, qy, qz, qw), with the scalar last as in a configuration; qw is the textbook's q0. A
 quaternion and its negative are the same rotation. Functions with the argument `frame` express the angular
@@ -100,7 +102,11 @@ def nearest_rotation(M: ArrayLike, name: str = "M") -> FloatArray:
 
 
 def polar_factor(M: FloatArray) -> FloatArray:
-    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant."""
+    """Return the rotation nearest to a 3 by 3 matrix with a positive determinant.
+
+    >>> polar_factor(np.diag([1.0, 1.001, 0.999])).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
     U, _, Vt = np.linalg.svd(M)
     return np.asarray(U @ Vt)
 
@@ -108,8 +114,10 @@ def polar_factor(M: FloatArray) -> FloatArray:
 def axis_aligning(axis: ArrayLike) -> FloatArray:
     """Return a rotation with `axis` as its third column; for the axis z, it is the identity.
 
-    The formula (Duff and others, "Building an Orthonormal Basis, Revisited", 2017) has no singularity. For a
-    coordinate axis, the entries are exactly 0 and +-1.
+    The formula (Duff and others, "Building an Orthonormal Basis, Revisited", 2017) has no singularity. If the
+    z component of `axis` is not negative, the result is the shortest rotation from z to `axis`. Otherwise,
+    the result is half a turn about x, followed by the shortest rotation from -z to `axis`. For a coordinate
+    axis, the entries are exactly 0 and +-1.
     """
     axis = unit_vectors(axis, "axis")
     x, y, z = np.moveaxis(axis, -1, 0)
@@ -371,7 +379,7 @@ class Sequence:
     """The axes of an Euler sequence; the index 0 is x, 1 is y, 2 is z.
 
     The axes `first`, `second` and `third` turn with the body. The axis `other` is neither the first nor the
-    second axis. The sign is +1 if (first, second, other) is right-handed, else -1. If `fixed` is true, the
+    second axis. `sign` is +1 if (first, second, other) is right-handed, else -1. If `fixed` is true, the
     name lists axes that are fixed in space, in the reverse order of the body's axes.
     """
 
@@ -450,7 +458,8 @@ def euler_of(name: str, R: ArrayLike) -> FloatArray:
     else:
         first = np.arctan2(-sign * R[..., j, m], R[..., m, m])
         second = np.arctan2(sign * R[..., i, m], np.hypot(R[..., j, m], R[..., m, m]))
-    # Let R = F S T with the rotations F, S, T about the three axes. Row `j` of S T is row `j` of T.
+    # Let R = F S T with the rotations F, S, T about the three axes. Then F^T R is equal to S T.
+    # Row `j` of S T is equal to row `j` of T, because S is a rotation about the axis `j`.
     cosine, sine = np.cos(first), np.sin(first)
     row = cosine[..., np.newaxis] * R[..., j, :] + (sign * sine)[..., np.newaxis] * R[..., m, :]
     # Only two entries of row `j` are not 0: the entries of the second axis and of the axis `rest`.
@@ -469,7 +478,7 @@ def rpy_of(R: ArrayLike) -> FloatArray:
     return euler_of("xyz", R)
 
 
-#: At this distance (rad) or less from the singularity, Euler angle rates are not computed.
+#: At this distance (rad) or less from the singularity, Euler angle rates have too few correct digits.
 NEAREST = 1e-9
 
 

@@ -14,7 +14,7 @@ from urdfkin.model.tree import FloatArray, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BaseMotion:
-    """Motion of the robot's root link relative to the world; the textbook calls the world frame -1.
+    """Motion of the robot's root link relative to the world; the textbook numbers the world frame -1.
 
     Every field may have leading batch axes, which broadcast with the batch axes of the configuration. The
     fields store the numbers without changes, because Pinocchio receives the same numbers in a comparison.

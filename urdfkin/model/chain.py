@@ -1,4 +1,4 @@
-"""A path between two frames as a sequence of joint axes. Denavit-Hartenberg tables are derived from it.
+"""A path between two frames as a sequence of joint axes, the basis of Denavit-Hartenberg tables.
 
 As in section 7.5 of the textbook, joint i rotates about, or translates along, z_{i-1} at O_{i-1}. The vector
 d_{i-1,i} leads from O_{i-1} to O_i. The path may lead from parent to child, from child to parent, or through
@@ -238,10 +238,7 @@ class FrameChain(Displayable):
 
 
 def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
-    """Return the path from the link or joint frame `base` (by default the root) to the frame `tip`.
-
-    A planar or floating joint on the path raises InputError; an unknown name raises UnknownNameError.
-    """
+    """Return the path from `base` to `tip`; a planar or floating joint on the path raises InputError."""
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
     lengths, folded, count = list[float](), list[int](), 0

@@ -40,21 +40,18 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest end of a sampled range (rad or m); it also replaces a missing limit.
+#: Largest absolute value of an end of a sampled range (rad or m); this value also replaces a missing limit.
 WIDEST = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class NarrowedRange:
-    """A mimicked joint's own range, and the smaller range in which its mimic joints are within their limits.
+    """A mimicked joint's own range, and the part of this range that its mimic joints allow.
 
     Attributes:
-        joint: Name of the mimicked joint.
-        own: The range from the limits of the mimicked joint.
         allowed: The part of `own` in which all mimic joints are within their limits; None if no value is
             allowed.
         by: Names of the mimic joints whose limits make the range smaller.
-        unit: "rad" or "m".
     """
 
     joint: str
@@ -82,20 +79,20 @@ def range_words(ends: tuple[float, float]) -> str:
 
 
 def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
-    """Return the ends of a joint's range, rad or m; without limits, -pi to pi or -`slide` to `slide`."""
+    """Return the ends of a joint's range; without limits, -pi to pi (rad) or -`slide` to `slide` (m)."""
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
     return (-math.pi, math.pi) if kind.turns else (-slide, slide)
 
 
 def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
-    """Return `count` uniform random values in each range (lower, upper): an array (count, ranges)."""
+    """Return uniform random values (count, ranges) in the given ranges (lower, upper)."""
     lower, upper = np.array(ranges).reshape(-1, 2).T
     return np.random.default_rng(seed).uniform(lower, upper, (count, len(ranges)))
 
 
 def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the range of each joint with exactly one coordinate, without the limits of its mimic joints."""
+    """Return the range of each joint with one coordinate, without the limits of its mimic joints."""
 
     def own_range(joint: Joint) -> tuple[float, float]:
         if joint.kind is JointKind.CONTINUOUS:
@@ -109,17 +106,13 @@ def own_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 
 def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
-    """Return the ranges of `own_ranges`, narrowed so that the mimic joints are within their limits.
-
-    If no value in a range keeps the mimic joints within their limits, the range is not narrowed.
-    """
+    """Narrow `own_ranges` so that all mimic joints are within their limits, where this is possible."""
     ranges = own_ranges(tree)
     narrowed = {one.joint: one.allowed for one in narrowed_ranges(tree)}
     return {name: narrowed.get(name) or own for name, own in ranges.items()}
 
 
 def narrowed_ranges(tree: KinematicTree) -> tuple[NarrowedRange, ...]:
-    """Return a `NarrowedRange` for each joint whose mimic joints restrict its range further."""
     ranges = own_ranges(tree)
     allowed, by = dict[str, tuple[float, float]](), dict[str, list[str]]()
     for joint in tree.joints:
@@ -152,7 +145,7 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
     def is_allowed(leader: float) -> bool:
         return least <= rule.multiplier * leader + rule.offset <= most
 
-    if is_allowed(lower) and is_allowed(upper):  # All values between two allowed ends are allowed.
+    if is_allowed(lower) and is_allowed(upper):
         return lower, upper
     if rule.multiplier == 0.0:
         return math.inf, -math.inf
@@ -160,7 +153,7 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
     # The rounding error of the mimic joint's value narrows the range at each end.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
     error = MIMIC_LIMIT * EPS * size / abs(rule.multiplier)
-    if not math.isfinite(error):  # The mimic joint has only one limit.
+    if not math.isfinite(error):  # The error is infinite if the mimic joint has only one limit.
         error = MIMIC_LIMIT * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
     return (
         lower if is_allowed(lower) else max(lower, ends[0] + error),
@@ -169,7 +162,7 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
 
 
 def _rounded_outwards(limit: Limit) -> tuple[float, float]:
-    """Return the limits, wider by one unit in the last place, because a limit in decimal is rounded."""
+    """Widen the limits by one unit in the last place, because parsing rounds a decimal limit."""
     return math.nextafter(limit.lower, -math.inf), math.nextafter(limit.upper, math.inf)
 
 
@@ -189,22 +182,17 @@ _OF_RATES = {
 
 
 def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return a name for each number of `q`: the joint's name, and a suffix if the joint has several numbers.
-
-    Example: `base.x`, `base.y`, ...; if another joint has the name `base.x`, then `base:x`, `base:y`, ...
-    """
+    """Return the names of the numbers of `q`, with suffixes such as `.x` for a floating joint."""
     return tuple(name for name, _ in _names_and_units(tree, _OF_Q))
 
 
 def rate_names(tree: KinematicTree) -> tuple[str, ...]:
-    """Return a name for each number of `v` and `a`; planar and floating joints have several numbers."""
     return tuple(name for name, _ in _names_and_units(tree, _OF_RATES))
 
 
 def _names_and_units(
     tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
-    """Yield a unique name and the unit of each number of q or v."""
     taken = set[str]()
     for joint in tree.joints:
         if not joint.nv:
@@ -221,12 +209,11 @@ def _names_and_units(
 
 
 def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
-    """Return the unit of each number of q, v or a: "rad", "m" or "" (none); the time unit is omitted."""
+    """Return the unit of each number of q, v or a: "rad", "m" or ""; the time unit is omitted."""
     return tuple(unit for _, unit in _names_and_units(tree, _OF_Q if what == "q" else _OF_RATES))
 
 
 def coordinate_layout(tree: KinematicTree, what: str) -> CoordinateLayout:
-    """Return the names and units of the numbers of q, v or a, for the parsing of values."""
     is_q = what == "q"
     spans = {
         joint.name: (at, joint.nq if is_q else joint.nv)
@@ -245,7 +232,6 @@ def coordinate_layout(tree: KinematicTree, what: str) -> CoordinateLayout:
 
 
 def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
-    """Return a hint for the name of each joint that has no coordinate."""
     return {
         joint.name: Hint(
             f"it mimics {joint.mimic.leader}: give that joint's value, or load with mimic=False (--no-mimic)",
@@ -261,7 +247,7 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return hints for the lengths of q, v and a that differ between Pinocchio and urdfkin."""
+    """Return hints for wrong lengths: the lengths in Pinocchio, and the length with all mimic joints."""
     has_mimic_joints = any(joint.mimic for joint in tree.joints)
     leave_out = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -299,8 +285,8 @@ def neutral(tree: KinematicTree) -> FloatArray:
 def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     """Return the named configurations (nq,): `neutral`, `ready` and the tree's own named poses.
 
-    `ready` is within the limits. The catalogue defines `ready` for some robots. For any other robot, `ready`
-    is `neutral`, but a joint whose limits exclude 0 is in the middle of its range.
+    In `ready`, a joint without a value in the tree is at 0. If the joint's range excludes 0, the joint is in
+    the middle of the range.
     """
     ready = neutral(tree)
     for name, (lower, upper) in coordinate_ranges(tree).items():
@@ -320,16 +306,10 @@ def locked_values(
 ) -> dict[str, float]:
     """Return the value (rad or m) of each joint to lock, by name, in the order of the tree.
 
-    Args:
-        tree: The robot.
-        lock: A value for each joint to lock, as a mapping or text. If `joints` is given, the text may begin
-            with the name of a pose.
-        joints: Names of the joints that stay movable. Every other joint is locked at its value in `lock`, or
-            at 0 if `lock` has no value for the joint.
-
-    An unknown joint or pose raises UnknownNameError. A joint to lock that is fixed, mimics another joint, has
-    several coordinates or is named twice raises InputError. So does a value that is no finite number, or that
-    is outside the joint's limits.
+    Without `joints`, only the joints in `lock` are locked. `joints` lists the joints that stay movable. Every
+    other joint is then locked at its value in `lock`, or at 0 if `lock` has no value. If `joints` is given,
+    `lock` may begin with the name of a pose, whose values then replace 0. An unknown name raises
+    UnknownNameError. Any other invalid lock, for example a value outside the limits, raises InputError.
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.named(lock, "lock")
@@ -402,10 +382,7 @@ def velocity_limits(tree: KinematicTree) -> FloatArray:
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return `q` with the quaternions of floating joints normalised (a copy if there are any).
-
-    A quaternion whose norm differs from 1 by more than 1e-6 raises InputError.
-    """
+    """Normalise the quaternions of floating joints; raise InputError if a norm is not 1 within 1e-6."""
     if not tree.floating_joints:
         return q
     q = q.copy()
@@ -416,7 +393,6 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
 
 
 def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
-    """Return q, v or a as a float64 array whose last axis has nq or nv numbers."""
     if (named := by_name(value, what)) is not None:
         return coordinate_layout(tree, what).read(named)
     array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
@@ -433,10 +409,7 @@ def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
 
 
 def shaped(tree: KinematicTree, value: Given, what: str, *, look: bool = True) -> FloatArray:
-    """Return the result of `numbers`, with the quaternions of floating joints normalised.
-
-    If `look` is true, values of q that look like degrees cause a `DegreesWarning`.
-    """
+    """Parse q, v or a; normalise the quaternions of q, and warn of degrees if `look` is true."""
     array = numbers(tree, value, what)
     if what != "q":
         return array
@@ -461,7 +434,7 @@ def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return a message for each joint, also for each mimic joint, that exceeds its limits anywhere in `q`."""
+    """Return a message for each joint, also a mimic joint, that exceeds its limits anywhere in `q`."""
     return [words for _, words in _violations(tree, q)]
 
 
@@ -481,11 +454,6 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 
 
 def _degrees(joint: Joint, value: float) -> str:
-    """Return a hint to write the unit `deg` if the value looks like degrees, else an empty text.
-
-    A value looks like degrees if it is beyond `LARGEST_ANGLE` and far outside the limits of a revolute joint,
-    and within the limits after a conversion to radians.
-    """
     if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
         return ""
     lower, upper = far_outside(joint.limit.lower, joint.limit.upper)
@@ -499,10 +467,7 @@ _MOST_CHECKED = 16
 
 
 def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
-    """Return the lines of `limit_violations` for values that look like degrees.
-
-    At most 16 configurations of `q` (..., nq) are checked.
-    """
+    """Return `limit_violations` of values that look like degrees; check at most 16 configurations."""
     if tree.least_implausible == math.inf or not q.size:
         return []
     if q.ndim == 2:
@@ -517,7 +482,6 @@ def degrees_lines(tree: KinematicTree, q: FloatArray) -> list[str]:
 
 
 def warn_of_degrees(tree: KinematicTree, q: FloatArray) -> None:
-    """Warn with `DegreesWarning` at the caller's line if values of q (..., nq) look like degrees."""
     if lines := degrees_lines(tree, q):
         more = f" ({len(lines) - 1} more joints likewise)" if len(lines) > 1 else ""
         advice = "q is in radians; numpy.radians converts degrees"
@@ -553,8 +517,8 @@ def to_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> 
 def from_pinocchio(tree: KinematicTree, q: FloatArray, *, mimic: bool = False) -> FloatArray:
     """Convert Pinocchio's configuration (..., nq_pinocchio) to urdfkin's (..., nq).
 
-    Angles of continuous and planar joints are returned in [-pi, pi]. A wrong length, a (cos, sin) pair whose
-    norm is not 1, or a mimic joint that does not obey its rule raises InputError.
+    Angles of continuous and planar joints are returned in [-pi, pi]. A (cos, sin) pair whose norm is not 1,
+    or a mimic joint that does not obey its rule, raises InputError.
     """
     length = _pinocchio_length(tree, mimic=mimic)
     if q.shape[-1:] != (length,):
@@ -632,12 +596,10 @@ class Samples:
 
 
 def sample(tree: KinematicTree, n: int, rng: np.random.Generator) -> FloatArray:
-    """Return random configurations (n, nq), uniform within the limits.
+    """Return random configurations (n, nq), uniform within the ranges of `coordinate_ranges`.
 
-    Continuous joints take any angle. Planar and floating joints take any orientation and positions within
-    +-2 m. A missing limit, or a limit beyond +-10 (rad or m), is replaced by +-10. The limits of mimic joints
-    restrict the mimicked joint too. If no value is within the limits of the mimicked joint and of the mimic
-    joint, only the limits of the mimicked joint apply, and `limit_violations` names the mimic joint.
+    Continuous joints take any angle. Planar and floating joints take any orientation, and positions within
+    +-2 m. For other joints, a missing limit, or a limit beyond +-10 (rad or m), is replaced by +-10.
     """
     return _uniform(tree, n, rng, coordinate_ranges(tree))
 
@@ -668,7 +630,7 @@ _SAMPLED = {JointKind.PLANAR: _sample_planar, JointKind.FLOATING: _sample_floati
 
 
 def special(tree: KinematicTree) -> FloatArray:
-    """Return (3, nq): zero configuration, all joints at the lower limit, all joints at the upper limit."""
+    """Return (3, nq): the zero configuration, then all joints at the lower and at the upper limit."""
     q = np.tile(neutral(tree), (3, 1))
     ranges = own_ranges(tree)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
@@ -678,7 +640,7 @@ def special(tree: KinematicTree) -> FloatArray:
 
 
 def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
-    """Return random motions of the root link: poses of a floating joint, and velocities as in `draw`."""
+    """Return random motions of the root link, with velocities and accelerations as in `draw`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
     placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
@@ -691,10 +653,9 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
 def draw(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
     """Return samples for a validation: `n` random samples and, if requested, the samples of `special`.
 
-    The samples cover the own range of each joint, even if a mimic joint then exceeds its limits, because the
-    equations are valid beyond the limits too. Joint velocities and accelerations have the standard normal
-    distribution. Every eighth sample has a hundred times larger velocities and accelerations, so that the
-    quadratic terms of eq. 7.129 and 7.130 dominate.
+    The samples cover each joint's own range, even if a mimic joint then exceeds its limits, because the
+    equations are valid beyond the limits too. Every eighth sample has a hundred times larger velocities and
+    accelerations, so that the quadratic terms of eq. 7.129 and 7.130 dominate.
     """
     q = _uniform(tree, n, rng, own_ranges(tree))
     if with_special:

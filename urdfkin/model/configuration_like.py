@@ -28,10 +28,9 @@ from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.inputs import FloatArray, floats
 
-#: Types that q, v and a may have; for type checkers, a string is also an ArrayLike.
+#: Types that q, v and a may have. Text is included, because `ArrayLike` contains `str`.
 Given = ArrayLike | Mapping[str, ArrayLike]
 
-#: Largest number of names in a message.
 _LISTED = 8
 #: Pattern of the blank between a number and its unit.
 _UNIT_APART = re.compile(r" (?=(?:deg\w*|rad\w*|mm|m|°)(?: |/|$))")
@@ -39,8 +38,6 @@ _AROUND_SIGNS = re.compile(r" ?([=*/]) ?")
 
 
 class Hint(NamedTuple):
-    """The remedy for a wrong input, and the page with the explanation."""
-
     remedy: str
     question: QuestionsSection
 
@@ -53,10 +50,8 @@ class CoordinateLayout:
         what: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and their count.
-        poses: Returns the named poses. The function is called only for an input that needs a pose.
         otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
-        lengths: Returns a hint for each wrong length that users often pass, such as the length of q in
-            Pinocchio.
+        lengths: Returns a hint for wrong lengths that users often pass, such as the length of Pinocchio's q.
     """
 
     what: str
@@ -70,8 +65,7 @@ class CoordinateLayout:
     def read(self, value: str | Mapping[str, ArrayLike], where: str | None = None) -> FloatArray:
         """Return the numbers (..., n) of q, v or a that a text or a mapping describes.
 
-        `where` names the input in messages. Too few or too many numbers, an invalid number or a wrong
-        unit raises InputError; an unknown coordinate, joint velocity or pose raises UnknownNameError.
+        An unknown name raises UnknownNameError; any other invalid input raises InputError.
 
         >>> rest = {"neutral": np.zeros(2)}
         >>> arm = CoordinateLayout("q", ("shoulder", "elbow"), ("rad", "rad"), poses=lambda: rest)
@@ -91,9 +85,7 @@ with a configuration: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values of a text or mapping by name, and the pose at the start of the text, or None.
-
-        Numbers without names, or a repeated name, raise InputError; an unknown pose raises UnknownNameError.
+        """Return the values of a text or mapping by name, and the pose that begins the text, or None.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).named("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)
@@ -121,12 +113,11 @@ with a configuration: 'neutral, elbow=...'
 
     @staticmethod
     def _is_in_order(cells: Sequence[str]) -> bool:
-        """Return whether a text is a plain list of numbers, without joint names and pose names."""
         is_pose = len(cells) == 1 and _is_word(cells[0])
         return not is_pose and all(_pair(cell)[0] is None for cell in cells)
 
     def demand_names(self, names: Sequence[str], where: str) -> None:
-        """Raise an error unless each name belongs to a coordinate or to a joint with several coordinates."""
+        """Raise an error if a name is neither a coordinate nor a joint with several coordinates."""
         for name in names:
             if not isinstance(name, str) or (name not in self.names and name not in self.spans):
                 raise self._not_a_coordinate(name, where)
@@ -177,7 +168,6 @@ with a configuration: 'neutral, elbow=...'
         return out
 
     def _of_a_joint(self, name: object, value: ArrayLike, where: str) -> dict[int, FloatArray]:
-        """Return each number of a joint with several coordinates, by its index in the vector."""
         if not isinstance(name, str) or name not in self.spans:
             raise self._not_a_coordinate(name, where)
         at, size = self.spans[name]
@@ -196,7 +186,6 @@ with a configuration: 'neutral, elbow=...'
         return UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
 
     def _number(self, text: str, where: str, unit: str | None) -> float:
-        """Return one number in SI units; raise InputError for an invalid number or a wrong unit."""
         found = parse_quantity(text)
         value = parse_float(text) if found is None else found.value
         if value is None:
@@ -208,16 +197,14 @@ with a configuration: 'neutral, elbow=...'
         other = unit is not None and found.unit not in (None, unit)
         if other or found.per not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
-            per = ("", ", or these per s", ", or these per s^2")[order]
+            per = ("", ", or these units per s", ", or these units per s^2")[order]
             hint = f"use {kinds}{per}"
             raise InputError("wrong unit", where=where, found=repr(text.strip()), remedy=hint)
         return value
 
 
 def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
-    """Return a text or a mapping unchanged, a table with labels as a mapping, and None for other values.
-
-    A label that occurs twice, or a list of tables with labels, raises InputError.
+    """Return text or a mapping unchanged, a table with labels as a mapping, and None for other values.
 
     >>> by_name([0.5, 0.1], "q"), by_name("ready", "q"), by_name({"elbow": 0.5}, "q")
     (None, 'ready', {'elbow': 0.5})
@@ -243,7 +230,7 @@ def by_name(value: Given, where: str) -> str | Mapping[str, ArrayLike] | None:
 
 
 def _labels(value: object) -> list[Any]:
-    """Return a table's `keys()`, `columns` or `column_names`; an empty list if they are 0, 1, 2, ..."""
+    """Return the labels of a table, such as column names; an empty list if the labels are 0, 1, 2, ..."""
     table: Any = value
     if not hasattr(type(value), "__getitem__"):
         return []
@@ -272,7 +259,6 @@ def wrong_count(
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names for a message: all of them, or the first eight and the total count."""
     more = f", ... ({len(names)} in all)" if len(names) > _LISTED else ""
     return ", ".join(map(str, names[:_LISTED])) + more
 
@@ -288,11 +274,11 @@ def _cells(text: str) -> list[str]:
 
 
 def _pair(cell: str) -> tuple[str | None, str]:
-    """Split a text such as "joint_1=0.5" into the name and the number; the name is None without `=`."""
+    """Split a text such as "joint_1=0.5" into name and number; without `=`, the name is None."""
     name, equals, number = cell.rpartition("=")
     return (name.strip(), number.strip()) if equals else (None, cell)
 
 
 def _is_word(text: str) -> bool:
-    """Return whether a text may be the name of a pose: it is not a number and does not look like one."""
+    """Return whether a text can be the name of a pose, because the text does not look like a number."""
     return text[:1].isalpha() and "=" not in text and parse_quantity(text) is None and remedy(text) is None

@@ -76,7 +76,6 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
 
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
-    """Return each joint with its own coordinates, and the indices of its first numbers in q and in v."""
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
     return [(joint, at, to) for joint, at, to in rows if joint.nv]
 
@@ -88,7 +87,7 @@ def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _screw(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the linear and the angular part of a planar or floating joint's coordinates or velocity.
+    """Return the linear and angular part of a planar or floating joint's coordinates or velocity.
 
     The angular part is a vector (..., 3), or the quaternion (..., 4) in a floating joint's coordinates.
     """

@@ -23,10 +23,6 @@ from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, froz
 class Coupling:
     """The linear map from a path's coordinates to the values of its joints: values = G q + g.
 
-    Attributes:
-        joints: Names of all moving joints of the path, from the base to the tip.
-        mimics: Mimic rule of each joint; None for a joint with its own coordinate.
-
     >>> turn = JointKind.REVOLUTE
     >>> couple = Coupling(("a", "b"), (None, Mimic("a", 2.0, 0.5)), (turn, turn))
     >>> couple.names, couple.values([1.0]).tolist(), couple.values({"a": "180deg"}).round(2).tolist()
@@ -49,18 +45,16 @@ class Coupling:
 
     @cached_property
     def matrix(self) -> FloatArray:
-        """The matrix G (joints, coordinates)."""
         G = np.zeros((len(self.joints), len(self.names)))
         G[np.arange(len(self.joints)), self._leader_index] = self._multiplier
         return frozen(G)
 
     @cached_property
     def offset(self) -> FloatArray:
-        """The vector g (joints,): the value of each joint if every coordinate is zero."""
+        """The vector g (joints,): the joint values if every coordinate is zero."""
         return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def layout(self, what: str = "q") -> CoordinateLayout:
-        """Return the names and units of the path's q, v or a, with which values are parsed."""
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
@@ -74,20 +68,12 @@ class Coupling:
         return CoordinateLayout(what, self.names, own, poses=lambda: neutral, otherwise=lambda: hints)
 
     def values(self, q: Given) -> FloatArray:
-        """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates).
-
-        A wrong length of the last axis or a missing name raises InputError; an unknown name raises
-        UnknownNameError.
-        """
+        """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates)."""
         coordinates = self.checked(q, "q")
         # Each row of G contains only one number that is not zero, so no matrix product is needed.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
     def checked(self, array: Given, what: str) -> FloatArray:
-        """Return `array` as float64; `what` ("q", "v" or "a") is its name in messages.
-
-        A last axis with the wrong length raises InputError.
-        """
         if (named := by_name(array, what)) is not None:
             return self.layout(what).read(named)
         values = np.asarray(array, dtype=np.float64)
@@ -109,19 +95,15 @@ class Coupling:
         return frozen([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
 
     def q_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Return the index of each coordinate of the path in the robot's configuration `q`."""
         return tuple(tree.q_index[tree.joint_index(name)] for name in self.names)
 
     def v_index(self, tree: KinematicTree) -> tuple[int, ...]:
-        """Return the index of each coordinate of the path in the robot's joint velocities `v`."""
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
     def select(self, tree: KinematicTree, q: Given) -> FloatArray:
-        """Return this path's coordinates (..., coordinates) in the robot's configuration `q` (..., nq)."""
         return numbers(tree, q, "q")[..., list(self.q_index(tree))]
 
 
 def coupling_of(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
-    """Return the `Coupling` of the joints of a path, given as (name, mimic rule or None, kind)."""
     names, mimics, kinds = zip(*joints, strict=True) if joints else ((), (), ())
     return Coupling(names, mimics, kinds)

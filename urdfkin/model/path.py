@@ -57,8 +57,8 @@ class Path:
         return frames
 
     def _after_each_step(self, amounts: FloatArray) -> Iterator[FloatArray]:
-        """Yield the poses (..., 4, 4) after each step; consecutive poses may be the same array."""
-        # A motion by 0 changes nothing, and many cells of a table are 0.
+        """Yield the poses (..., 4, 4) after each step; the yielded arrays may share memory."""
+        # A motion by 0 is skipped, because it changes nothing.
         moving = np.asarray(amounts.any(axis=tuple(range(amounts.ndim - 1))))
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         k = 0
@@ -75,7 +75,6 @@ class Path:
         """Return the pose (..., 4, 4) at the end of the path, for amounts (..., motions) in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
-        # After the loop, T is the pose at the end of the path.
         for T in self._after_each_step(amounts):  # noqa: B007
             pass
         return np.array(T)
@@ -85,7 +84,6 @@ class Path:
         return self.columns_at(self.frames(amounts))
 
     def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the result of `columns`, computed from the result (..., steps, 4, 4) of `frames`."""
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
         # A motion does not move its own axis, so the axis is also fixed in the frame after the motion.
@@ -109,7 +107,6 @@ def elementary(axis: int, turns: bool, amount: ArrayLike) -> FloatArray:
 
 
 def _moved(T: FloatArray, motion: ElementaryMotion, amount: FloatArray) -> FloatArray:
-    """Return the poses T (..., 4, 4), multiplied from the right by an elementary motion."""
     moved = np.array(T)
     if motion.turns:
         moved[..., :3, :3] = T[..., :3, :3] @ coordinate_rotation(motion.axis, amount)

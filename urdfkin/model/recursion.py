@@ -1,7 +1,7 @@
 """The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
-The attribute `eq` contains the textbook's equations for one kind of number
-(`urdfkin.kinematics.number_kinds.bound`). The compiled recursion is `urdfkin.compiled.recursion`.
+The attribute `Recursion.eq` contains the textbook's equations for one kind of number
+(`urdfkin.kinematics.arithmetic.bound`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class State:
     """The position, velocity and acceleration of a link's frame.
 
     R and p are expressed in world axes. The vectors w, vel, alpha and acc are expressed in the link's own
-    axes if `Recursion.own` is True, else in world axes.
+    axes if `Recursion.own` is True, and in world axes otherwise.
     """
 
     R: Matrix = IDENTITY
@@ -41,15 +41,12 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One Jacobian column of a joint.
+    """One Jacobian column of a joint, with the axis z and the multiplier `factor` of the mimic rule.
 
     Attributes:
-        z: The joint's axis.
-        turns: Whether the joint is revolute.
         carrier: State of the frame that the joint's axis is fixed to.
         order: Position of the joint on the path, counted from the base.
         place: Index of the joint velocity in v.
-        factor: Multiplier of the mimic rule.
     """
 
     z: Vector
@@ -62,16 +59,16 @@ class Column:
 
 @dataclass(eq=False)
 class Recursion:
-    """Steps of the recursion: each computes a link's state from the state of the previous link.
+    """Steps of the recursion: each step computes a link's state from the state of the previous link.
 
-    If `own` is True, velocities and accelerations are expressed in each link's own axes; else in world axes.
+    Velocities and accelerations are expressed in each link's own axes if `own` is True, and in world axes
+    otherwise.
     """
 
     eq: Any
     own: bool = False
 
     def seen(self, s: State, x: Vector) -> Vector:
-        """Convert a vector from the link's own axes to the axes that `own` selects."""
         return x if self.own else self.eq.rotate(s.R, x)
 
     def carried(self, s: State, d: Vector) -> State:
@@ -89,30 +86,30 @@ class Recursion:
         return State(R, s.p, *(self.eq.rotate(back, x) for x in (s.w, s.vel, s.alpha, s.acc)))
 
     def revolute(self, s: State, axis: Vector, S: Matrix, v: Number, a: Number) -> State:
-        """Return the state after a revolute joint with the rotation S (7.129, 7.127)."""
+        """Return the state of the link after a revolute joint with rotation matrix S (7.129, 7.127)."""
         z = self.seen(s, axis)
         alpha = self.eq.angular_acceleration(s.alpha, s.w, z, v, a)
         return self.turned(replace(s, alpha=alpha, w=self.eq.angular_velocity(s.w, z, v)), S)
 
     def prismatic(self, s: State, axis: Vector, x: Number, v: Number, a: Number) -> State:
-        """Return the state after a prismatic joint (7.64, 7.130, 7.128)."""
+        """Return the state of the link after a prismatic joint (7.64, 7.130, 7.128)."""
         s = self.carried(s, self.eq.times(x, axis))
         z = self.seen(s, axis)
         acc = self.eq.sliding_acceleration(s.acc, s.w, z, v, a)
         return replace(s, vel=self.eq.sliding_velocity(s.vel, z, v), acc=acc)
 
     def planar(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
-        """Return the state after a planar joint with the rotation S."""
+        """Return the state of the link after a planar joint; S is the joint's rotation matrix."""
         rates = [x for u in (v, a) for x in ((u[0], u[1], 0), (0, 0, u[2]))]
         return self._free(s, (q[0], q[1], 0), S, rates)
 
     def floating(self, s: State, q: Numbers, S: Matrix, v: Numbers, a: Numbers) -> State:
-        """Return the state after a floating joint with the rotation S."""
+        """Return the state of the link after a floating joint; S is the joint's rotation matrix."""
         rates = [(u[k], u[k + 1], u[k + 2]) for u in (v, a) for k in (0, 3)]
         return self._free(s, (q[0], q[1], q[2]), S, rates)
 
     def _free(self, s: State, slide: Vector, S: Matrix, rates: Sequence[Vector]) -> State:
-        """Return the state after a planar or floating joint with the displacement `slide` and the rotation S.
+        """Return the state of the link after a planar or floating joint.
 
         `rates` contains the joint's linear and angular velocity, then its linear and angular acceleration.
         All four vectors are expressed in the child link's axes.
@@ -142,7 +139,6 @@ class Recursion:
         return self.eq.point_acceleration(s.acc, s.alpha, s.w, self.eq.minus(ZERO, s.p)), s.alpha
 
     def in_reference(self, s: State, reference: Reference, linear: Vector, angular: Vector) -> Six:
-        """Return a six-vector in the axes of the reference frame, from two vectors in world axes."""
         if reference.own_axes:
             back = self.eq.transposed(s.R)
             linear, angular = self.eq.rotate(back, linear), self.eq.rotate(back, angular)
@@ -181,7 +177,7 @@ class Recursion:
     def _add_mimic_columns(
         self, s: State, reference: Reference, nv: int, found: Iterator[tuple[Column, Vector, Vector]]
     ) -> list[Six]:
-        """Add the columns of mimic joints to the column of their mimicked joint."""
+        """Add the column of each mimic joint to the mimicked joint's column."""
         out: list[Six] = [(0,) * 6] * nv
         for column, linear, angular in found:
             six = self.in_reference(s, reference, linear, angular)
@@ -195,8 +191,8 @@ class Recursion:
     ) -> Iterator[tuple[int, int, Number, Six]]:
         """Yield the derivative of each Jacobian column with respect to each joint coordinate.
 
-        Each tuple contains the column's index, the coordinate's index in v, a factor, and the derivative. The
-        derivative must be multiplied by the factor, which comes from mimic rules.
+        Each tuple contains the indices of the column and the coordinate in v, a factor, and the derivative
+        without this factor.
         """
         to = ZERO if reference.at_world else s.p
         ends = [(one, self._column(one, to)) for one in columns]
@@ -208,7 +204,7 @@ class Recursion:
     def _change(self, six: Any, by: Any, reference: Reference, *, before: bool) -> tuple[Vector, Vector]:
         """Return the derivative of the Jacobian column `six` with respect to the coordinate of column `by`.
 
-        `before` is True if the joint of `by` is the joint of `six`, or is before it on the path.
+        `before` is True if the joint of `by` is the joint of `six`, or comes earlier on the path.
         """
         eq = self.eq
         change: tuple[Vector, Vector] = ZERO, ZERO

@@ -11,11 +11,11 @@ from urdfkin.errors.validators import safe_repr
 class Reference(IntEnum):
     """The three reference frames, with Pinocchio's names.
 
-    The number of a member is its number in the compiled kernels.
+    The compiled kernels use the members' numbers.
 
     * `LOCAL`: the frame's own origin, in the frame's axes.
     * `WORLD`: the point of the moving body that is now at the world's origin, in the world's axes.
-    * `LOCAL_WORLD_ALIGNED`: the frame's own origin, in the world's axes. The textbook uses this one (7.85).
+    * `LOCAL_WORLD_ALIGNED`: the frame's own origin, in the world's axes. The textbook uses this frame (7.85).
 
     Every `reference` argument accepts a member or its name, in upper or lower case:
 
@@ -24,7 +24,7 @@ class Reference(IntEnum):
     """
 
     own_axes: bool  #: The axes of the results: the frame's axes if True, the world's axes if False.
-    #: True: the results describe the body point that is now at the world's origin. False: the frame's origin.
+    #: Whether the results describe the body point that is now at the world's origin, not the frame's origin.
     at_world: bool
 
     def __new__(cls, number: int, own_axes: bool, at_world: bool) -> Reference:

@@ -11,16 +11,12 @@ from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
-#: Indices of text columns, for tables whose first columns are link and joint, or joint, parent and child.
+#: Indices of the text columns in the table whose first columns are link and joint.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
 _WORDS_OF_JOINTS = (0, 1, 2, *(i + 1 for i in WORDS[2:]))
 
 
 def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
-    """Return the summary of a robot for a terminal or a notebook: one table that also shows the tree.
-
-    The sentence `order` below the table explains the order of the joints.
-    """
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
     cells = [("",) * len(columns), *(cells_of(tree, i)[: len(columns)] for i in range(len(tree.joints)))]
@@ -61,7 +57,7 @@ class Joints(dict[str, Joint], Displayable):
 
 
 def guides(tree: KinematicTree) -> Iterator[str]:
-    """Yield the box-drawing characters before each link name, such as `├─`. An only child has none."""
+    """Yield the box-drawing characters before each link name, such as `├─`; an only child has none."""
     children = [0] * len(tree.links)
     for joint in tree.joints:
         children[joint.parent] += 1
@@ -77,7 +73,6 @@ def guides(tree: KinematicTree) -> Iterator[str]:
 
 
 def cells_of(tree: KinematicTree, i: int) -> tuple[str, ...]:
-    """Return the cells of `COLUMNS` for joint `i`; for a fixed joint only its kind."""
     joint = tree.joints[i]
     if not joint.kind.nv:
         words = joint.kind.value if joint.lock is None else f"locked at {joint.lock.value:.6g}"
@@ -96,7 +91,7 @@ def _place(letter: str, at: int, count: int) -> str:
 
 
 def axis_words(axis: Sequence[float]) -> str:
-    """Return a joint's axis as text: `z`, `-x`, or three numbers if it is not along a frame axis.
+    """Return a joint's axis as text: `z`, `-x`, or three numbers if the axis is not along a frame axis.
 
     >>> axis_words((0.0, -1.0, 0.0)), axis_words((0.0, 0.6, 0.8))
     ('-y', '0 0.6 0.8')

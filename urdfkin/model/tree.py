@@ -29,10 +29,6 @@ FloatArray = inputs.FloatArray
 class FrameName(str):
     """`link:NAME` or `joint:NAME`: the link or joint NAME, even if another frame is named `link:NAME`.
 
-    Reports and messages print a `FrameName` like an ordinary name. A plain `str` with the same text has a
-    different meaning: `KinematicTree.frame_link` first looks for a link or joint whose own name is exactly
-    that text.
-
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
     ('link:hand', 'hand')
     """
@@ -72,11 +68,11 @@ def frozen(array: ArrayLike) -> FloatArray:
 class JointKind(Enum):
     """The joint types of the URDF specification; each value is the word used in the file."""
 
-    nq: int  #: Number of coordinates of a joint of this kind in `q`.
-    nv: int  #: Number of entries of a joint of this kind in `v` and `a`.
+    nq: int
+    nv: int
     nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
-    has_axis: bool  #: Whether a joint of this kind rotates about an axis or slides along one.
-    turns: bool  #: Whether a joint of this kind rotates about its axis.
+    has_axis: bool  #: Whether a joint of this kind rotates about an axis or translates along an axis.
+    turns: bool
     bounded: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
@@ -105,8 +101,8 @@ class Limit:
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
 LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside the limits if its distance from them exceeds the larger of two numbers:
-#: `_OUTSIDE` (rad or m), and the fraction `_OF_RANGE` of the joint's range.
+#: A value is far outside the limits if it exceeds a limit by more than `_OUTSIDE` (rad or m),
+#: and by more than `_OF_RANGE` times the joint's range.
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
@@ -126,11 +122,7 @@ def is_bounded(limit: Limit | None) -> TypeGuard[Limit]:
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """The rule of a mimic joint: its value is `multiplier * q_leader + offset`.
-
-    The mimicked joint `leader` is not a mimic joint: chains of mimic joints are resolved before a tree is
-    built.
-    """
+    """The rule of a mimic joint: `multiplier * q_leader + offset`, where `leader` is not a mimic joint."""
 
     leader: str
     multiplier: float
@@ -150,8 +142,6 @@ class Joint:
         T_parent_joint: (4, 4) pose of the joint frame in the parent link's frame at q = 0, in metres. The
             child link's frame is the joint frame after the motion.
         axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
-        limit: None if the joint has no limits.
-        mimic: None if the joint has its own coordinate.
         tilt: Angle (rad) between the joint's axis in Pinocchio and `axis` (URDF514), usually 0. No result of
             urdfkin uses this angle, but it may increase the differences from Pinocchio.
         lock: The original joint and its value, if the user fixed a moving joint of the URDF; else None.
@@ -183,12 +173,10 @@ class Joint:
 
     @property
     def nq(self) -> int:
-        """Number of the joint's own coordinates; 0 for a fixed joint or a mimic joint."""
         return 0 if self.mimic else self.kind.nq
 
     @property
     def nv(self) -> int:
-        """Number of the joint's own velocities; 0 for a fixed joint or a mimic joint."""
         return 0 if self.mimic else self.kind.nv
 
     @property
@@ -207,11 +195,9 @@ class Joint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lock:
-    """A joint of the URDF that is fixed at a value.
+    """A joint of the URDF that the user fixed at a value.
 
-    Attributes:
-        joint: The joint as the URDF describes it.
-        q: Coordinate of the joint, rad or m; for a mimic joint, the coordinate of the joint that it mimics.
+    `q` (rad or m) is the joint's coordinate; for a mimic joint, the coordinate of the mimicked joint.
     """
 
     joint: Joint
@@ -219,7 +205,6 @@ class Lock:
 
     @property
     def value(self) -> float:
-        """The joint's own value, rad or m."""
         rule = self.joint.mimic
         return self.q if rule is None else rule.multiplier * self.q + rule.offset
 
@@ -305,12 +290,12 @@ class KinematicTree:
 
     @cached_property
     def q_index(self) -> tuple[int, ...]:
-        """Index of each joint's first coordinate in `q`; a mimic joint has that of the joint it mimics."""
+        """Index of each joint's first coordinate in `q`; a mimic joint has the mimicked joint's index."""
         return self._offsets([joint.nq for joint in self.joints])
 
     @cached_property
     def v_index(self) -> tuple[int, ...]:
-        """Index of each joint's first velocity in `v`; a mimic joint has that of the joint it mimics."""
+        """Index of each joint's first velocity in `v`; a mimic joint has the mimicked joint's index."""
         return self._offsets([joint.nv for joint in self.joints])
 
     def _offsets(self, sizes: Sequence[int]) -> tuple[int, ...]:
@@ -408,7 +393,6 @@ class KinematicTree:
         return self.link_index(frame.own) if isinstance(frame, LinkFrame) else self.joint_index(frame.own) + 1
 
     def _with_prefix(self, name: str) -> FrameName | None:
-        """Return the frame name for `link:NAME` or `joint:NAME` if such a link or joint exists, else None."""
         kinds: tuple[tuple[type[FrameName], dict[str, int]], ...] = (
             (LinkFrame, self._link_index),
             (JointFrame, self._joint_index),
@@ -419,7 +403,6 @@ class KinematicTree:
         return None
 
     def _unambiguous(self, *names: FrameName) -> list[str]:
-        """Return a list with the first of `names` that no link or joint has; an empty list if all exist."""
         known = self._link_index.keys() | self._joint_index.keys()
         return [str(name) for name in names if name not in known][:1]
 
@@ -445,7 +428,7 @@ class KinematicTree:
 
 
 def with_root_joint(tree: KinematicTree, kind: JointKind) -> KinematicTree:
-    """Return the tree with a joint `root_joint` from a new root link `universe`: Pinocchio's names."""
+    """Add a root link `universe` and a joint `root_joint`; Pinocchio uses the same names."""
     for known, name in ((tree.links, "universe"), ([joint.name for joint in tree.joints], "root_joint")):
         if name in known:
             raise InputError(
@@ -464,7 +447,7 @@ def with_tilts(tree: KinematicTree, tilts: Mapping[str, float]) -> KinematicTree
 
 
 def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) -> KinematicTree:
-    """Return the tree with named poses. Only values of joints with exactly one coordinate are stored."""
+    """Add named poses; store only the values of joints with exactly one coordinate."""
     single = {joint.name for joint in tree.joints if joint.nq == 1}
     stored = {
         pose: {name: x for name, x in values.items() if name in single} for pose, values in poses.items()
@@ -473,7 +456,7 @@ def with_poses(tree: KinematicTree, poses: Mapping[str, Mapping[str, float]]) ->
 
 
 def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTree:
-    """Return the tree with some joints, and the joints that mimic them, fixed at given values (rad or m)."""
+    """Fix some joints, and the joints that mimic them, at given values (rad or m)."""
     leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
     joints = [
         Lock(joint, values[leader]).fixed() if leader in values else joint
@@ -483,15 +466,11 @@ def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTre
 
 
 def without_mimic_rules(tree: KinematicTree) -> KinematicTree:
-    """Return the tree without mimic rules: every mimic joint gets its own coordinate."""
     return KinematicTree(tree.name, tree.links, tuple(replace(joint, mimic=None) for joint in tree.joints))
 
 
 def build_tree(name: str, root: str, joints: Sequence[tuple[Joint, str, str]]) -> KinematicTree:
-    """Return the tree of triples (joint, parent link, child link), in Pinocchio's order.
-
-    The attribute `parent` of a given joint is ignored. A joint that cannot be reached raises InputError.
-    """
+    """Sort the triples (joint, parent link, child link) into a tree in Pinocchio's order."""
     below: dict[str, list[tuple[Joint, str]]] = {}
     for joint, parent, child in joints:
         below.setdefault(parent, []).append((joint, child))
@@ -516,11 +495,7 @@ def _last_name_first(joints: list[tuple[Joint, str]]) -> list[tuple[Joint, str]]
 
 
 def pose(R: ArrayLike | None = None, p: ArrayLike | None = None) -> FloatArray:
-    """Return the pose (4, 4) with a rotation (by default the identity) and an origin (by default zero), m.
-
-    >>> pose(p=[1.0, 2.0, 3.0])[:3, 3].tolist()
-    [1.0, 2.0, 3.0]
-    """
+    """Return the pose (4, 4) with a rotation and an origin (m)."""
     T = np.eye(4)
     if R is not None:
         T[:3, :3] = R

@@ -389,7 +389,7 @@ class Robot(Displayable):
 
     @property
     def tip_frame(self) -> str:
-        """The default tip: the catalogue's tip of the robot, or the leaf link after the most moving joints.
+        """The default tip: the tip in the robot catalogue, or the leaf link after the most moving joints.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame

@@ -23,6 +23,10 @@ class ConventionRobot:
     Jacobians and the rows of six-vectors have the target program's order; q, v and a also have the target
     program's units. Pinocchio checks each result before the result is converted.
 
+    Attributes:
+        robot: The robot.
+        conversion: Names and conversions of the convention, from `robot.convention(...)`.
+
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", root_joint="floating").with_convention("drake")
     >>> q, v = robot.neutral(), [0.0] * 5 + [1.0] + [0.0] * 12
@@ -39,71 +43,87 @@ class ConventionRobot:
 
     @property
     def nq(self) -> int:
+        """Length of q in the target program."""
         return self.conversion.nq
 
     @property
     def nv(self) -> int:
+        """Length of v and a in the target program."""
         return self.conversion.nv
 
     @property
     def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints in the target program, in the target program's order."""
         return self.conversion.joint_names
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
+        """Names of the numbers of q in the target program."""
         return self.conversion.coordinate_names
 
     @property
     def rate_names(self) -> tuple[str, ...]:
+        """Names of the numbers of v and a in the target program."""
         return self.conversion.rate_names
 
     def neutral(self) -> FloatArray:
+        """Return the zero configuration of the URDF, converted to the target program's q."""
         return self.conversion.to(self.robot.neutral())
 
     def sample(self, n: int, seed: int = 0) -> FloatArray:
+        """Return the random configurations (n, nq) of `Robot.sample`, converted to the target program's q."""
         return self.conversion.to(self.robot.sample(n, seed))
 
     def certificate(self) -> Certificate:
+        """Return the certificate of the robot's results."""
         found: Certificate = self.robot.certificate()
         return found
 
     def placement(self, q: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
+        """Return T_world_frame (..., 4, 4); see `Robot.placement`."""
         return self._call(self.robot.placement, (q,), frame, **options)[1]
 
     def relative_placement(self, q: ArrayLike, frame: Any, other: Any, **options: Any) -> FloatArray:
+        """Return the pose (..., 4, 4) of `frame` in the frame `other`; see `Robot.relative_placement`."""
         return self._call(self.robot.relative_placement, (q,), frame, other, **options)[1]
 
     def velocity(
         self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
+        """Return a frame's velocity (..., 6) with the target program's row order; see `Robot.velocity`."""
         return self.conversion.six(self._call(self.robot.velocity, (q, v), frame, *more, **options)[1])
 
     def acceleration(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
+        """Return the target program's classical acceleration (..., 6); see `Robot.acceleration`."""
         return self.conversion.six(self._call(self.robot.acceleration, (q, v, a), frame, *more, **options)[1])
 
     def jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+        """Return the target program's Jacobian (..., 6, nv) of a frame; see `Robot.jacobian`."""
         ours, J = self._call(self.robot.jacobian, (q,), frame, *more, **options)
         return self.conversion.jacobian(ours[0], J)
 
     def jacobian_rate(
         self, q: ArrayLike, v: ArrayLike, frame: Any = None, *more: Any, **options: Any
     ) -> FloatArray:
+        """Return the time derivative of the target program's Jacobian; see `Robot.jacobian_rate`."""
         ours, rate = self._call(self.robot.jacobian_rate, (q, v), frame, *more, **options)
         J = self.robot.jacobian(ours[0], frame, *more, **options)
         return self.conversion.jacobian_rate(ours[0], ours[1], J, rate)
 
     def hessian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+        """Return the derivatives (..., 6, nv, nv) of the target program's Jacobian; see `Robot.hessian`."""
         ours, H = self._call(self.robot.hessian, (q,), frame, *more, **options)
         return self.conversion.hessian(ours[0], self.robot.jacobian(ours[0], frame, *more, **options), H)
 
     def analytical_jacobian(self, q: ArrayLike, frame: Any = None, *more: Any, **options: Any) -> FloatArray:
+        """Return the target program's analytical Jacobian; see `Robot.analytical_jacobian`."""
         ours, J = self._call(self.robot.analytical_jacobian, (q,), frame, *more, **options)
         return self.conversion.columns(ours[0], J)
 
     def imu(self, q: ArrayLike, v: ArrayLike, a: ArrayLike, frame: Any = None, **options: Any) -> FloatArray:
-        """Return an IMU's readings (..., 6), [accelerometer; gyroscope] in every convention."""
+        """Return an IMU's readings (..., 6), [accelerometer; gyroscope]; see `Robot.imu`."""
         return self._call(self.robot.imu, (q, v, a), frame, **options)[1]
 
     def _call(

@@ -29,11 +29,13 @@ from urdfkin.verify.verifier import oracle_results_with_bound
 
 @dataclass(frozen=True, eq=False)
 class MotionCheck:
-    """Comparison of a quantity from urdfkin and from Pinocchio, for n samples.
+    """Comparison of a quantity from urdfkin with the same quantity from Pinocchio, for each sample.
 
-    `units` is the difference divided by eps * scale, where eps is the machine epsilon, and scale is the size
-    of the quantity's numbers. `bound` is the largest such value that rounding can cause, and `share` is
-    `units` / `bound`.
+    Attributes:
+        units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale,
+            where eps is the machine epsilon, and scale is the size of the quantity's numbers.
+        share: (n,) the difference as a fraction of the bound; above 1 is a disagreement.
+        bound: (n,) largest difference that rounding can cause, divided by eps * scale.
     """
 
     units: FloatArray

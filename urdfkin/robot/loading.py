@@ -315,7 +315,8 @@ def robot_of(
     """Return the robot of a URDF text in memory; the first six options are those of `load`.
 
     `made` states whether urdfkin generated the text from another source, and `listed` contains findings about
-    this source. `table` states whether this source is a table. With `quiet`, no warnings are issued.
+    this source. `table` states whether the source is a Denavit-Hartenberg table or a product of
+    exponentials. With `quiet`, no warnings are issued.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle

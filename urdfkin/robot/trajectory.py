@@ -53,7 +53,9 @@ Shapes = Mapping[str, tuple[int, ...]]
 
 
 def read_arrays(path: Path, shapes: Shapes, required: Sequence[str]) -> dict[str, FloatArray]:
-    """Read arrays (n, ...) of finite numbers from an .npz file; pickled objects are rejected.
+    """Read arrays (n, ...) of finite numbers from an .npz file; n is the same for all arrays.
+
+    Pickled objects are rejected, because unpickling can execute code from the file.
 
     Raises:
         SourceError: the file cannot be read, or does not contain numbers.
@@ -185,7 +187,7 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     """Return a straight line in joint space between two configurations (nq,), at rest at both ends.
 
     Planar and floating joints make a screw motion of at most half a turn. A continuous joint moves by
-    `end - start`, even by more than one turn.
+    `end - start`, even by more than one turn. `duration` is in seconds, and `samples` counts both ends.
     """
     duration = real_number(duration, "the duration")
     samples = whole_number(samples, "samples", 0)
@@ -314,7 +316,10 @@ def _differences(
 
 
 def _error(fine: FloatArray, coarse: FloatArray, order: int) -> float:
-    """Estimate the largest error of `fine`; `coarse` has twice the time step."""
+    """Estimate the largest error of `fine`; `coarse` has twice the time step.
+
+    The error of `coarse` is larger than the error of `fine` by the factor 2^`order`.
+    """
     return float(np.abs(fine - coarse).max(initial=0.0)) / (2.0**order - 1.0)
 
 
@@ -415,9 +420,10 @@ def read_columns(
 ) -> Mapping[str, FloatArray]:
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
-    Empty lines and lines that begin with # are skipped. The first other line may contain the names of the
-    columns, in any order; with `named`, it must contain them. Without names, the columns are those in
-    `required`. A heading may end with a unit, such as `elbow [deg]`; `units` contains the SI units.
+    Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
+    names of the columns, in any order. With `named`, this line must contain the names. Without names, the
+    columns are those in `required`. A heading may end with a unit, such as `elbow [deg]`. `units` contains
+    the SI unit of each column that may have a unit.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -509,6 +515,7 @@ def _unit(text: str, where: str, expected: str) -> str:
 
 def _in_si(column: FloatArray, unit: str) -> FloatArray:
     if unit == "deg":
+        # For k * 15 degrees, `in_radians` returns exactly k * pi / 12.
         return np.fromiter(map(in_radians, column.tolist()), np.float64, len(column))
     return column / _PER_SECOND.get(unit, 1000.0)
 
@@ -578,7 +585,8 @@ _ONE_TURN = math.tau + 0.02
 #: opposite direction is less than twice as large.
 _AMBIGUOUS = math.tau / 3.0
 
-#: If unwrapping moves a mimic joint by less than this value (rad or m), the motion is a rounding error.
+#: If unwrapping moves a mimic joint by at most this value (rad or m), the motion is a rounding error.
+#: A multiplier with an absolute value above 1 increases this limit in proportion.
 _ROUNDING = 1e-9
 
 

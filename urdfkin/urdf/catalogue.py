@@ -40,7 +40,6 @@ class Entry:
         relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
-        reason: The reason why the mimic rules are invalid, or None.
         poses: Joint values (rad or m) by joint name, for each named pose. Other joints are at 0.
         own: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """
@@ -135,10 +134,7 @@ def find_package(
     environ: Mapping[str, str] = os.environ,
     accepts: Callable[[Path], bool] = lambda folder: True,
 ) -> Path | None:
-    """Return the folder of a package, or None; the docstring of this module describes the search.
-
-    `beside` is the file from which the search goes upwards.
-    """
+    """Return the folder of a package, or None; the docstring of this module describes the search."""
     if not name or name in (".", "..") or "\0" in name:
         return None
     found = filter(is_folder, _candidates(name, beside, environ))
@@ -190,11 +186,7 @@ class Described:
 
 
 def described(source: object) -> Described | None:
-    """Return the file of a robot in robot_descriptions; None for any other source.
-
-    Raise InputError for a missing package or file, UnknownNameError for an unknown description, and
-    SourceError for a failed download.
-    """
+    """Return the file of a robot in robot_descriptions, or None for any other source."""
     if isinstance(source, str) and _DESCRIPTION_NAME.fullmatch(source) is not None:
         if source in catalogue() or exists(Path(source)):
             return None

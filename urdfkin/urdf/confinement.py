@@ -74,7 +74,7 @@ def _nearest_folder_with(mark: str, path: Path) -> list[Path]:
 
 
 def _lies_in(root: str, path: str) -> bool:
-    """Return whether a path is `root`, or is in `root` without hidden parts below `root`."""
+    """Return whether a path is `root` or is below `root`; hidden files and folders do not count."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep

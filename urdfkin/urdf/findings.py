@@ -36,7 +36,6 @@ QUOTED = 60
 
 
 def shortened(text: str, limit: int = QUOTED) -> str:
-    """Return at most `limit` characters of a text, safe to print."""
     return printable(text if len(text) <= limit else text[: limit - 3] + "...")
 
 
@@ -52,8 +51,6 @@ _TAB = "    "
 
 
 class Excerpts:
-    """Lines of a file with the wrong text underlined; the file's data has no byte order mark."""
-
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
         self.number, self.text = 0, ""
@@ -96,12 +93,7 @@ ROUNDING = 2.0**-50
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """The automatic fix of a finding; the edits do not overlap.
-
-    Attributes:
-        turns: Upper bound on the angle (rad) by which the fix rotates a joint frame; 0 if the robot stays
-            equal.
-    """
+    """The automatic fix of a finding; the fix rotates a joint frame by at most `turns` (rad)."""
 
     edits: tuple[Edit, ...]
     turns: float = 0.0
@@ -352,12 +344,7 @@ MARK = "urdfkin:"
 
 @dataclass(slots=True)
 class Comment:
-    """A comment with an instruction for urdfkin.
-
-    Attributes:
-        behind: Whether the line has other text before the comment.
-        element: The element that begins after the comment, or None.
-    """
+    """A comment with an instruction; `behind` is True if the comment follows text on the same line."""
 
     text: str
     line: int
@@ -379,8 +366,7 @@ class Silence:
 @dataclass(slots=True)
 class Silences:
     all: list[Silence] = field(default_factory=list)
-    #: First comment that silences a code. A key is ("line", number, code), ("element", id, code) or
-    #: ("file", 0, code).
+    #: First comment for each ("line", number, code), ("element", id, code) and ("file", 0, code).
     _first: dict[tuple[str, int, str], Silence] = field(default_factory=dict)
 
     def add(self, silence: Silence) -> None:
@@ -412,7 +398,7 @@ class Silences:
 
 #: Maximum number of misspelt names in a file for which similar names are suggested.
 SEARCHES = 20
-#: Limits of one search for similar names: number of compared names, and the argument `work` of `nearest`.
+#: Limits of one search for similar names: number of compared names, and `work` of `nearest`.
 CANDIDATES, WORK = 5_000, 250_000
 
 #: At least this number of warnings or notes with one code are combined into one finding.
@@ -428,10 +414,7 @@ WRITTEN_OUT = 10_000
 
 @dataclass(slots=True)
 class _Kind:
-    """The findings of one code and severity.
-
-    `found` has at most `WRITTEN_OUT` findings with their weights; `lines` has the lines of further findings.
-    """
+    """The findings of one code and severity; `lines` has the line numbers of findings that are not stored."""
 
     severity: Severity
     found: list[tuple[Finding, float]] = field(default_factory=list)
@@ -525,10 +508,7 @@ class Reporter:
     def findings(
         self, *, fold: bool = True, wanted: Callable[[Finding], bool] | None = None
     ) -> tuple[Finding, ...]:
-        """Return the findings by line; `fold` combines many findings with one code into one.
-
-        `wanted` is called once for each finding, in file order, and returns whether the finding is reported.
-        """
+        """Return the findings by line; call `wanted` exactly once for each finding, in file order."""
         pairs = [pair for kind in self._kinds.values() for pair in kind.found]
         if wanted is not None:
             pairs.sort(key=lambda pair: _place_in_file(pair[0]))
@@ -558,7 +538,6 @@ class Reporter:
         return self._attributes
 
     def _place(self, at: Element, attribute: str | None) -> tuple[int, int, int]:
-        """Return line, column and width of a start tag or of one attribute."""
         span = None if attribute is None else self._spans(at).get(attribute)
         if span is None:
             return at.line, at.column, 1 + len(at.tag)
@@ -570,14 +549,13 @@ class Reporter:
         return None if span is None else Fix((Edit(*span.value, value),), turns)
 
     def without(self, at: Element, *attributes: str) -> Fix | None:
-        """Return the fix that removes attributes and the white space before each attribute."""
         existing = [span for name in attributes if (span := self._spans(at).get(name)) is not None]
         spans = sorted((span.start, span.value[1] + 1) for span in existing)
         edits = tuple(Edit(blanks_before(self.data, start), end) for start, end in spans)
         return Fix(edits) if edits else None
 
     def without_element(self, at: Element) -> Fix | None:
-        """Return the fix that removes an empty element, or its whole line."""
+        """Return the fix that removes an empty element, and its line if nothing else is on the line."""
         tag = START_TAG.match(self.data, at.offset)
         if tag is None:
             return None
@@ -595,10 +573,7 @@ class Reporter:
 
 @dataclass(frozen=True, slots=True)
 class _AttributeSpan:
-    """The position of an attribute; columns are in characters, indices in bytes.
-
-    `value` contains the index of the value's first byte and the index of the closing quotation mark.
-    """
+    """The position of an attribute; `value` spans the text between the quotation marks."""
 
     line: int
     column: int

@@ -48,10 +48,7 @@ class XmlTree(Protocol):
 
 
 def text_of(source: Any) -> tuple[str, str] | None:
-    """Return the URDF text of another library's object and the object's name in messages, or None.
-
-    Raise InputError if an element cannot be written as XML, or if a yourdfpy robot is not a tree.
-    """
+    """Return the URDF text of another library's object and the object's name in messages, or None."""
     if any(kind.__module__.partition(".")[0] == "yourdfpy" for kind in type(source).__mro__):
         return urdf_of(getattr(source, "robot", source)), "<yourdfpy>"
     root = source.getroot() if hasattr(source, "getroot") else source
@@ -61,10 +58,7 @@ def text_of(source: Any) -> tuple[str, str] | None:
 
 
 def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
-    """Return a finding if yourdfpy may have lost rotations.
-
-    yourdfpy (0.0.60) ignores the attribute quat_xyzw, so the rotation of a joint with quat_xyzw is lost.
-    """
+    """Return a finding if yourdfpy (0.0.60), which ignores quat_xyzw, may have lost rotations."""
     robot = getattr(source, "robot", source)
     if not type(robot).__module__.startswith("yourdfpy"):
         return ()
@@ -87,8 +81,7 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
 def urdf_of(robot: yourdf.Robot) -> str:
     """Return the URDF of a yourdfpy robot; yourdfpy's own writer (0.0.60) omits mimic rules.
 
-    The axes are not normalised, so that `check` can report their lengths. Raise InputError for an invalid
-    robot, and UnknownNameError for a missing mimicked joint.
+    The axes are not normalised, so that `check` can report their lengths.
     """
     try:
         records = [_record(joint) for joint in robot.joints]
@@ -116,7 +109,6 @@ def _record(joint: yourdf.Joint) -> JointRecord:
 
 
 def _text(root: Any) -> str:
-    """Write an element tree as XML without comments and processing instructions."""
     if not isinstance(root.tag, str):
         raise InputError("the root of this ElementTree is not an element", found=safe_repr(root.tag))
     try:
@@ -152,11 +144,9 @@ _ENDLESS = 1e300
 
 @dataclass(frozen=True, slots=True)
 class Modelled:
-    """The kinematic tree of a Pinocchio model.
+    """The kinematic tree of a Pinocchio model, with the index of each link in the model.
 
-    Attributes:
-        joints: Index of the Pinocchio joint, for each link whose frame is a joint frame.
-        frames: Index of the Pinocchio frame, for each other link.
+    `joints` contains the links whose frame is a joint frame; `frames` contains all other links.
     """
 
     tree: KinematicTree

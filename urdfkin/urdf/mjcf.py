@@ -3,7 +3,7 @@
 MuJoCo compiles the file, which resolves defaults and classes. The tree is built from the compiled model:
 
 - Each body becomes a link with the body's frame. Each site with a name also becomes a link; a fixed joint
-  connects this link with the link of the body.
+  connects this link with the link of the site's body.
 - The joints of a body move one after the other. Joint k, with the anchor p_k and the motion J_k, changes the
   pose F of the body to F Trans(p_k) J_k Trans(-p_k). A body with several joints becomes a chain of joints and
   links. The last link of the chain is the body.
@@ -54,7 +54,7 @@ _HEAD = 65_536
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A part of the file that the tree does not represent or represents differently, or a probable mistake.
+    """A part that the tree does not represent or represents differently, or a probable mistake.
 
     Attributes:
         where: The tag and the name of the element, or the tag alone; None for the whole file.
@@ -74,8 +74,7 @@ class Mjcf:
 
     Attributes:
         model: MuJoCo's compiled model, in which all bodies remain separate.
-        fused: If `whole` is True and the file sets `fusestatic`: the model with fused static bodies.
-            Otherwise None.
+        fused: The model with fused static bodies; None unless `whole` is True and the file sets `fusestatic`.
         frames: "body" or "site", and the index in `model`, for each link.
         coordinates: Index in MuJoCo's qpos of each moving joint, including mimic joints.
         rules: Name of the mimic joint for each equality that is a mimic rule, by the equality's index.
@@ -96,7 +95,7 @@ class Mjcf:
     aligns: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's qpos for q (n, nq), including the values of mimic joints."""
+        """Return MuJoCo's qpos (n, nq of MuJoCo) for q (n, nq), including mimic joints."""
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.coordinates:
@@ -120,7 +119,6 @@ class Mjcf:
         return out
 
     def _in_fused(self, frame: tuple[str, int]) -> tuple[str, int] | None:
-        """Return the body or site of `fused` with the name of a frame of `model`, or None."""
         mujoco, (kind, i) = library(), frame
         what = mujoco.mjtObj.mjOBJ_BODY if kind == "body" else mujoco.mjtObj.mjOBJ_SITE
         name = mujoco.mj_id2name(self.model, what, i)
@@ -148,8 +146,8 @@ class Mjcf:
     def reference_angles(self, q: FloatArray) -> FloatArray:
         """Return a sum of hinge angles (n, frames), in rad, for bounds on rounding errors.
 
-        Each hinge between the world and a frame adds |q| + |ref| if the hinge's reference value `ref` is not
-        0.
+        Each hinge between the world and a frame adds |q| + |ref| if the hinge's reference value `ref` is
+        nonzero.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -161,7 +159,6 @@ class Mjcf:
         return self._of_frames(at_body, np.zeros(m.nsite))
 
     def _joints_of(self, body: int) -> Iterator[tuple[int, str, int]]:
-        """Yield index, kind and qpos index of each joint of a body."""
         m, kinds = self.model, library().mjtJoint
         words = {int(kinds.mjJNT_FREE): "free", int(kinds.mjJNT_SLIDE): "slide"}
         for j in _joint_indices(m, body):
@@ -249,8 +246,7 @@ def is_mjcf(source: object) -> TypeGuard[str | bytes | os.PathLike[str]]:
 def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False) -> Mjcf:
     """Read an MJCF file or text in this process (`urdfkin.verify.mjcf_check` confines the process).
 
-    If `whole` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files. Raise
-    InputError without MuJoCo, for an invalid file, and for a ball joint.
+    If `whole` is False, shapes and inertias are removed first, so that MuJoCo needs no mesh files.
     """
     mujoco = library()
     fused = None
@@ -351,10 +347,10 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
     useless = dict(_useless(spec))
     for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
         if words in useless:
-            yield Listed(f"{words} have no effect here", tag, moves=True)
+            yield Listed(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
         counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())
-        yield Listed(f"left out, since kinematics does not use them: {counts}")
+        yield Listed(f"kinematics does not use {counts}")
 
 
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
@@ -396,8 +392,6 @@ def _joint_indices(model: Any, body: int) -> range:
 
 @dataclass(slots=True)
 class _MjcfReader:
-    """Convert a compiled model; `source` is the name of the file in messages."""
-
     mujoco: Any
     model: Any
     name: str
@@ -436,7 +430,6 @@ class _MjcfReader:
         self._joints.append((fixed_joint(name, T), parent, child))
 
     def _body(self, i: int) -> None:
-        """Add the joints of a body one after the other, then the link of the body."""
         m, here = self.model, self._links[self.model.body_parentid[i]]
         T, link = _pose(m.body_pos[i], m.body_quat[i]), self._links[i]
         if m.body_mocapid[i] >= 0:
@@ -490,7 +483,6 @@ class _MjcfReader:
         return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
 
     def _rules(self) -> Iterator[tuple[str, Mimic]]:
-        """Yield the mimic rules: linear equalities of two joints, with chains combined."""
         m, rules = self.model, dict[str, Mimic]()
         for i in range(m.neq):
             if m.eq_type[i] != self.mujoco.mjtEq.mjEQ_JOINT:
@@ -517,8 +509,8 @@ class _MjcfReader:
     def _rule(self, i: int) -> tuple[str, Mimic] | None:
         """Return the mimic joint y and its rule for the equality y - y0 = c0 + c1 (x - x0).
 
-        Here x0 and y0 are the reference values of the joints. The result is None if the equality is not
-        linear, or has only one joint.
+        Here x0 and y0 are the joints' reference values. Return None if the equality is not a linear relation
+        of two joints.
         """
         m = self.model
         y, x = int(m.eq_obj1id[i]), int(m.eq_obj2id[i])
@@ -542,7 +534,6 @@ def fixed_joint(name: str, T: FloatArray) -> Joint:
 
 
 def leads(rules: Mapping[str, Mimic], joint: str, to: str) -> bool:
-    """Return whether `joint` mimics `to`, directly or through other mimic joints."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to

@@ -1,7 +1,7 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
-The XML parser is expat: it keeps namespace prefixes (`xacro:macro`), reports the position of every start tag,
-parses deep nesting without recursion, and opens no file. If a document type declaration defines entities or
+The XML parser is expat, which reports the position of every start tag, keeps namespace prefixes, parses deep
+nesting without recursion, and opens no file. If a document type declaration defines entities or
 refers to an external file, parsing stops with an error. No entity is expanded.
 
 A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
@@ -365,7 +365,6 @@ class _Builder:
         self.report.add(SYNTAX, message, found=found, remedy=remedy, position=position)
 
     def _entity_name(self) -> str | None:
-        """Return the first undefined entity after the error position."""
         found = _ENTITY.finditer(self.report.data, self.parser.ErrorByteIndex)
         return next((match[1].decode() for match in found if match[1] not in _PREDEFINED), None)
 
@@ -414,17 +413,14 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers in attributes.
-
-    `bad_number` is the rule for an invalid number, `bad_vector` the rule for a wrong count of numbers.
-    """
+    """Read numbers; report invalid numbers with `bad_number`, wrong counts with `bad_vector`."""
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
     bad_vector: Rule = BAD_VECTOR
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
-        """Return a number; `default` without the attribute, None for an invalid number."""
+        """Return a number; `default` if the attribute is missing, None if the number is invalid."""
         written = element.attributes.get(attribute)
         if written is None:
             return default
@@ -438,7 +434,7 @@ class NumberReader:
         return value
 
     def vector(self, element: Element, attribute: str, count: int = 3) -> tuple[float, ...] | None:
-        """Return `count` numbers; None without the attribute or for an invalid number."""
+        """Return `count` numbers; None if the attribute is missing or invalid."""
         written = element.attributes.get(attribute)
         if written is None:
             return None
@@ -483,7 +479,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report text that is too long: the conversion to a number takes quadratic time."""
+        """Report text that is too long for a number, because the conversion takes quadratic time."""
         if len(written) <= most:
             return False
         found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
@@ -597,7 +593,6 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
     return robot
 
 
-#: Remedies for files of other formats, by the tag of the root element.
 _FORMATS = {
     "sdf": "this is an SDF file; convert the file to a URDF first",
     "mujoco": "this is an MJCF file; `load` and all other commands read files with the suffix .xml or .mjcf",
@@ -679,7 +674,7 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute; report a missing attribute and, without `number`, an empty one."""
+        """Return a required attribute; report a missing attribute, but do not report an empty number."""
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"
@@ -787,7 +782,7 @@ class JointReader:
             joint.mimic = MimicRecord(mimic, leader, multiplier, offset)
 
     def _others(self, joint: JointRecord) -> None:
-        """Check unused elements too, because urdfdom refuses a file with an invalid element."""
+        """Check unused elements too: urdfdom refuses a file if one of these elements is invalid."""
         dynamics, safety = (joint.element.first(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
             self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')

@@ -23,10 +23,7 @@ from urdfkin.urdf.records import JointRecord, LimitRecord, MimicRecord, RobotRec
 
 
 def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None = None) -> KinematicTree:
-    """Return the kinematic tree of a URDF in which `urdfkin.urdf.lint` found no errors.
-
-    If `root_joint` is "floating" or "planar", a joint `root_joint` connects the root link with the world.
-    """
+    """Return the kinematic tree of a URDF in which `urdfkin.urdf.lint` found no errors."""
     name = urdf.element.attributes.get("name", "")
     tree = build_tree(name, root_link(name, urdf.links, urdf.joints), joint_rows(urdf.joints, mimic=mimic))
     if root_joint not in (None, "floating", "planar"):

@@ -21,7 +21,6 @@ class Limits:
 
     Attributes:
         depth: Maximum number of levels of nested elements. Pinocchio never reads more than the default.
-        attributes: Maximum number of attributes of one element.
         name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
         number: Maximum number of characters of one number.
         markup: Maximum number of bytes of one tag, comment or processing instruction. The default is that of
@@ -40,7 +39,7 @@ class Limits:
 DEFAULT_LIMITS = Limits()
 
 
-#: Regular expression for a start tag. A quoted attribute value may contain '>'.
+#: A quoted attribute value in a start tag may contain '>'.
 START_TAG = re.compile(rb"""<(?:[^<>"']++|"[^"]*+"|'[^']*+')*+>""")
 ATTRIBUTE = re.compile(rb"""([^\s=<>/"']++)\s*+=\s*+("[^"]*+"|'[^']*+')""")
 
@@ -80,7 +79,6 @@ class Element:
         return next((child for child in self.children if child.tag == tag), None)
 
     def walk(self) -> Iterator[Element]:
-        """Yield the element and all its descendants in file order."""
         stack = [self]
         while stack:
             element = stack.pop()
@@ -98,7 +96,6 @@ Vector = tuple[float, ...]
 #: Attributes of `<limit>` that URDF 1.2 introduced.
 FURTHER_LIMITS = ("acceleration", "deceleration", "jerk")
 
-#: Joint types with an axis.
 AXIAL = ("revolute", "continuous", "prismatic")
 
 

@@ -31,7 +31,6 @@ class Origin:
         table: Whether the robot was created from a Denavit-Hartenberg table.
         sha256: The digest of an MJCF or USD file; empty for other sources.
         lock: Name and value (rad or m) of each locked joint, without mimic joints.
-        variants: Variant sets and variants that were selected in a USD stage.
     """
 
     source: str
@@ -53,7 +52,7 @@ class Origin:
 
     @property
     def again(self) -> str:
-        """The source for a new call of `load`; `-` (standard input) for text and bytes."""
+        """The source for a new call of `load`; `-` (standard input) for a source without a name."""
         return "-" if self.source.startswith("<") else self.source
 
     @property
@@ -78,22 +77,15 @@ class Origin:
 
     @property
     def words(self) -> str:
-        """The source and the options as written on a command line."""
         return " ".join(filter(None, (shlex.quote(self.again), self.options)))
 
     @property
     def lock_words(self) -> str:
-        """The locked joints in words; an empty string if there are none.
-
-        >>> Origin("panda", lock=(("finger", 0.04), ("wrist", 0.0))).lock_words
-        'finger locked at 0.04, wrist at 0'
-        """
         locks = enumerate(self.lock)
         return ", ".join(f"{name}{'' if i else ' locked'} at {value:.6g}" for i, (name, value) in locks)
 
     @property
     def python(self) -> str:
-        """The call of `load` in Python."""
         values = {
             "mimic": self.mimic,
             "root_joint": self.root_joint,
@@ -117,8 +109,7 @@ class Text:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: The path or name from which the URDF can be read again; otherwise `<text>`, `<bytes>` or
-            `<file>`.
+        source: The path or name to read the URDF again; otherwise `<text>`, `<bytes>` or `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
     """
 
@@ -180,7 +171,6 @@ def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
 
 
 def _suffix(source: object) -> str:
-    """Return the suffix of a path in lower case; an empty string for any other source."""
     if not isinstance(source, str | os.PathLike):
         return ""
     is_text = isinstance(source, str) and source.lstrip().startswith("<")
@@ -249,7 +239,7 @@ def as_word(path: Path) -> str:
 
 
 def entry_of(word: str) -> Entry | None:
-    """Return the catalogue entry of a name, or None; a name has no dot and no separator."""
+    """Return the catalogue entry of a name; None for a path, which has a dot or a separator."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

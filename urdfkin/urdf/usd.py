@@ -74,6 +74,7 @@ _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoin
 #: Words in the names of USD types and schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
 #: Suffixes of the type names of joints that a kinematic tree cannot represent.
+#: OpenUSD recognizes such a joint only if the plugin for the joint type is installed.
 _NO_JOINTS = ("DistanceJoint", "GearJoint", "RackAndPinionJoint")
 #: Coefficients of the nonlinear terms of a MuJoCo joint equality; a mimic rule is linear.
 _HIGHER = ("mjc:coef2", "mjc:coef3", "mjc:coef4")
@@ -84,7 +85,7 @@ _SHAPES = ("visual", "visuals", "collision", "collisions")
 #: Rotation matrix that rotates the y axis onto the z axis.
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
-#: Kinds of remarks. The module `left_out` of the rules defines a rule for each kind.
+#: Kinds of remarks. The module `lint.rules.left_out` defines a rule for each kind.
 Kind = Literal[
     "left-out-of-usd", "unit-scale", "up-axis", "lost-mimic", "limit-unit", "loose-body", "outside-joint",
     "rest-pose", "mirrored-body", "missing-layer", "unused-in-usd", "time-samples",
@@ -93,11 +94,7 @@ Kind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """A part of the stage that the tree does not represent, or a probable mistake.
-
-    Attributes:
-        where: The path of the prim; empty for a remark about the whole stage.
-    """
+    """A part of the stage that the tree does not represent, or a probable mistake."""
 
     kind: Kind
     where: str
@@ -140,11 +137,11 @@ class Usd:
         prims: The path of the prim for each link that represents a prim.
         rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
         rest_q: (nq,) configuration in which the stage shows the robot.
-        single: Five numbers for each joint name, which bound the effect of rounding to single precision.
-            Number 1 bounds the error (m) of the joint origins. Number 2 bounds the error (rad) of the joint
+        single: Five numbers, by joint name, that bound the effect of rounding to single precision. Number 1
+            bounds the error (m) of the joint origins. Number 2 bounds the error (rad) of the joint
             orientations. Number 3 is the sum of the lengths (m) of the vectors that these orientation errors
-            rotate. Number 4 bounds the relative error of a mimic joint's value; it is 0 for other joints.
-            Number 5 is the distance (m) between the joint frame and the child frame.
+            rotate. Number 4 bounds the relative error of a mimic joint's value; number 4 is 0 for other
+            joints. Number 5 is the distance (m) between the joint frame and the child frame.
         joints: The numbers of each joint prim in the tree, by the path of the prim.
         unit: The stage's metersPerUnit.
     """
@@ -169,7 +166,6 @@ def version() -> str:
 
 
 def library() -> Any:
-    """Return a namespace of OpenUSD's modules; raise InputError if OpenUSD is not installed."""
     try:
         from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdPhysics
     except ImportError:
@@ -178,10 +174,7 @@ def library() -> Any:
 
 
 def files_of(pxr: Any, path: str) -> tuple[str, ...]:
-    """Return the files of a stage; read each layer before its references are followed.
-
-    Raise InputError for a forbidden reference or too many layers, and SourceError for an unreadable file.
-    """
+    """Return the files of a stage; check each layer before OpenUSD follows its references."""
     ground = Ground.around(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
     files: dict[str, None] = {}
@@ -266,8 +259,7 @@ def read_usd(
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
     `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
-    with the variant set. `articulation` is the path or name of the articulation to read; None if there is
-    only one.
+    with the variant set. `articulation` is the path or name of the articulation to read.
     """
     pxr = library()
     try:
@@ -288,7 +280,7 @@ def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str
     """Select variants in the session layer, which is not saved; return the paths of expanded instances.
 
     OpenUSD cannot select a variant inside an instance. An instance with the variant set is therefore made
-    non-instanceable. Raise UnknownNameError for an unknown variant set or variant.
+    non-instanceable.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     opened = set[str]()
@@ -334,7 +326,8 @@ class _Edge:
 
     Attributes:
         name: At first the name of the prim; later the unique name of the joint in the tree.
-        frames: The poses of the joint frame in the two bodies; a body is None for the world.
+        ends: The paths of the two bodies that the joint connects; None is the world.
+        frames: The poses of the joint frame in the two bodies.
         rounded: Bounds on how far rounding to single precision moves (m) and rotates (rad) the joint frame.
     """
 
@@ -429,7 +422,7 @@ class _StageReader:
             joints = sum(one.IsA(physics.Joint) for one in below)
             if bodies or joints:
                 what = f"the prototypes of this PointInstancer have {bodies} bodies and {joints} joints"
-                remedy = "write each copy as a prim of its own, with a reference"
+                remedy = "write each copy as a separate prim, with a reference"
                 self._report("left-out-of-usd", path, f"{what}, which are not read", remedy)
             else:
                 self._report("unused-in-usd", path, "kinematics does not use this PointInstancer")
@@ -460,7 +453,6 @@ class _StageReader:
             self._report("time-samples", where, what, "write a default value")
 
     def _report_timed_transforms(self, prim: Any) -> None:
-        """Report transform operations without a default value, for a prim and its ancestors."""
         while prim and (path := str(prim.GetPath())) not in self._looked_at:
             self._looked_at.add(path)
             if prim.IsA(self.pxr.UsdGeom.Xformable):
@@ -472,7 +464,6 @@ class _StageReader:
             prim = prim.GetParent()
 
     def _uneven_scale(self, prim: Any) -> str | None:
-        """Describe the nearest ancestor with a non-uniform scale, or return None."""
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
@@ -560,7 +551,6 @@ class _StageReader:
     # -- joints --------------------------------------------------------------------------------------
 
     def _edge(self, prim: Any) -> _Edge | None:
-        """Return a joint between two bodies, or a body and the world; report any other joint."""
         path = str(prim.GetPath())
         if self._value(prim, "physics:jointEnabled") is False:
             self._report("left-out-of-usd", path, "this joint is disabled")
@@ -602,11 +592,7 @@ class _StageReader:
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return body i (0 or 1) of a joint and the joint frame; None if the body does not exist.
-
-        The result contains the path of the body (None for the world), the pose of the joint frame in the body
-        (m), and the numbers `size` and `rounded` of `_Edge`.
-        """
+        """Return body path, joint frame (m), `size` and `rounded` for body i; None for a missing body."""
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
@@ -678,16 +664,13 @@ class _StageReader:
         return self._general_motion(prim, path)
 
     def _general_motion(self, prim: Any, path: str) -> tuple[JointKind, FloatArray, tuple[float, float], str]:
-        """Return the result of `_motion` for a `PhysicsJoint`, which has limits for six directions.
-
-        A direction is locked if its lower limit is above its upper limit.
-        """
+        """Return the result of `_motion` for a `PhysicsJoint`, which has limits for six directions."""
         limits: dict[str, tuple[float, float]] = {}
         for direction in _DIRECTIONS:
             low, high = _NO_LIMITS
             if f"PhysicsLimitAPI:{direction}" in _schemas(prim):
                 low, high = (self._end(prim, f"limit:{direction}:physics:{end}") for end in ("low", "high"))
-            if low <= high:
+            if low <= high:  # A lower limit above the upper limit locks the direction.
                 limits[direction] = low, high
         free = tuple(limits)
         if not free:
@@ -704,10 +687,7 @@ class _StageReader:
         return kind, _unit(0), _NO_LIMITS, " ".join(free)
 
     def _end(self, prim: Any, name: str) -> float:
-        """Return a limit of a `PhysicsJoint`; raise InputError if a layer blocks the limit with `None`.
-
-        For a blocked limit, OpenUSD's parser of UsdPhysics does not use the default, but other readers do.
-        """
+        """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
             message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
@@ -732,7 +712,7 @@ class _StageReader:
     # -- articulations -------------------------------------------------------------------------------
 
     def _articulations(self) -> list[_Articulation]:
-        """Group the bodies that joints connect; report a joint between two articulations instead."""
+        """Return the groups of connected bodies; report and ignore joints between articulations."""
         above: dict[str, str] = {path: path for path in self._bodies}
 
         def top(path: str) -> str:
@@ -824,7 +804,7 @@ class _StageReader:
         return _Articulation(path, bodies, [edge for group in groups for edge in group.edges])
 
     def _root(self, group: _Articulation) -> str | None:
-        """Return the root body of a group, or None if the world is the root."""
+        """Return the root body of a group, or None if the root is the world."""
         if any(None in edge.ends for edge in group.edges):
             return None
         if group.path in group.bodies:
@@ -891,7 +871,6 @@ class _StageReader:
         self._report("left-out-of-usd", edge.path, what)
 
     def _is_outside(self, edge: _Edge, group: _Articulation) -> bool:
-        """Return whether exactly one of a joint's two bodies is below the articulation root."""
         inside = group.path + "/"
         if group.path in self._bodies or not any(path.startswith(inside) for path in group.bodies):
             return False
@@ -899,7 +878,6 @@ class _StageReader:
         return len(set(below)) > 1
 
     def _short(self, path: str) -> str:
-        """Return a prim's name, with the names of ancestors if the name is not unique."""
         parts, same = path.split("/")[1:], [other.split("/")[1:] for other in self._bodies]
         for n in range(1, len(parts) + 1):
             if sum(other[-n:] == parts[-n:] for other in same) <= 1:
@@ -922,7 +900,7 @@ class _StageReader:
         free = kind in (JointKind.PLANAR, JointKind.FLOATING)
         if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
             raise InputError(
-                "body0 of a floating joint must be the world, and body0 of a planar joint must be its parent",
+                "body0 of a floating joint must be the world, and body0 of a planar joint must be the parent",
                 where=f"{self.source}: joint {edge.path}",
                 found=kind.value,
                 remedy="exchange body0 and body1 of this joint, or write several joints",
@@ -1041,7 +1019,6 @@ class _StageReader:
         return self._unit if kind is JointKind.PRISMATIC else math.pi / 180.0
 
     def _compare_units(self, edge: _Edge, leader: str) -> None:
-        """Report a mimic rule between an angle and a length."""
         kind = next((one.kind for one in self._edges if one.path == leader), edge.kind)
         if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
             what = "a mimic rule between an angle and a length has no unit in the schema; m and rad are used"
@@ -1104,19 +1081,18 @@ class _StageReader:
                     self._report_layer(layer.pseudoRoot, name, prim)
 
     def _report_layer(self, root: Any, name: str, prim: Any) -> None:
-        """Report another unit or up axis of a layer; `prim` is the layer's topmost prim."""
         tokens, path = self.pxr.UsdGeom.Tokens, str(prim.GetPath())
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
             factor = unit / self._unit
             if abs(factor - 1.0) > SINGLE and not self._is_scaled(prim, factor):
                 what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._unit:g}"
-                remedy = f"scale this prim by {factor:g}, or write the layer in the unit of the stage"
+                remedy = f"scale this prim by {factor:g}, or save the layer in the unit of the stage"
                 self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
         up = str(self.pxr.UsdGeom.GetStageUpAxis(self.stage))
         if root.HasInfo(tokens.upAxis) and root.GetInfo(tokens.upAxis) != up and not self._is_resolved(prim):
             what = f"the layer {name} has upAxis {root.GetInfo(tokens.upAxis)}, but the stage {up}"
-            remedy = "rotate this prim, or write the layer again with the up axis of the stage"
+            remedy = "rotate this prim, or save the layer with the up axis of the stage"
             self._report("up-axis", path, f"{what}; the layer is not rotated", remedy)
 
     def _is_scaled(self, prim: Any, factor: float) -> bool:
@@ -1125,10 +1101,7 @@ class _StageReader:
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim or an ancestor has a transform operation with the suffix `unitsResolve`.
-
-        By convention, such an operation converts a layer to the unit and up axis of the stage.
-        """
+        """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
                 return True

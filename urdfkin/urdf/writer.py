@@ -21,9 +21,8 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 requires finite limits of effort and velocity, so a tree with an infinite limit is written as
-    URDF 1.2. Raise InputError for a revolute or prismatic joint without finite position limits, and for a
-    name that XML does not allow.
+    URDF 1.0 requires finite limits of effort and velocity. If a <limit> element lacks such a limit, the file
+    declares version 1.2.
     """
     version = ' version="1.2"' if any(_needs_newer_version(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{attribute(tree.name)}"{version}>']

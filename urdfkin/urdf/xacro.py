@@ -4,7 +4,7 @@ A xacro file is a program, and may come from an untrusted source. docs/xacro.md 
 xacro file may do. The module `expanding` contains the code of the separate process.
 
 xacro itself ignores an argument that the file does not declare, but urdfkin raises an error. If urdfkin
-cannot read all included files, every argument is accepted.
+cannot read one of the included files, every argument is accepted.
 """
 
 from __future__ import annotations
@@ -40,10 +40,7 @@ _COMPUTED = re.compile(r"\$[({]|[*?\[]")
 
 
 def arguments_of(path: Path, find: Find) -> set[str] | None:
-    """Return the names of the xacro arguments of a file and of all files that it includes.
-
-    The result is None if one of the files cannot be read, or if there are more than `MOST_FILES` files.
-    """
+    """Return the argument names of a xacro file and its included files; None if a file is unreadable."""
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
         while files:

@@ -47,8 +47,8 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(exact, otypes=[object])
-#: The result has two lines for analytical Jacobians.
-#: Each line covers these representations of the orientation.
+#: The result has one line for each group of these representations of the orientation.
+#: Angles about fixed axes are left out: their Jacobians are those of Euler angles with reversed rows.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -57,12 +57,7 @@ _REPRESENTATIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Errors of one library relative to the values with fifty digits, in eps * scale.
-
-    Attributes:
-        worst: The largest error.
-        typical: Root mean square of the errors.
-    """
+    """Largest error and root mean square of the errors of one library, in eps * scale."""
 
     worst: float
     typical: float
@@ -70,12 +65,9 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyLine:
-    """The errors of urdfkin and of Pinocchio for one quantity in one reference frame.
+    """Errors of urdfkin and of Pinocchio for one quantity, over `numbers` compared values.
 
-    Attributes:
-        reference: Name of the reference frame; None for a placement. For analytical Jacobians: the
-            representation of the orientation.
-        numbers: Number of compared values.
+    For analytical Jacobians, `reference` is the representation of the orientation.
     """
 
     quantity: str
@@ -87,8 +79,6 @@ class AccuracyLine:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyStudy:
-    """Result of the accuracy study of one robot, with one line for each quantity and reference frame."""
-
     robot: str
     samples: int
     seed: int
@@ -101,22 +91,9 @@ def accuracy_study(
 ) -> AccuracyStudy:
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
-    The quantities are each link's placement, velocity, Jacobian, analytical Jacobians, Jacobian rate and
-    acceleration. The configurations are the first random configurations of `validate`. One configuration
-    takes almost a second. `base` is the motion of the root link: one motion for all samples, or one motion
-    for each sample. Without `base`, the root link is fixed.
-
-    The result has one line for the analytical Jacobians of all twelve sequences of Euler angles, and one line
-    for the analytical Jacobians of quaternions. Angles about fixed axes (such as roll, pitch and yaw) are
-    left out: they have the same Jacobians as the corresponding Euler angles, with the rows in reverse order.
-    A sample is skipped if it is so close to a singularity that `Robot.analytical_jacobian` raises an error. A
-    sample is also skipped if rounding errors make the sign of the quaternion uncertain. Pinocchio computes no
-    analytical Jacobians. Therefore, the study inserts the rotation and the Jacobian of each library into
-    eq. 7.122.
-
-    Raises:
-        OracleError: Pinocchio does not accept the robot.
-        InputError: The number of base motions is neither one nor the number of samples.
+    `base` is the motion of the root link: one motion for all samples, or one motion for each sample. Without
+    `base`, the root link is fixed. Pinocchio computes no analytical Jacobians, so the study inserts the
+    rotation and the Jacobian of each library into eq. 7.122.
     """
     drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
@@ -126,8 +103,6 @@ def accuracy_study(
 
 
 class _AccuracySamples(NamedTuple):
-    """The results of urdfkin and of Pinocchio, the values with 50 digits, and the scale of the errors."""
-
     urdfkin: FloatArray
     pinocchio: FloatArray
     true: NDArray[np.object_]
@@ -173,14 +148,13 @@ class _AccuracyBatch:
         return _AccuracySamples(ours, theirs, self._true(row, reference).reshape(ours.shape), scale)
 
     def _true(self, row: Quantity, reference: Reference) -> NDArray[np.object_]:
-        """Return the values with 50 digits (n, links, ...)."""
         return np.array(
             [[row.truth(motion, link, reference) for link in self.links] for motion in self.motions],
             dtype=object,
         )
 
     def _analytical(self, representations: Sequence[str]) -> Iterator[_AccuracySamples]:
-        """Yield the analytical Jacobians of each representation."""
+        """Yield analytical Jacobians, except near a singularity or if a quaternion's sign is uncertain."""
         poses, J_v = self._compared(PLACEMENT, None), self._compared(JACOBIAN, _ALIGNED)
         plan, x = self.part.plan, self.part
         size, nearest = magnitudes(plan, x.q, None, None, x.state), max(NEAREST, nearest_singularity(plan))
@@ -206,10 +180,9 @@ class _AccuracyBatch:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return, for each link, the indices of the Jacobian's columns that are not zero (n, links, most).
+    """Return the indices (n, links, most) of the nonzero columns of each link's Jacobian.
 
-    Here `most` is the largest number of such columns of a link. If a link has fewer such columns, indices of
-    zero columns follow.
+    If a link has fewer than `most` nonzero columns, indices of zero columns follow.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
@@ -217,17 +190,13 @@ def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
 
 
 def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
-    """Return the columns of matrices (..., rows, nv) that `indices` selects."""
     return np.take_along_axis(J, indices[..., np.newaxis, :], axis=-1)
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
-
-    Of the two quaternions q and -q of a rotation, the function returns the one closer to `near` (m, 4).
-    """
+    """Return the unit quaternions (m, 4) of rotations (m, 3, 3): of q and -q, the one closer to `near`."""
     K = davenport(R)
-    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I is 4 q q^T
+    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I equals 4 q q^T.
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
     return unit
 

@@ -28,7 +28,7 @@ class FailedStudy:
 
 @dataclass(frozen=True, slots=True)
 class StudySettings:
-    """Settings of the accuracy study; with `moving_base`, the root link of each robot has a random motion."""
+    """Settings of the accuracy study; `moving_base` gives each root link a random motion."""
 
     samples: int
     seed: int
@@ -36,7 +36,6 @@ class StudySettings:
 
     @property
     def options(self) -> str:
-        """The settings as command-line options."""
         moving = " --accuracy-moving-base" if self.moving_base else ""
         return f"--accuracy-samples {self.samples} --seed {self.seed}{moving}"
 
@@ -47,7 +46,6 @@ class AccuracyResult:
 
     @classmethod
     def merge(cls, store: Store, others: Sequence[Store]) -> None:
-        """Copy missing results from other stores; raise InputError if a store has other settings."""
         theirs = [results for results in map(cls.of, others) if results is not None]
         if not theirs:
             return
@@ -62,7 +60,7 @@ class AccuracyResult:
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
-        """Return the results with the latest settings; None: no accuracy study was requested."""
+        """Return the results in a store; None without an accuracy study or with unreadable settings."""
         try:
             if (content := read_if_there(store.folder / STUDY_FILE)) is None:
                 return None
@@ -82,7 +80,6 @@ class AccuracyResult:
         return self._store.entry(self._key(robot), STUDY_SUFFIX, _decode)
 
     def has(self, robot: int) -> bool:
-        """Return whether the store has a file with the result of a robot, without reading the file."""
         return self._store.has(self._key(robot), STUDY_SUFFIX)
 
     def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
@@ -90,7 +87,7 @@ class AccuracyResult:
         self._store.write_entry(key, STUDY_SUFFIX, pack(key, {"accuracy": found}))
 
     def stamp(self, robot: int) -> str:
-        """Return the sha256 of the robot's text; a result is valid only for the text with this sha256."""
+        """Return the sha256 of the robot's text."""
         return self._store.manifest.robots[robot][1]
 
     def _check_same(self, other: AccuracyResult) -> None:
@@ -105,7 +102,7 @@ class AccuracyResult:
     def _key(self, robot: int) -> str:
         manifest = self._store.manifest
         origin, stamp = manifest.robots[robot]
-        origin = replace(origin, oracle=None)  # the study does not use a second oracle
+        origin = replace(origin, oracle=None)  # The study uses no second oracle.
         parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), stamp]
         return hashlib.sha256(json.dumps([LAYOUT, "accuracy", *parts], sort_keys=True).encode()).hexdigest()
 

@@ -31,12 +31,8 @@ from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entrie
 class Failure:
     """The reason why a robot was not checked.
 
-    Attributes:
-        verdict: BAD_INPUT if the robot's file has an error, NOT_VERIFIED otherwise.
-        summary: Summary of the readable parts of the robot.
-        error: The traceback of an unexpected error; None otherwise.
-        passing: Whether the failure is temporary: the process or the cluster caused it, not the robot. A
-            temporary failure is not stored, so a resumed run computes the chunk again.
+    `passing` means that the process or the cluster failed, and not the robot. Such a failure is not stored,
+    so a resumed run computes the chunk again. `error` is the traceback of an unexpected error.
     """
 
     verdict: ValidationVerdict
@@ -91,7 +87,6 @@ def _name_and_message(error: Exception) -> str:
     return f"{type(error).__name__}: {' '.join(str(error).split()) or 'no message'}"
 
 
-#: Reasons that a report gives if the process of a robot crashed.
 CRASHED = "the process that validated the robot crashed"
 CRASHED_TWICE = "the process that validated the robot crashed twice; the second process had only this robot"
 
@@ -113,16 +108,11 @@ class DamagedError(Exception):
 def encode_answer(key: str, found: Answer) -> bytes:
     if isinstance(found, Failure):
         return pack(key, {"failure": found})
-    rows = list(found.tallies.items())  # a key of a JSON object must be a string
+    rows = list(found.tallies.items())  # Keys of JSON objects must be strings.
     return pack(key, {"tallies": rows, "result": replace(found, tallies={})})
 
 
 def decode_answer(key: str, content: bytes) -> Answer:
-    """Return the answer in the file of a chunk.
-
-    Raises:
-        DamagedError: The file is damaged or belongs to another chunk.
-    """
     body = unpack(key, content)
     try:
         if "failure" in body:
@@ -134,16 +124,12 @@ def decode_answer(key: str, content: bytes) -> Answer:
 
 
 def pack(key: str, body: dict[str, Any]) -> bytes:
-    """Return results as the bytes of a file, with their key and a checksum.
-
-    Each double has enough decimals in JSON to be read back exactly. Infinity is Python's word `Infinity`.
-    """
+    """Return results as the bytes of a file, with key and checksum; doubles can be read back exactly."""
     data = zlib.compress(json.dumps(as_data({"key": key} | body), separators=(",", ":")).encode(), 1)
     return _MAGIC + hashlib.sha256(data).digest() + data
 
 
 def unpack(key: str, content: bytes) -> dict[str, Any]:
-    """Return the data in a file; raise DamagedError if the file is damaged or has another key."""
     checksum, data = content[len(_MAGIC) :][:_DIGEST], content[len(_MAGIC) + _DIGEST :]
     if not content.startswith(_MAGIC):
         raise DamagedError("not a chunk of urdfkin")

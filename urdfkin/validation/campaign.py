@@ -121,7 +121,7 @@ def validate(
         raise InputError("`retry` and `shard` need `store`", remedy="give store=FOLDER")
     given = robots if isinstance(robots, Sequence) and not isinstance(robots, str | bytes) else [robots]
     started = datetime.datetime.now(datetime.UTC)
-    pinocchio()  # raises an error before the work starts if Pinocchio is missing
+    pinocchio()  # If Pinocchio is missing, an error is raised before the work starts.
     found, unread = subjects(given, mimic, root_joint, xacro_args, lock, joints)
     if oracle_library(oracle) is not PINOCCHIO:
         found = [replace(one, origin=replace(one.origin, oracle=oracle)) for one in found]
@@ -146,7 +146,7 @@ def validate(
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
             if _kernels_pay(len(missing) * samples) and (isolate or any(map(_can_be_loaded, missing))):
-                # If a worker compiled the kernels, this time would count as a robot's computing time.
+                # If a worker compiled the kernels, the compilation would count as a robot's computing time.
                 load_kernels()
                 begin = time.perf_counter()
             collector.begin()
@@ -155,7 +155,7 @@ def validate(
             interrupted = True
         except UrdfkinError as error:
             collector.give_up(Failure(ValidationVerdict.NOT_VERIFIED, str(error)))
-        except Exception as error:  # finished results stay in the report
+        except Exception as error:  # Finished results stay in the report.
             collector.give_up(unexpected_failure(error))
     reports = tuple(collector.reports())
     return ValidationReport(
@@ -182,7 +182,7 @@ def _folder(store: str | os.PathLike[str]) -> Path:
 
 
 def _can_be_loaded(subject: RobotInput) -> bool:
-    """Return False for a robot that cannot be loaded; the robot's first chunk reports the error."""
+    """Return whether a robot can be loaded; if not, the robot's first chunk reports the error."""
     try:
         subject.load()
     except Exception:
@@ -191,13 +191,7 @@ def _can_be_loaded(subject: RobotInput) -> bool:
 
 
 def stored(folder: str | os.PathLike[str]) -> ValidationReport:
-    """Return the report of a store; if the store is complete, the report equals that of an uninterrupted run.
-
-    The report of an incomplete store is marked as interrupted.
-
-    Raises:
-        SourceError, InputError: The folder is not a store.
-    """
+    """Return the report of a store; the report of an incomplete store is marked as interrupted."""
     store = Store.reading(Path(folder), _warn)
     store.check_names()
     manifest, found = store.manifest, store.manifest.subjects()
@@ -219,7 +213,6 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
-    """Return the accuracy results of the compared robots, and whether each robot has a result."""
     if not store.has_study:
         return (), True
     from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy
@@ -235,14 +228,11 @@ _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 
 def _kernels_pay(samples: int) -> bool:
-    """Return whether kernels save more time on these samples than it takes to load or compile them."""
     return samples > _WORTH_COMPILING or (samples > _WORTH_LOADING and are_on_disk())
 
 
 @dataclass
 class _Campaign:
-    """The tasks of a run, with the collector and the store that receive the answers."""
-
     subjects: Sequence[RobotInput]
     cut: Cut
     seed: int
@@ -254,7 +244,6 @@ class _Campaign:
         return Task(robot, self.cut.chunk(self.subjects[robot], self.seed, index, self.memory))
 
     def use(self, store: Store) -> None:
-        """Read the answers of a store, and save new answers there."""
         for robot in range(len(self.subjects)):
             for index in self.collector.missing(robot):
                 if (found := store.answer(robot, index)) is not None:
@@ -276,8 +265,8 @@ class _Campaign:
 def chunks_of_shard(robots: int, cut: Cut, shard: str | None = None) -> list[range]:
     """Return the chunks of each robot that belong to a shard, such as "2/4"; without a shard, all chunks.
 
-    The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read
-    by one shard only. Another form of the shard raises InputError.
+    The shards are equal, contiguous ranges in the order of robots and chunks, so that most robots are read by
+    one shard only.
 
     >>> chunks_of_shard(2, Cut(1000), "1/4"), chunks_of_shard(2, Cut(1000), "4/4")
     ([range(0, 4), range(0, 0)], [range(0, 0), range(4, 8)])

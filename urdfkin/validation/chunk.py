@@ -1,11 +1,11 @@
 """Chunks of a validation; a chunk is a range of samples of one robot.
 
 A sample depends only on the seed and on the index of the sample. Inputs and results of a chunk are plain
-data, so a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2 of a
-robot are the neutral configuration, the lower limits and the upper limits.
+data. Therefore, a chunk can run in this process, in another process or on another machine. Samples 0, 1 and 2
+of a robot are the neutral configuration, the lower limits and the upper limits.
 
 Random samples are drawn 25 at a time, each draw with its own seed. Therefore, the number of draws in a chunk
-does not change any result; only the cost of distributing and storing chunks changes.
+does not change any result.
 """
 
 from __future__ import annotations
@@ -43,12 +43,8 @@ _MAX_DRAWS = 40
 class Chunk:
     """A range of samples of one robot.
 
-    Attributes:
-        seed: Seed of the samples. The random generator of a draw starts from this seed and the draw's index.
-        index: Index of the chunk among the robot's chunks.
-        first: Index of the chunk's first draw.
-        samples: Number of random configurations.
-        memory: Number of bytes that the check of the robot may use; None: half of the machine's free memory.
+    `first` is the index of the chunk's first draw, and `samples` is the number of random configurations. The
+    check of the robot may use `memory` bytes; None means half of the machine's free memory.
     """
 
     subject: RobotInput
@@ -60,7 +56,6 @@ class Chunk:
 
     @property
     def configurations(self) -> int:
-        """Number of samples, including the special configurations."""
         return self.samples + (SPECIAL if self.first == 0 else 0)
 
     @property
@@ -79,10 +74,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk; only the first chunk of a robot has the robot's summary.
-
-    The sum of the results of two adjacent chunks is the result of the combined chunk.
-    """
+    """Result of a chunk; results of adjacent chunks can be added, and only the first chunk has a summary."""
 
     name: str
     joints: tuple[str, ...]
@@ -118,7 +110,6 @@ class Cut:
 
     @property
     def _draws(self) -> int:
-        """Number of draws in each chunk of a robot."""
         return min(_MAX_DRAWS, max(1, -(-self.samples // DRAWN) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
@@ -126,7 +117,6 @@ class Cut:
         return max(1, -(-self.samples // (self._draws * DRAWN)))
 
     def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
-        """Return a chunk of a robot; `most` is the number of bytes that the robot may use."""
         first = index * self._draws
         samples = min(self._draws * DRAWN, self.samples - first * DRAWN)
         return Chunk(subject, seed, index, first, samples, most)
@@ -157,7 +147,7 @@ def _load(chunk: Chunk) -> _Models:
     _cache.clear()
     robot = chunk.subject.load()
     most = memory.limit() if chunk.memory is None else chunk.memory
-    memory.check(robot.tree, chunk.samples + SPECIAL, most)  # the first chunk is the largest
+    memory.check(robot.tree, chunk.samples + SPECIAL, most)  # The first chunk is the largest.
     second = None
     if (by := robot.verifier.library) is not PINOCCHIO:
         second = SecondOracleModel(by, robot.verifier.oracle(by=by))
@@ -167,7 +157,6 @@ def _load(chunk: Chunk) -> _Models:
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
-    """Compare all quantities of all frames in all reference frames with the oracle."""
     begin, timings = time.perf_counter(), Timings()
     robot, oracle, second = _load(chunk)
     summary = RobotSummary.of(robot, oracle) if chunk.index == 0 else None

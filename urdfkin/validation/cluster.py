@@ -52,14 +52,9 @@ class ClusterError(UrdfkinError, RuntimeError):
 def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> Iterator[Cluster]:
     """Yield an engine on a cluster, for `validate(executor=...)`.
 
-    Args:
-        scheduler: Address of a running scheduler, such as `tls://host:8786`; or `local:N` for N workers on
-            this machine. Local workers open no port, and end with the engine.
-        tell: Callback for messages: the number of workers, and the address of the scheduler's dashboard.
-
-    Raises:
-        ClusterError: No scheduler answers at the address, or the versions of urdfkin or Pinocchio differ.
-        InputError: `local:N` has no number.
+    `scheduler` is the address of a running scheduler, such as `tls://host:8786`, or `local:N` for N workers
+    on this machine. Local workers open no port, and end with the engine. `tell` receives messages for the
+    user. Raise ClusterError if no scheduler answers, or if the versions of urdfkin or Pinocchio differ.
     """
     with _client(scheduler) as client:
         _check_versions(client)
@@ -80,7 +75,7 @@ def _client(scheduler: str) -> Iterator[Client]:
     if kind != "local":
         try:
             client = Client(scheduler, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:  # tls:// without a certificate raises TypeError
+        except (OSError, ValueError, TypeError) as error:  # Without a certificate, tls:// raises TypeError.
             found = str(error)
         else:
             with client:
@@ -108,8 +103,7 @@ def _client(scheduler: str) -> Iterator[Client]:
 class _Portless:
     """Base class that starts no web server, because all users of the machine could open Dask's web page."""
 
-    def start_http_server(self, *_: object, **__: object) -> None:
-        """Override Dask's method and start no web server."""
+    def start_http_server(self, *_: object, **__: object) -> None: ...
 
 
 class _Scheduler(_Portless, Scheduler):
@@ -124,12 +118,8 @@ class _ClusterWorker(_Portless, Worker):
 def _without_ports(number: int) -> Iterator[SpecCluster]:
     """Yield a scheduler and workers in this process that open no port.
 
-    Chunks run in separate processes. Dask adds its scratch folders to the front of `sys.path`. These folders
-    are in a temporary folder of this run, which only this user can access. `sys.path` is restored before any
-    further import.
-
-    Raises:
-        ClusterError: Dask has opened a port.
+    Dask adds its scratch folders to the front of `sys.path`. These folders are in a temporary folder that
+    only this user can access, and `sys.path` is restored before any further import.
     """
     with tempfile.TemporaryDirectory(prefix="urdfkin-") as scratch:
         scheduler: dict[str, Any] = {"protocol": "inproc://", "dashboard": False}
@@ -160,7 +150,7 @@ def _without_ports(number: int) -> Iterator[SpecCluster]:
 def _check_versions(client: Client) -> None:
     """Raise ClusterError if a worker or the scheduler has other versions than this process.
 
-    The caller must not send anything to the workers or the scheduler before this check.
+    The caller must not send anything to the cluster before this check.
     """
     for worker, found in client.run(results.provenance, on_error="return").items():
         if isinstance(found, BaseException):
@@ -170,7 +160,7 @@ def _check_versions(client: Client) -> None:
     for name in _COMPARED:
         try:
             found = client.run_on_scheduler(metadata.version, name)
-        except Exception:  # the scheduler computes nothing and does not need the package
+        except Exception:  # The scheduler computes nothing and does not need the package.
             continue
         own = version(name)
         if own not in (found, "a checkout"):
@@ -208,12 +198,6 @@ class Cluster:
         self._limit, self._counted = _MORE, float("-inf")
 
     def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks.
-
-        Raises:
-            ClusterError: The connection to the scheduler is lost, or a new worker has another version of
-                urdfkin or Pinocchio.
-        """
         waiting, failed = chain.from_iterable(work), set[int]()
         completed = as_completed(loop=self._client.loop)
         try:
@@ -223,7 +207,7 @@ class Cluster:
                         continue
                     try:
                         completed.add(self._send(task, 1))
-                    except (UrdfkinError, OSError) as error:  # the text of the robot cannot be read
+                    except (UrdfkinError, OSError) as error:  # The text of the robot cannot be read.
                         failed.add(task.robot)
                         enter(task, failure(task.chunk.subject, error))
                 if not self._pending:
@@ -245,7 +229,6 @@ class Cluster:
             self._robots.clear()
 
     def _limit_now(self) -> int:
-        """Return the maximum number of chunks that may be on the cluster at the same time."""
         if time.monotonic() - self._counted > _INTERVAL and self._client.status == "running":
             threads = sum(self._client.nthreads().values())
             self._limit, self._counted = _PER_THREAD * threads + _MORE, time.monotonic()
@@ -262,7 +245,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Delete a robot's text on the workers if no sent chunk needs the text; it can be sent again."""
+        """Delete a robot's text on the workers if no sent chunk needs the text."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]
@@ -273,7 +256,7 @@ class Cluster:
         if future.status == "finished":
             try:
                 result = future.result()
-            except OSError as lost:  # the scheduler, which transfers the results, is lost
+            except OSError as lost:  # The scheduler, which transfers results, is lost.
                 raise self._lost() from lost
             return _answer(result, task)
         if self._client.status != "running":

@@ -1,7 +1,7 @@
 """Collect the answers of a run, report the progress, and make the report of each robot.
 
-When a result arrives, it is added to the results of adjacent chunks, so memory does not grow with the number
-of samples. The sum does not depend on the order in which the results arrive.
+Each result is added to the results of adjacent chunks when the result arrives. Therefore, memory does not
+grow with the number of samples. The sum does not depend on the order in which the results arrive.
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ class CampaignProgress:
         chunks_done: Number of chunks that are finished or no longer needed.
         chunks_kept: Number of finished chunks from an earlier run.
         failures: Number of robots so far that have a disagreement or could not be checked.
-        label: Name of the current robot.
     """
 
     robots_done: int
@@ -47,11 +46,7 @@ Progress = Callable[[CampaignProgress], None]
 
 
 class ResultCollector:
-    """The answers of a run, by robot and chunk.
-
-    `parts` is the range of chunks to run for each robot. The callback `progress` is called before the work
-    and after each answer.
-    """
+    """The answers of a run, by robot and chunk; `parts` is the range of chunks to run for each robot."""
 
     def __init__(
         self,
@@ -93,7 +88,6 @@ class ResultCollector:
         )
 
     def missing(self, robot: int) -> Iterator[int]:
-        """Yield the chunks of a robot that have no answer; if the robot has failed, yield none."""
         known = self._robots[robot]
         for index in known.part:
             if known.failures:
@@ -102,13 +96,11 @@ class ResultCollector:
                 yield index
 
     def give_up(self, found: Failure) -> None:
-        """Add a failure to each robot that is not finished."""
         for robot in self._robots:
             if not robot.over:
                 robot.failures[len(self._cut)] = found
 
     def reports(self) -> Iterator[RobotReport]:
-        """Yield a report for each robot with chunks in this run, in the requested order."""
         for subject, robot in zip(self._subjects, self._robots, strict=True):
             if robot.part:
                 yield robot.report(subject, self._cut.configurations(robot.part))
@@ -158,8 +150,7 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        """Return the report of the robot; `wanted` is the requested number of samples."""
-        # Results after the first failed chunk are left out: how many exist depends on the workers' speed.
+        # Results after a failed chunk are left out, because their number depends on the workers' speed.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._sums if run.start < last]
@@ -190,7 +181,7 @@ class _RobotAnswers:
 def _verdict(
     tallies: dict[Key, Tally], summary: RobotSummary, failure: Failure | None, samples: int, wanted: int
 ) -> tuple[ValidationVerdict, list[str]]:
-    """Return the verdict on a robot and all reasons for the verdict; a disagreement takes precedence."""
+    """Return the verdict on a robot and its reasons; a disagreement takes precedence."""
     disagreements = [*_outside(tallies), *summary.disagreements]
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:
@@ -204,7 +195,6 @@ def _verdict(
 
 
 def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
-    """Yield sentences about results outside their bound."""
     failed = sum(tally.failed for tally in tallies.values())
     if failed:
         results = sum(tally.results for tally in tallies.values())

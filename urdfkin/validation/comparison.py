@@ -1,8 +1,8 @@
 """Compare every frame of a robot with Pinocchio, for a batch of samples.
 
 Frames are compared in blocks, to limit the memory. The largest arrays are the Jacobians, with
-samples * frames * 6 * nv numbers. The results of a frame do not depend on the block that contains the frame,
-so the report does not depend on the division into blocks.
+samples * frames * 6 * nv numbers. The division into blocks changes no result of a frame, and therefore does
+not change the report.
 """
 
 from __future__ import annotations
@@ -40,7 +40,6 @@ class SecondOracleModel:
     def cross_check(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> CrossCheck:
-        """Compare the results of three libraries, for the frames or joints of a block."""
         second = block.timings.timed("second", row.ask, self.oracle, block.query(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
@@ -58,10 +57,7 @@ def tallies(
     timings: Timings,
     second: SecondOracleModel | None = None,
 ) -> dict[Key, Tally]:
-    """Return the error statistics of each quantity of a robot in each reference frame.
-
-    `oracle` is Pinocchio's model. The computing times are added to `timings`.
-    """
+    """Return the error statistics of each quantity of a robot in each reference frame."""
     found: dict[Key, Tally] = {}
     work = robot, oracle, x, first_sample, timings
     for frames in blocks(len(robot.all_frames), frame_bytes(len(x.q), robot.nv)):
@@ -114,10 +110,9 @@ class _Block(_ComparisonBatch):
         self.joint_names = robot.joint_names[joints]
 
     def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
-        """Yield the error statistics of each quantity.
+        """Yield error statistics; urdfkin's results for a joint are those for the joint's child link.
 
-        urdfkin computes the results for a joint and for the joint's child link only once, because they are
-        equal. Pinocchio computes them with two different functions.
+        The results for both are compared, because Pinocchio computes them with different functions.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
@@ -131,7 +126,6 @@ class _Block(_ComparisonBatch):
                     yield self._compare(joint, reference, own, joint_bound, second)
 
     def joint_part(self, bound: Bound) -> Bound:
-        """Return the bounds of the block's joints, from the bounds of the block's frames."""
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
@@ -160,8 +154,7 @@ class _Block(_ComparisonBatch):
 class _Screws(_ComparisonBatch):
     """Comparison of Pinocchio's `data.J` with urdfkin's Jacobians.
 
-    Each column of `data.J` belongs to one joint, and equals a column of the Jacobian of this joint in the
-    reference frame WORLD.
+    Each column of `data.J` equals a column of one joint's Jacobian in the reference frame WORLD.
     """
 
     def tallies(self) -> Iterator[Tally]:
@@ -195,10 +188,7 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations of the tree `free`, which has no mimic rules.
-
-    The values of mimic joints are computed with the mimic rules of `tree`.
-    """
+    """Return configurations of the tree `free`, without mimic rules, from configurations of `tree`."""
     expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 #: A mistake explains the results if at most this fraction of the largest difference remains.
 EXPLAINED = 1e-3
-#: Maximum number of reported mistakes.
 _MOST = 3
 #: Number of configurations in a first, fast test for two exchanged joints.
 _FEW = 4
@@ -49,8 +48,6 @@ class Diagnosis:
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
-        found: The function's results (n, ...).
-        expected: urdfkin's results.
         scale: For each number in `expected`, the scale in its bound k * eps * scale.
         compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
@@ -64,8 +61,7 @@ class Diagnosis:
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
         """Return the fraction of the largest difference that a mistake does not explain.
 
-        `predicted` contains urdfkin's results with the mistake. With `n`, only the first n results are
-        compared.
+        `predicted` contains urdfkin's first n results with the mistake; without `n`, all results.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -74,7 +70,6 @@ class Diagnosis:
             return left / whole if np.isfinite(left) and whole > 0.0 else np.inf
 
     def is_expected(self, predicted: FloatArray) -> bool:
-        """Return whether a mistake has no effect, because its results equal the expected results."""
         return bool((np.abs(predicted - self.expected) <= _EQUAL * self._nonzero_scale()).all())
 
     def _nonzero_scale(self, n: int | None = None) -> FloatArray:
@@ -86,11 +81,7 @@ class Diagnosis:
 
 
 def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
-    """Return at most three sentences about the mistakes that explain the results.
-
-    Each mistake is also tried together with exchanged linear and angular halves of the six-vectors. A
-    combination is reported only if no single mistake explains the results.
-    """
+    """Return at most three sentences about the mistakes that explain the results."""
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.exchanged_halves
     if swaps:
@@ -98,7 +89,7 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     for words, predict in mistakes.all(case):
         try:
             predicted = predict()
-        except UrdfkinError:  # this robot cannot have the mistake
+        except UrdfkinError:  # This robot cannot have the mistake.
             continue
         if predicted.shape != case.found.shape or case.is_expected(predicted):
             continue
@@ -118,11 +109,7 @@ Mistake = tuple[str, Callable[[], FloatArray]]
 
 @dataclass(frozen=True)
 class Mistakes:
-    """Common mistakes of a function that computes one quantity of one frame.
-
-    Attributes:
-        conversion: Conversion to the function's convention; None: urdfkin's convention.
-    """
+    """Common mistakes of a function that computes one quantity of one frame in a convention."""
 
     robot: Robot
     row: Quantity
@@ -132,13 +119,11 @@ class Mistakes:
 
     @property
     def exchanged_halves(self) -> str:
-        """A sentence about exchanged linear and angular rows; empty if the quantity has no such rows."""
         first = "linear" if self._angular_first else "angular"
         return f"the {first} rows come first" if self.row.shape[0] == 6 else ""
 
     @property
     def expected_halves(self) -> str:
-        """A sentence about the order of linear and angular rows in the convention."""
         tool = "urdfkin" if self.conversion is None else self.conversion.convention.name
         return f"{tool} has the {'angular' if self._angular_first else 'linear'} rows first"
 
@@ -147,7 +132,6 @@ class Mistakes:
         return self.conversion is not None and self.conversion.angular_first
 
     def all(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield the mistakes, the simplest first."""
         yield from self._of_references(case)
         if self.row.name == "acceleration":
             yield from self._of_accelerations(case)
@@ -201,7 +185,6 @@ class Mistakes:
         yield "the term J a is missing", partial(case.compute, (q, v, zero))
 
     def _velocity(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the frame's velocity in the function's reference frame and row order."""
         q, v = self._ours((q, v))
         assert self.reference is not None
         found = self.robot.velocity(q, v, self.frame, self.reference, verify=False)
@@ -259,7 +242,7 @@ class Mistakes:
                 yield words.replace(" q ", all_inputs), partial(case.compute, everywhere)
 
     def _axes(self) -> list[tuple[str, int, int, bool]]:
-        """Return (name, index in q, index in v, whether q is an angle) for each joint with one coordinate.
+        """Return (name, index in q, index in v, is_angle) for each joint with one coordinate.
 
         The indices belong to the function's convention.
         """
@@ -278,10 +261,7 @@ class Mistakes:
 
     @staticmethod
     def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Multiply the values of some joints by a factor, in the first `count` of the inputs q, v and a.
-
-        For each of these joints, `at` contains the indices in q and in v.
-        """
+        """Scale joint values in the first `count` inputs by a factor; `at` has the indices in q and in v."""
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
             x[:, [pair[min(k, 1)] for pair in at]] *= factor
@@ -301,7 +281,6 @@ class Mistakes:
         named = {} if self.reference is None else {"reference": self.reference}
 
         def expand(x: FloatArray, letter: str, *, moving: bool) -> FloatArray:
-            """Return q, v or a for all joints; without `moving`, the mimic joints are at 0."""
             names = free.coordinate_names if letter == "q" else free.rate_names
             ours = self.robot.coordinate_names if letter == "q" else self.robot.rate_names
             found = np.zeros((len(x), len(names)))
@@ -325,16 +304,16 @@ class Mistakes:
 
         listed = ", ".join(repr(joint.name) for joint in mimics[:4])
         if self.row.columns:
-            yield f"the columns of the mimic joints ({listed}) are not added", partial(result, "qva")
+            yield (
+                f"the columns of the mimic joints ({listed}) are not added to the columns of the mimicked"
+                " joints",
+                partial(result, "qva"),
+            )
         elif len(case.inputs) > 1:
             yield f"the velocities of the mimic joints ({listed}) are missing", partial(result, "q")
         yield f"the mimic joints ({listed}) do not move", partial(result, "")
 
     def _of_joints(self, case: Diagnosis) -> Iterator[Mistake]:
-        """Yield mistakes about single joints: a reversed sign, or two exchanged joints.
-
-        The columns of a Jacobian are reversed or exchanged as well.
-        """
         axes = self._axes()
         for name, q, v, _ in axes:
             words = f"the joint {name!r} has the opposite sign"
@@ -384,7 +363,6 @@ class Mistakes:
         return tuple(found)
 
     def _of_orders(self, case: Diagnosis) -> Iterator[Mistake]:
-        """For each known tool, yield the possible mistake that the joints are in this tool's order."""
         if self.conversion is not None:
             return
         from urdfkin.model.conventions import BUILT_IN
@@ -407,7 +385,6 @@ class Mistakes:
             )
 
     def _of_frames(self, case: Diagnosis) -> Iterator[Mistake]:
-        """For each link, yield the possible mistake that the function uses this link's frame."""
         names = [f"link:{name}" for name in self.robot.link_names if name != self.frame]
         if self.row.against is not None or not names:
             return
@@ -425,7 +402,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield (0.0, sentence) for each wrong column that a mistake explains completely."""
+    """Yield the remainder 0.0 and a sentence for each wrong column that a mistake explains completely."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

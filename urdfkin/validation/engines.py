@@ -37,14 +37,9 @@ Enter = Callable[[Task, Answer], None]
 
 
 class Engine(Protocol):
-    """Interface of an engine.
+    """Interface of an engine; an exception from `run` ends the validation, but earlier answers are kept."""
 
-    An exception from `run` ends the validation. Answers that were passed to the callback before the exception
-    stay in the report.
-    """
-
-    def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks and pass each answer to `enter`."""
+    def run(self, work: Work, enter: Enter) -> None: ...
 
 
 class SerialEngine:
@@ -58,13 +53,11 @@ class SerialEngine:
 
 
 class ExecutorEngine:
-    """Engine that runs chunks on an executor, with at most `IN_FLIGHT` chunks in the executor's queue."""
-
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
 
     def run(self, work: Work, enter: Enter) -> None:
-        """Run the tasks. If the executor raises an error, the error becomes the result of the robot."""
+        """Run the tasks; an error that the executor raises becomes the result of the robot."""
         waiting, failed = chain.from_iterable(work), set[int]()
         submitted = deque[tuple[Task, Future[Answer]]]()
         next_task = next(waiting, None)
@@ -105,9 +98,7 @@ def _result(future: Future[Answer]) -> Answer:
 class RobotTasks:
     """The remaining tasks of a robot.
 
-    Attributes:
-        robot: Index of the robot; -1 before the first task was taken.
-        index: Index of the latest chunk that was taken; a lower index means that more chunks remain.
+    `index` is the index of the latest chunk that was taken; a lower index means that more chunks remain.
     """
 
     def __init__(self, tasks: Iterable[Task]) -> None:
@@ -123,7 +114,6 @@ class RobotTasks:
         return task
 
     def put_back(self, task: Task) -> None:
-        """Put a task back as the robot's next task."""
         self._tasks = chain([task], self._tasks)
 
 
@@ -157,7 +147,6 @@ class WorkQueue:
         return task
 
     def put_back(self, task: Task, tasks: RobotTasks) -> None:
-        """Put a task back into its robot's remaining tasks, so that another worker can run it."""
         tasks.put_back(task)
         self._begun.remove(tasks)
         self._waiting = chain([tasks], self._waiting)
@@ -166,6 +155,5 @@ class WorkQueue:
         self._ended.add(robot)
 
     def withdraw(self, robot: int) -> list[Task]:
-        """Remove a robot from the queue, and return its remaining tasks."""
         self.end(robot)
         return [task for tasks in self._begun if tasks.robot == robot for task in tasks]

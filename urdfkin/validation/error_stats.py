@@ -1,7 +1,7 @@
 """Error statistics of a validation, which can be added over chunks, processes and machines.
 
-The addition of two tallies is commutative and associative, so the sum does not depend on the division of the
-samples into chunks. If two worst cases are equally bad, the sum of two tallies keeps the case with the
+The addition of tallies is commutative and associative. Therefore, the sum does not depend on the division of
+the samples into chunks. If two worst cases are equally bad, the sum of two tallies keeps the case with the
 smaller sample number.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
@@ -29,14 +29,7 @@ CROSS_CHECKED = ("urdfkin", "pinocchio", "second_oracle")
 
 @dataclass(frozen=True, slots=True)
 class OraclePair:
-    """Comparison of one library's results with the results of the second oracle.
-
-    Attributes:
-        failed: Number of results outside their bound.
-        worst: The largest disagreement in multiples of eps * scale. For Pinocchio and the second oracle, the
-            scale is that of `_sum_of_bounds`.
-        share_of_bound: The largest ratio of a disagreement to its bound.
-    """
+    """Comparison of one library's results with results of the second oracle; `worst` is in eps * scale."""
 
     failed: int = 0
     worst: float = 0.0
@@ -55,8 +48,6 @@ class CrossCheck:
     """Comparison of urdfkin, Pinocchio and a second oracle (`by`) for one quantity in one reference frame.
 
     Attributes:
-        urdfkin: urdfkin compared with the second oracle.
-        pinocchio: Pinocchio compared with the second oracle.
         alone: For each library of `CROSS_CHECKED`, the number of results in which only this library differs.
         undecided: Number of results without a majority: no two of the three libraries agree, or one library
             agrees with two others that disagree with each other.
@@ -91,8 +82,8 @@ def cross_check(
 ) -> CrossCheck:
     """Compare three results (n, frames, ...) with each other.
 
-    `first` is the bound on the difference between urdfkin and Pinocchio, `second` the bound on the difference
-    between urdfkin and the second oracle.
+    `first` is the bound on the difference between urdfkin and Pinocchio. `second` is the bound on the
+    difference between urdfkin and the second oracle.
     """
     if not ours.size:
         return CrossCheck(by, OraclePair(), OraclePair())
@@ -111,7 +102,6 @@ def cross_check(
 
 
 def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDArray[np.bool_], OraclePair]:
-    """Return whether each result agrees (n, frames), and the worst disagreements of the pair."""
     units = worst_of_each(one, other, bound.scale, 2)
     share = np.nan_to_num(units / result_k(bound, units.shape), nan=np.inf)
     agrees = share <= 1.0
@@ -129,18 +119,12 @@ def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
 HISTOGRAM_EDGES = np.logspace(-3, 5, 81)
 #: Key of error statistics: the quantity and the reference frame.
 Key = tuple[str, str]
-#: Values of q, v and a.
 Inputs = tuple[list[float], list[float], list[float]]
 
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """The sample with the largest ratio of disagreement to bound, and the inputs of that sample.
-
-    Attributes:
-        share: Ratio of the disagreement to the bound.
-        units: The disagreement, in eps * scale.
-    """
+    """Sample with the largest `share` (disagreement / bound); `units` is the disagreement in eps * scale."""
 
     share: float
     units: float
@@ -156,16 +140,13 @@ class Tally:
     """Error statistics of one quantity in one reference frame.
 
     Attributes:
-        results: Number of compared results. A result is a matrix or a six-vector.
-        failed: Number of results outside their bound.
+        results: Number of compared matrices or six-vectors.
         worst: The largest disagreement, in eps * scale.
         share: The largest ratio of a disagreement to its bound.
         histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
             adjacent edges, and above the last edge.
         by_frame: The largest disagreement of each frame, in the robot's order.
-        case: The sample with the largest ratio.
-        bounds: The smallest and the largest bound of all results, in eps * scale. The bound for a frame grows
-            with the number of joints on the path to the frame.
+        bounds: The smallest and the largest bound of all results, in eps * scale.
     """
 
     results: int
@@ -193,19 +174,18 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return combined statistics for the frames of `self` and of `other`; the samples are the same."""
+        """Return the statistics for the frames of `self` and of `other`, which have the same samples."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 
     def percentile(self, percent: float) -> float:
-        """Return a percentile of the disagreements; the error is at most the width of a bin, 26 %."""
         return percentile(self.histogram, HISTOGRAM_EDGES, self.worst, percent)
 
 
 def percentile(
     histogram: Sequence[int], edges: Sequence[float] | FloatArray, worst: float, percent: float
 ) -> float:
-    """Return a percentile of the values in a histogram; the error is at most the width of a bin."""
+    """Return a percentile of the values in a histogram, with an error of at most the width of a bin."""
     counts = np.cumsum(histogram)
     if not counts[-1]:
         return 0.0
@@ -225,10 +205,7 @@ def tally(
     first_sample: int,
     inputs: Sequence[Inputs],
 ) -> Tally:
-    """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample.
-
-    The scale and k of the bound can be broadcast to the shape of the results.
-    """
+    """Compare results (n, frames, ...) of urdfkin and Pinocchio; `inputs` are q, v and a of each sample."""
     n, count = ours.shape[:2]
     if not ours.size:
         return Tally(n * count, 0, 0.0, 0.0, (n * count, *([0] * len(HISTOGRAM_EDGES))), (0.0,) * count, None)

@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.call import Call
 
-#: Number of configurations in a batch.
 _BATCH = 256
 #: Number of configurations in a diagnosis.
 _DIAGNOSED = 48
@@ -222,7 +221,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a robot's verifier that also stores the arguments and the result of the checked call."""
+    """A wrapper of a robot's verifier that also stores the latest checked call of each quantity."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -324,14 +323,11 @@ class _FunctionResults:
     """The results of the user's function and of urdfkin for a batch of configurations.
 
     Attributes:
-        first: Index of the first configuration.
-        inputs: The function's inputs, one row for each configuration.
         good: Indices of the n configurations with a result of the right shape.
         found: The function's results (n, ...).
         expected: urdfkin's results (n, ...).
         scale: For each number in `expected`, the scale in its bound k * eps * scale.
         k: (n,) for each result, the factor k in its bound k * eps * scale.
-        theirs: The oracle's results (n, ...); None if no oracle can check the robot.
     """
 
     first: int
@@ -344,19 +340,15 @@ class _FunctionResults:
     theirs: FloatArray | None
 
     def shares(self, other: FloatArray) -> FloatArray:
-        """Return the differences between `found` and `other`, divided by their bounds."""
         k = self.k.reshape(-1, *[1] * (self.found.ndim - 1))
         return self.units(other) / k
 
     def units(self, other: FloatArray) -> FloatArray:
-        """Return the differences between `found` and `other`, divided by eps * scale; inf if not finite."""
         return disagreement(self.found, other, self.scale)
 
 
 @dataclass
 class _Run:
-    """One check of a function; the attributes are the validated arguments of `verify_function`."""
-
     function: Callable[..., object]
     robot: Robot
     row: Quantity
@@ -425,7 +417,7 @@ class _Run:
         """Return urdfkin's results for inputs in the function's convention, without a check."""
         ours = self._ours(inputs)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DegreesWarning)  # a diagnosis tries q in degrees
+            warnings.simplefilter("ignore", DegreesWarning)  # A diagnosis tries q in degrees.
             found = self._method(self.robot, ours, frame or self.frame, reference, verify=False)
             return self._converted(ours, found, frame, reference)
 
@@ -590,12 +582,6 @@ class _Run:
 
 @dataclass
 class _Total:
-    """Maxima and sums over the batches of configurations.
-
-    Attributes:
-        kept: The first batch with a result of the right shape, for the diagnosis.
-    """
-
     row_names: tuple[str, ...]
     column_names: tuple[str, ...]
     compared: int = 0
@@ -656,10 +642,7 @@ def _call(
     total: _Total,
     configurations: int,
 ) -> FloatArray | None:
-    """Call the function and return a copy of the result.
-
-    After an exception or a wrong result, add the error to `total` and return None.
-    """
+    """Call the function and return a copy of its result, or add its error to `total` and return None."""
     try:
         given = np.asanyarray(function(*inputs))
         if np.ma.isMaskedArray(given) or given.dtype.kind not in "fiu":
@@ -667,7 +650,7 @@ def _call(
             total.error(sample, f"{kind}, expected real numbers", configurations)
             return None
         found = np.array(given, dtype=np.float64)
-    except (Exception, SystemExit) as error:  # the check reports an exception of the user's code
+    except (Exception, SystemExit) as error:  # The check reports exceptions of the user's code.
         total.error(sample, f"{type(error).__name__}: {str(error)[:300]}", configurations)
         return None
     if found.shape != shape:

@@ -21,19 +21,14 @@ from urdfkin.verify.oracles import versions
 
 #: Name and version of the layout of a store.
 LAYOUT = "urdfkin-campaign/1"
-#: Maximum number of differences in a message.
 _SHOWN = 4
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """Definition of a campaign.
+    """Definition of a campaign; `started` is the start time, ISO 8601, UTC.
 
-    Attributes:
-        robots: For each robot: the origin, and the sha256 of the text (empty if the text could not be read).
-        provenance: Versions and digests of the computing code (`urdfkin.validation.results.provenance`).
-        versions: Versions in the report.
-        started: Start time, ISO 8601, UTC.
+    For each robot, `robots` contains the origin and the text's sha256, which is empty for an unreadable text.
     """
 
     robots: tuple[tuple[Origin, str], ...]
@@ -62,7 +57,6 @@ class Manifest:
 
     @cached_property
     def _keys(self) -> list[str]:
-        """Key of each robot: a sha256 of the robot's text, the settings and the versions."""
         settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
@@ -74,12 +68,10 @@ class Manifest:
 
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
-        """Read a manifest; raise InputError for a file that is no manifest, or has another layout."""
         layout = DocumentKind(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
-        """Return the differences between two campaigns, each with the values in both manifests."""
         own, theirs = (
             {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance
             for m in (self, other)
@@ -98,7 +90,6 @@ class Manifest:
 
 
 def _short(value: object) -> str:
-    """Return the first 12 characters of a digest; return other values as text."""
     text = str(value)
     return text[:12] if len(text) == 64 else text
 

@@ -32,14 +32,13 @@ def limit(processes: int = 1) -> int | None:
 
 
 def needed_bytes(tree: KinematicTree, samples: int) -> int:
-    """Return the maximum number of bytes for checking a robot."""
+    """Estimate the largest memory (bytes) that a check of a robot needs."""
     nv, links = sum(joint.kind.nv for joint in tree.joints), len(tree.links)
     block = min(BLOCK_BYTES, 2 * links * frame_bytes(samples, nv))
     return _PER_CUBE * nv**3 + _PER_LINK * links + _ARRAYS * max(block, frame_bytes(samples, nv))
 
 
 def check(tree: KinematicTree, samples: int, most: int | None) -> None:
-    """Raise OracleError if a comparison of `samples` configurations needs more than `most` bytes."""
     wanted = needed_bytes(tree, samples)
     if most is not None and wanted > most:
         raise OracleError(

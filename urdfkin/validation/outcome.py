@@ -24,13 +24,11 @@ class ValidationVerdict(StrEnum):
 DISAGREEMENT, INPUT, UNCHECKED = 1, 2, 3
 #: Exit code of an interrupted run, as in shells: 128 + SIGINT.
 INTERRUPTED = 130
-#: Words for the verdicts of a failed run, for one robot and for several robots.
 _WORDS = {
     ValidationVerdict.DISAGREES: ("disagrees", "disagree"),
     ValidationVerdict.NOT_VERIFIED: ("is not verified", "are not verified"),
     ValidationVerdict.BAD_INPUT: ("has bad input", "have bad input"),
 }
-#: Verdict of a run for each exit code.
 OUTCOMES = {
     0: ValidationVerdict.VERIFIED.value,
     DISAGREEMENT: ValidationVerdict.DISAGREES.value,
@@ -48,7 +46,6 @@ class RunOutcome:
         exit_code: 0 if everything is verified. Otherwise the first code that applies, in this order: 1 (a
             disagreement), 130 (interrupted), 2 (a robot cannot be read), 3 (a robot was not verified, or
             there was no robot).
-        reason: Reason in one line if the run has not passed; None if it has passed.
     """
 
     exit_code: int
@@ -61,7 +58,6 @@ class RunOutcome:
 
     @property
     def passed(self) -> bool:
-        """Whether at least one robot was requested, and every requested robot was verified."""
         return self.reason is None
 
 

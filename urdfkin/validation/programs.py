@@ -207,7 +207,6 @@ class Program:
         return bytes(line)
 
     def _ended(self) -> str:
-        """Return a message with the program's exit status and the end of its standard error."""
         assert self._process is not None
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(1.0)

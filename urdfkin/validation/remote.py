@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Return value of a worker for a chunk: a word and a value.
 #: The value of "answer" is the pickled answer.
 #: The value of "died" is the signal or exit status of the second crash.
-#: "other code" contains the worker's package versions if they differ from the client's.
+#: The value of "other code" contains the worker's versions, which differ from the client's versions.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -40,11 +40,7 @@ def hold(robot: bytes) -> bytes:
 
 
 def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
-    """Run a chunk in a process and return its answer.
-
-    `robot` and `chunk` are pickles; the chunk is pickled without its robot. The chunk runs only if the
-    client's versions and digests (`by`) are those of this machine.
-    """
+    """Run a pickled chunk in a process if the client's versions and digests (`by`) equal this machine's."""
     if by != provenance():
         return "other code", provenance()
     cause = ""
@@ -67,7 +63,7 @@ class _CrashError(Exception):
 
 
 class _Parcel:
-    """The robot and the chunk, serialized separately; the receiving process puts the robot into the chunk."""
+    """The serialized robot and chunk; the receiving process puts the robot into the chunk."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk
@@ -82,7 +78,7 @@ def _unpickle(robot: bytes, chunk: bytes) -> Chunk:
 
 
 def _idle_or_new() -> WorkerProcess:
-    """Return an idle process, which may already have read the robot; if none is idle, start a process."""
+    """Return an idle process, which may already have read the robot, or a new process."""
     with _lock:
         while _idle:
             process = _idle.pop()

@@ -60,12 +60,9 @@ class RobotReport:
     """Report of one robot.
 
     Attributes:
-        origin: Source of the robot and its loading options.
         reason: Reason why the robot is not verified; None if it is verified.
         joints: Names of the moving joints, mimic joints included.
         frames: Names of the compared frames: every link and every joint.
-        tallies: Error statistics of each quantity in each reference frame.
-        timings: Computing times; None if nothing was computed.
         error: The traceback of an unexpected error, for a bug report; None otherwise.
     """
 
@@ -84,12 +81,10 @@ class RobotReport:
 
     @property
     def source(self) -> str:
-        """Source of the robot: a path, a catalogue name, `-` or `<text>`."""
         return self.origin.source
 
     @property
     def results(self) -> int:
-        """Number of compared results."""
         return sum(tally.results for tally in self.tallies.values())
 
     @property
@@ -98,18 +93,17 @@ class RobotReport:
         return sum(tally.failed for tally in self.tallies.values())
 
     def of(self, quantity: str) -> list[Tally]:
-        """Return the error statistics of one quantity, one entry for each reference frame."""
         return [tally for (kind, _), tally in self.tallies.items() if kind == quantity]
 
     def replay(self, key: Key) -> str | None:
-        """Return a command that computes the worst result of a quantity again; None: nothing was compared."""
+        """Return a command that computes the worst result again; None if nothing was compared."""
         quantity, reference = key
         if (case := self.tallies[key].case) is None:
             return None
         row = QUANTITIES[quantity]
         # The prefix "joint:" is needed because a link may have the same name.
         frame = case.frame if row.of == "frames" else f"joint:{case.frame}"
-        origin = replace(self.origin, oracle=None)  # the command compares the result with Pinocchio
+        origin = replace(self.origin, oracle=None)  # The command compares the result with Pinocchio.
         return replay_line(origin, row.command, frame, reference, {x: getattr(case, x) for x in row.inputs})
 
     def as_dict(self, study: AccuracyStudy | None = None) -> dict[str, Any]:
@@ -211,10 +205,9 @@ class ValidationReport(Displayable):
 
     @property
     def command(self) -> str:
-        """The command that repeats the run.
+        """The command that repeats the run: one line for robots with the same options.
 
-        Robots with the same options are on the same line. For a robot that was passed as text, the command
-        reads the text from standard input. Each of these robots has its own line.
+        A robot that was passed as text is read from standard input, so a line has at most one such robot.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
@@ -242,7 +235,7 @@ class ValidationReport(Displayable):
 
     def as_dict(self) -> Document:
         """Return the JSON document; an infinite or NaN disagreement becomes null."""
-        studies = iter(self.studies)  # only compared robots have an accuracy result
+        studies = iter(self.studies)  # Only compared robots have an accuracy result.
         document = {
             "schema": VALIDATION.name,
             "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
@@ -265,7 +258,6 @@ class ValidationReport(Displayable):
 
 
 def _group_by_command(origins: Sequence[Origin]) -> list[list[Origin]]:
-    """Group the robots by options; a group has at most one robot from standard input."""
     groups: dict[tuple[str, int], list[Origin]] = {}
     texts = Counter[str]()
     for origin in origins:

@@ -36,10 +36,9 @@ class RobotInput:
 
     Attributes:
         source: A path, a catalogue name or the text of the URDF, as for `load`.
-        origin: Source of the robot (also if `source` is the text) and loading options.
         stamp: The sha256 of the robot's text; empty if the text cannot be read.
         file: The file name in errors and warnings, if `source` is the text of the robot.
-        listed: Errors and warnings about the original MJCF or USD file, if the text was converted.
+        listed: Errors and warnings about the original MJCF or USD file.
         made: Whether the text was converted to URDF from another format.
     """
 
@@ -60,16 +59,10 @@ class RobotInput:
 
     @property
     def label(self) -> str:
-        """Source of the robot; messages use this name until the robot is loaded."""
         return self.origin.source
 
     def text(self) -> Text:
-        """Return the robot's text.
-
-        Raises:
-            InputError: The file has changed since the validation began.
-            UrdfkinError: The text cannot be read.
-        """
+        """Return the robot's text; raise InputError if the file has changed since the validation began."""
         if isinstance(self.source, bytes):
             return Text(self.source, self.file, self.label, catalogue().get(self.label))
         text = read_source(self.source)
@@ -88,7 +81,7 @@ class RobotInput:
 
     def read(self) -> Robot:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)  # the robot's summary contains the findings
+            warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
             robot = robot_of(
                 self.text(),
                 mimic=self.origin.mimic,
@@ -98,15 +91,11 @@ class RobotInput:
                 listed=self.listed,
                 made=self.made,
             )
-        robot.verifier.origin = self.origin  # the origin names the file from which the text was read
+        robot.verifier.origin = self.origin  # The origin names the file from which the text was read.
         return robot
 
     def load(self) -> Robot:
-        """Return the robot for a comparison with Pinocchio.
-
-        Raises:
-            OracleError: Pinocchio refuses the file or reads a different robot; the message has the reason.
-        """
+        """Return the robot; raise OracleError if Pinocchio refuses the file or reads a different robot."""
         robot = self.read()
         if robot.verifier.unverifiable is not None:
             raise OracleError(robot.verifier.unverifiable, where=self.label)
@@ -121,7 +110,6 @@ def subjects(
     lock: str | Mapping[str, ArrayLike] = MappingProxyType({}),
     joints: Sequence[str] | None = None,
 ) -> tuple[list[RobotInput], dict[int, Exception]]:
-    """Return the robots as plain data, and the errors of robots that cannot be read, by index."""
     found, errors = list[RobotInput](), dict[int, Exception]()
     for i, robot in enumerate(robots):
         try:
@@ -155,28 +143,27 @@ def _subject(
 ) -> RobotInput:
     if isinstance(robot, DHTable) or is_table_file(robot) or is_mjcf(robot) or is_usd(robot):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UrdfWarning)  # the robot's summary contains the findings
+            warnings.simplefilter("ignore", UrdfWarning)  # The robot's summary contains the findings.
             return replace(RobotInput.of(load(robot, mimic=mimic, root_joint=root_joint)), made=True)
     if isinstance(robot, Robot):
         return RobotInput.of(robot)
     if is_xacro(robot):
-        text = read_source(robot, xacro_args=xacro_args)  # the .xacro file is expanded once, here
+        text = read_source(robot, xacro_args=xacro_args)  # The .xacro file is expanded only once.
         return _from_text(text.data, Origin(text.source, mimic, root_joint, text.xacro_args), text.label)
     source = as_word(Path(robot)) if isinstance(robot, os.PathLike) else robot
     if isinstance(source, str) and source != "-":
         return _from_word(source, mimic, root_joint)
-    text = read_source(source)  # an open file, or standard input, is read once, here
+    text = read_source(source)  # An open file, or standard input, can be read only once.
     if is_mjcf(text.data):
         return _subject(text.data, mimic, root_joint, None)
     return _from_text(text.data, Origin(text.source, mimic, root_joint), text.label)
 
 
 def _from_word(source: str, mimic: bool | None, root_joint: str | None) -> RobotInput:
-    """Return the input for a path, a catalogue name or a text."""
     try:
         text = read_source(source)
     except UrdfkinError:
-        return RobotInput(source, Origin(source, mimic, root_joint))  # the robot's chunk reports the error
+        return RobotInput(source, Origin(source, mimic, root_joint))  # The robot's chunk reports the error.
     return RobotInput(source, Origin(text.source, mimic, root_joint), _digest(text.data))
 
 

@@ -95,16 +95,13 @@ _CONVENTIONS = ("standard", "modified")
 
 
 def chains_of(robot: Robot, oracle: Oracle | None) -> tuple[Chain, ...]:
-    """Return each chain as plain data for JSON: frames, two tables, and differences from Pinocchio.
-
-    `oracle` is Pinocchio's model. Without an oracle, the tables are not checked.
-    """
+    """Return each chain as plain data for JSON; without `oracle` (Pinocchio), no table is checked."""
     found = []
     for limb, base, tip in _chains(robot):
         try:
             tables = {name: dh_table(robot.tree, tip, base, name) for name in _CONVENTIONS}
         except InputError:
-            continue  # Denavit-Hartenberg tables contain no planar or floating joints
+            continue  # Denavit-Hartenberg tables contain no planar or floating joints.
         if any(table.rows for table in tables.values()):
             found.append({"limb": limb, "base": base, "tip": tip} | _with_check(robot, oracle, tables))
     return tuple(plain(found))
@@ -148,12 +145,7 @@ def _with_check(robot: Robot, oracle: Oracle | None, tables: dict[str, DHTable])
 
 @dataclass(frozen=True, slots=True)
 class RobotSummary:
-    """Summary of a robot in a report.
-
-    Attributes:
-        model: The result of `describe`; None if the robot could not be read.
-        second_reader: Comparison with the tree that yourdfpy reads from the same text; None: no comparison.
-    """
+    """Summary of a robot in a report; `model` is None if the robot could not be read."""
 
     model: ReportedModel | None = None
     findings: tuple[FindingEntry, ...] = ()
@@ -162,14 +154,12 @@ class RobotSummary:
 
     @classmethod
     def of(cls, robot: Robot, oracle: Oracle | None) -> RobotSummary:
-        """Return the summary of a loaded robot; without an oracle, the tables are not checked."""
         mimic, added = robot.verifier.mimic, robot.root_joint is not None
         reading = plain(second_reading(robot.urdf, robot.tree, mimic=mimic, root_joint=added))
         return cls(describe(robot), entries_of(robot.findings), chains_of(robot, oracle), reading)
 
     @property
     def disagreements(self) -> tuple[str, ...]:
-        """Messages about chains whose tables exceed their bound, and about differences of yourdfpy's tree."""
         found = [text for chain in self.chains if (text := chain_disagreement(chain)) is not None]
         if self.second_reader and (text := reader_disagreement(self.second_reader)) is not None:
             found.append(text)
@@ -177,7 +167,6 @@ class RobotSummary:
 
 
 def chain_disagreement(chain: Chain) -> str | None:
-    """Describe how the tables of a chain disagree with Pinocchio; None if they agree or were not compared."""
     share = chain["share_of_bound"]
     if not chain["samples"] or (share is not None and share <= 1.0):
         return None
@@ -190,7 +179,6 @@ def chain_disagreement(chain: Chain) -> str | None:
 
 
 def reader_disagreement(reading: ReportedSecondReading) -> str | None:
-    """Describe the differences between yourdfpy's and urdfkin's tree; None if there are none."""
     if not reading["differences"]:
         return None
     return f"{reading['by']} reads another robot from the file: {'; '.join(reading['differences'])}"

@@ -37,7 +37,6 @@ _WRITING = ".writing"
 #: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
 STUDY_FILE = "accuracy.json"
 #: Suffix of a file with the accuracy result of a robot.
-#: `urdfkin.validation.accuracy_store` computes the name of the file.
 STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
@@ -51,12 +50,7 @@ Tell = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Store:
-    """Folder of a stored validation; `open_store` returns a store for writing.
-
-    Attributes:
-        tell: Callback for a message about each damaged file.
-        scratch: Folder for unfinished files; None: the store is read-only.
-    """
+    """Folder of a stored validation; `scratch` is a folder for unfinished files, or None for reading only."""
 
     folder: Path
     manifest: Manifest
@@ -65,24 +59,16 @@ class Store:
 
     @classmethod
     def reading(cls, folder: Path, tell: Tell) -> Store:
-        """Return a read-only store; another process may be writing to the same folder.
-
-        Raises:
-            SourceError, InputError: The folder is not a store.
-        """
+        """Return a read-only store; another process may be writing to the same folder."""
         place = folder / _MANIFEST
         return cls(folder, Manifest.from_json(read_bytes(place), str(place)), tell)
 
     def answer(self, robot: int, index: int) -> Answer | None:
-        """Return the answer of a chunk, or None if the store has no answer."""
         key = self.manifest.key(robot, index)
         return self.entry(key, _DONE, decode_answer) or self.entry(key, _FAILED, decode_answer)
 
     def entry(self, key: str, kind: str, decode: Callable[[str, bytes], _T]) -> _T | None:
-        """Return the decoded content of the file with a key; None if the file is missing or damaged.
-
-        A damaged file is moved to `damaged/`, unless the store is read-only.
-        """
+        """Return the decoded content of a file; None if the file is missing or damaged."""
         place = self._place(key, kind)
         try:
             content = read_if_there(place)
@@ -93,11 +79,7 @@ class Store:
             return None
 
     def keep(self, robot: int, index: int, found: Answer) -> None:
-        """Write an answer; when this method returns, the complete file is on disk.
-
-        Raises:
-            SourceError: The file cannot be written.
-        """
+        """Write an answer; when this method returns, the complete file is on disk."""
         key = self.manifest.key(robot, index)
         self.write_entry(key, _FAILED if isinstance(found, Failure) else _DONE, encode_answer(key, found))
 
@@ -109,11 +91,9 @@ class Store:
         return (self.folder / STUDY_FILE).exists()
 
     def write_entry(self, key: str, kind: str, data: bytes) -> None:
-        """Write the file with a key atomically; the method `entry` reads this file."""
         self._write(self._place(key, kind), data)
 
     def forget_failures(self) -> None:
-        """Delete the stored failures, so that the robots that failed are computed again."""
         for place in self._files(_FAILED):
             place.unlink(missing_ok=True)
 
@@ -130,10 +110,7 @@ class Store:
                 self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:
-        """Return, for each robot, the number of stored chunks and whether a chunk failed.
-
-        The method reads only the names of the files.
-        """
+        """Return (number of stored chunks, whether a chunk failed) for each robot, from file names only."""
         names = {place.name for kind in (_DONE, _FAILED) for place in self._files(kind)}
         found = {}
         for robot in range(len(self.manifest.robots)):
@@ -143,7 +120,6 @@ class Store:
         return found
 
     def copy_missing(self, other: Store) -> int:
-        """Copy missing chunks from another store of the same campaign, and return their number."""
         other.check_names()
         taken = 0
         for robot in range(len(self.manifest.robots)):
@@ -154,7 +130,6 @@ class Store:
         return taken
 
     def check_same(self, manifest: Manifest, where: object = None) -> None:
-        """Raise InputError with the differences if a manifest describes another campaign."""
         if differences := self.manifest.differences(manifest):
             there = "here" if where is None else f"in {where}"
             raise InputError(
@@ -165,7 +140,6 @@ class Store:
             )
 
     def writing_process(self) -> str | None:
-        """Describe the process that is writing to the store; None if no process is writing."""
         try:
             with _lock_file(self.folder / _LOCK, os.O_RDONLY) as file:
                 return None if _try_lock(file, fcntl.LOCK_SH) else _holder(file)
@@ -173,7 +147,6 @@ class Store:
             return None
 
     def write(self, name: str, data: bytes) -> None:
-        """Write a file beside the manifest; raise SourceError if the file cannot be written."""
         self._write(self.folder / name, data)
 
     def _place(self, key: str, kind: str) -> Path:
@@ -214,16 +187,10 @@ class Store:
 def open_store(
     folder: Path, manifest: Manifest, tell: Tell, *, shard: str | None = None, retry_failed: bool = False
 ) -> Iterator[Store]:
-    """Open the store of a validation, or create the store, and lock the store for writing.
+    """Open or create the store of a validation, and lock the store for writing.
 
-    With `shard`, for example "2/4", only this part of the store is locked, and other processes may write
-    other parts. With `retry_failed`, stored failures are deleted, because the files of the failed robots may
-    have changed.
-
-    Raises:
-        SourceError: The store cannot be created or written.
-        InputError: The store contains a validation with other robots or settings, or another process uses the
-            store.
+    With `shard`, for example "2/4", other processes may write other parts. With `retry_failed`, stored
+    failures are deleted, because the files of the failed robots may have changed.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -241,7 +208,7 @@ def open_store(
                     remedy="delete the link",
                 )
             scratch = folder / _WRITING / (shard or "all").replace("/", "-of-")
-            shutil.rmtree(scratch, ignore_errors=True)  # a killed process leaves unfinished files
+            shutil.rmtree(scratch, ignore_errors=True)  # A killed process leaves unfinished files.
             scratch.mkdir(parents=True)
             try:
                 store = _check_or_write_manifest(
@@ -265,9 +232,9 @@ def _is_ours(path: Path) -> bool:
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
-    """Write the manifest if there is none, and return the store.
+    """Return the store; write its manifest if there is none, or for a retry with changed files.
 
-    An existing manifest is not replaced, because it contains the original start time.
+    Otherwise the manifest is not replaced, because it contains the original start time.
     """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())
@@ -285,7 +252,6 @@ def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
 
 
 def _only_failed_robots_differ(store: Store, manifest: Manifest) -> bool:
-    """Return whether the manifests are equal except for changed files of robots that have failed."""
     own, theirs = store.manifest.robots, manifest.robots
     if len(own) != len(theirs) or replace(store.manifest, robots=theirs).differences(manifest):
         return False
@@ -327,7 +293,7 @@ def _lock(file: IO[bytes], how: int, folder: Path) -> None:
     for _ in range(_TRIES):
         if _try_lock(file, how):
             return
-        time.sleep(0.1)  # another process may hold the lock for a moment to test whether the lock is free
+        time.sleep(0.1)  # Another process may hold the lock for a moment, to test the lock.
     raise InputError(
         "another process uses this store",
         where=str(folder),

@@ -13,13 +13,7 @@ _T = TypeVar("_T")
 
 @dataclass(slots=True)
 class Timings:
-    """Computing times in seconds.
-
-    Attributes:
-        read: Time of reading the file, and of building the models and the tables.
-        compare: Time of the bounds and of the comparison: the total time minus all other times.
-        second: Time of the second oracle.
-    """
+    """Computing times in seconds; `compare` is the total time minus all other times."""
 
     read: float = 0.0
     urdfkin: float = 0.0
@@ -28,7 +22,7 @@ class Timings:
     second: float = 0.0
 
     def timed(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function, and add its computing time to the total of a category, such as "urdfkin"."""
+        """Call a function, and add its computing time (s) to the attribute `part`, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
             return function(*args, **kwargs)
@@ -36,7 +30,6 @@ class Timings:
             setattr(self, part, getattr(self, part) + (time.perf_counter() - begin))
 
     def close(self, seconds: float) -> None:
-        """Set `compare` to the total time (s) minus the times of all other parts."""
         self.compare = max(0.0, seconds - self.read - self.urdfkin - self.pinocchio - self.second)
 
     def __add__(self, other: Timings) -> Timings:

@@ -67,7 +67,7 @@ _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
 #: A multiple of 1 / 1024 has few decimals and is exactly a double.
 _GRID = 1024.0
-#: Number of digits of a printed tolerance, and number of digits to which it is rounded before.
+#: Number of digits of a printed tolerance, and number of digits of a first rounding.
 #: Results of different processors differ in the last digits; the first rounding removes these digits.
 _DIGITS, _FIRST_DIGITS = 3, 12
 
@@ -76,8 +76,8 @@ SPATIAL_ACCELERATION = replace(
     name="spatial acceleration",
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
-#: The quantities of the test vectors.
-#: The classical and the spatial acceleration differ by w x vel; the scale of each includes this term.
+#: The classical and the spatial acceleration differ by the cross product of angular and linear velocity.
+#: The scale of each acceleration includes this product.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -154,14 +154,7 @@ VECTORS = DocumentKind("urdfkin-vectors/1", Vectors, (), "urdfkin vectors write 
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A small robot with one feature of URDF.
-
-    Attributes:
-        rule: The standard's rule.
-        note: A known difference between libraries in this feature; None if no difference is known.
-        data: The bytes of the URDF file: the encoded text with its XML declaration.
-        frames: Links of the test vectors.
-    """
+    """A small robot with one feature of URDF; `note` states a known difference between libraries."""
 
     name: str
     rule: str
@@ -272,11 +265,7 @@ def _tolerance(k: float, scale: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """The files of one robot: vectors as JSON and as lines of text, and the URDF if it was written.
-
-    Attributes:
-        numbers: Number of values in each file of vectors.
-    """
+    """The files of one robot, and the number of values in each file of vectors."""
 
     robot: str
     files: tuple[Path, ...]
@@ -294,7 +283,6 @@ class _Head:
 
 
 def write_features(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the test vectors and the URDF of each small robot in `features.toml`."""
     for feature in features().values():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -323,7 +311,6 @@ def write_robot(folder: Path, robot: Robot, samples: int = SAMPLES) -> Written:
 
 
 def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
-    """Write the test vectors of all robots in the catalogue."""
     for name in catalogue():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UrdfWarning)
@@ -332,7 +319,6 @@ def write_catalogue(folder: Path, samples: int = SAMPLES) -> Iterator[Written]:
 
 
 def name_of(robot: Robot) -> str:
-    """Return the robot's name in the catalogue, or else the name in the URDF."""
     return robot.source if robot.source in catalogue() else robot.name
 
 
@@ -348,7 +334,6 @@ def write_sums(folder: Path, written: Sequence[Written]) -> Path:
 
 
 def _write(place: Path, robot: Robot, head: _Head, frames: Sequence[str], samples: int) -> Written:
-    """Write a JSON file, and a text file with the same numbers, separated by tabs."""
     tree = robot.tree
     found = [_sample(robot, head.robot, frames, sample) for sample in range(samples)]
     rows = [
@@ -394,7 +379,6 @@ def _result(one: Mapping[str, Any]) -> str:
 def _sample(
     robot: Robot, name: str, frames: Sequence[str], sample: int
 ) -> tuple[dict[str, list[str]], list[dict[str, Any]]]:
-    """Return the inputs and the results of a sample, with all numbers as decimals."""
     q, v, a = configuration(robot.tree, name, sample)
     inputs = {name: [repr(float(x)) for x in array] for name, array in zip("qva", (q, v, a), strict=True)}
     digits = max(DIGITS, enough_digits(len(robot.tree.joints)))

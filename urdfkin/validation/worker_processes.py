@@ -1,8 +1,8 @@
 """Engine that runs chunks in processes of this machine; the crash of a process affects only its robot.
 
-A worker process is a new Python interpreter that imports neither the parent's main module nor modules of the
-current folder, so a script needs no `__main__` guard. A worker process has one chunk at a time, so each crash
-can be attributed to a robot. After a crash, the robot is tried once more, alone in a process, after all other
+A worker process is a new Python interpreter. A worker imports neither the parent's main module nor modules of
+the current folder, so a script needs no `__main__` guard. A worker has one chunk at a time, so each crash can
+be attributed to a robot. After a crash, the robot is tried once more, alone in a process, after all other
 robots. With `isolate`, each robot runs alone from the start, and the first crash is the robot's result.
 """
 
@@ -40,8 +40,6 @@ _GRACE = 5.0
 
 
 class WorkerProcess:
-    """A worker process with the connection that transfers chunks and answers."""
-
     def __init__(self) -> None:
         self.connection, theirs = Pipe()
         try:
@@ -63,7 +61,6 @@ class WorkerProcess:
         self._process.wait()
 
     def wait_for_cause(self) -> str:
-        """Wait until the process has ended, and return the signal or exit status that ended the process."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(_GRACE)
         self.end()
@@ -73,8 +70,7 @@ class WorkerProcess:
 def _start_interpreter(pipe: int) -> subprocess.Popen[bytes]:
     """Start a Python interpreter that imports the same packages as this process.
 
-    The new interpreter imports neither modules from the current folder nor this process's main module. The
-    interpreter has its own process group. Therefore, Ctrl-C in the terminal interrupts only the parent
+    The interpreter has its own process group. Therefore, Ctrl-C in the terminal interrupts only the parent
     process, which then saves the finished results.
     """
     command = own_python(f"from {WORKER} import serve; serve({pipe}, {os.getpid()})")
@@ -145,8 +141,7 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    If `alone` is None, several processes may share a robot. Otherwise, each process validates only one robot,
-    and `alone` is the reason in the report if the process crashes.
+    If `alone` is given, each process validates only one robot, and `alone` is the reported reason of a crash.
     """
 
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
@@ -221,7 +216,6 @@ class _WorkerPool:
         self._enter(task, found)
 
     def _handle_crash(self, worker: _BusyWorker, task: Task) -> None:
-        """Schedule the tasks of the robot for a second try, or report the crash."""
         self._workers.remove(worker)
         cause = worker.wait_for_cause()
         if self._alone is None:
@@ -231,8 +225,6 @@ class _WorkerPool:
 
 
 class _BusyWorker(WorkerProcess):
-    """A worker process with its current task and the remaining tasks of the current robot."""
-
     def __init__(self) -> None:
         super().__init__()
         self.task: Task | None = None

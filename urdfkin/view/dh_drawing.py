@@ -1,8 +1,8 @@
 """Draw a chain with its Denavit-Hartenberg frames, joint axes and common normals, as SVG.
 
 The picture is an orthographic view. Joint axes are dashed lines along z. Offsets d are grey and lie on the
-joint axes. Lengths a are orange and lie on the common normals. Each frame shows its x and z axes. Arrows that
-end at the same point share a label. The module needs the extra `urdfkin[plots]`.
+joint axes. Lengths a are orange and lie on the common normals. The module needs the extra
+`urdfkin[plots]`.
 """
 
 from __future__ import annotations
@@ -23,15 +23,12 @@ from urdfkin.view.figure import BLUE, ORANGE, VERMILION, label, new_figure, styl
 
 _X, _Z, _D, _A, _AXIS, _TEXT = VERMILION, BLUE, "#6b7280", ORANGE, "#9aa7b5", "#222222"
 
-#: Direction of view (rad): elevation above the base's x-y plane, and azimuth about the base's z axis
+#: Direction of view (rad): elevation above the base's x-y plane, and azimuth about the base's z axis.
 _ELEVATION, _AZIMUTH = math.radians(20.0), math.radians(-55.0)
 
 
 def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
-    """Return an SVG of the table's chain at q (rad and m, or by name); None is the zero configuration.
-
-    Raise InputError if matplotlib is not installed, or `q` has the wrong length.
-    """
+    """Return an SVG of the table's chain at q (rad and m, or by name); None is the zero configuration."""
     frames = table.frames(q)
     if frames.ndim != 3:
         raise InputError(
@@ -63,13 +60,7 @@ def _projection() -> FloatArray:
 
 @dataclass
 class _Canvas:
-    """A two-dimensional drawing of points in space; the labels are drawn last.
-
-    Attributes:
-        projection: (2, 3) right and up directions of the picture in the base's axes.
-        size: Size of the chain, m.
-        labels: (position, direction, text, colour) of each label.
-    """
+    """A two-dimensional drawing; the rows of `projection` (2, 3) are right and up in the base's axes."""
 
     axes: Any
     projection: FloatArray
@@ -81,7 +72,6 @@ class _Canvas:
         self.axes.plot([x, u], [y, v], solid_capstyle="round", **style)
 
     def arrow(self, start: FloatArray, along: FloatArray, color: str, name: str) -> None:
-        """Draw an arrow, with a label beyond its tip; an arrow towards the viewer appears as a dot."""
         a, b = self.projection @ start, self.projection @ (start + along)
         look = {"arrowstyle": "-|>", "color": color, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
         self.axes.annotate("", xy=b, xytext=a, zorder=4, arrowprops=look)
@@ -91,7 +81,6 @@ class _Canvas:
         self.axes.plot(*(self.projection @ point)[:, None], zorder=5, **style)
 
     def label(self, point: FloatArray, along: FloatArray, text: str, color: str) -> None:
-        """Store a label for a point; `draw_labels` draws the stored labels."""
         self.labels.append((self.projection @ point, self.projection @ along, text, color))
 
     def draw_labels(self) -> None:

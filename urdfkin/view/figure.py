@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: Placeholder colours of a drawing, and the colours of the page's style that replace them
+#: Each placeholder colour of a drawing, and the colour of the page's style that replaces it.
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",
@@ -37,11 +37,11 @@ PAGE_COLOURS = {
 TEXT, GRID, FIRST, SECOND, THIRD = PAGE_COLOURS
 FORMATS = ("svg", "png", "pdf")
 
-#: Okabe and Ito's colours, which are distinguishable with every colour vision deficiency
+#: Okabe and Ito's colours, which are distinguishable with every colour vision deficiency.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK = COLOURS = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
 )  # fmt: skip
-#: Colour of a cross at a number that is wrong or outside its limits
+#: Colour of a cross at a number that is wrong or outside its limits.
 BAD = "#B00020"
 
 _STYLE: dict[Any, Any] = {
@@ -57,7 +57,7 @@ _STYLE: dict[Any, Any] = {
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure (size in inches) without a window; raise InputError without matplotlib."""
+    """Return an empty figure (size in inches) that needs no display."""
     _matplotlib()
     from matplotlib.figure import Figure
 
@@ -88,10 +88,7 @@ def _matplotlib() -> Any:
 
 
 def save(figure: Figure, path: Path) -> bytes:
-    """Return the figure as the bytes of a file, in the format of the suffix of `path`.
-
-    The same figure gives the same bytes. Raise InputError for a suffix other than svg, png or pdf.
-    """
+    """Return the figure as bytes in the format that `path` ends with; equal figures give equal bytes."""
     format_ = path.suffix.removeprefix(".").lower()
     if format_ not in FORMATS:
         raise InputError(
@@ -105,10 +102,7 @@ def save(figure: Figure, path: Path) -> bytes:
 
 
 def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str:
-    """Return the figure, drawn with `PAGE_COLOURS`, as an SVG element of a page.
-
-    `prefix` makes ids unique on a page with several figures. Screen readers read `title` and `description`.
-    """
+    """Return a figure in `PAGE_COLOURS` as an SVG element; `prefix` makes ids unique on the page."""
     stream = io.StringIO()
     no_metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with style():
@@ -129,7 +123,6 @@ def inline_svg(figure: Figure, prefix: str, title: str, description: str) -> str
 
 
 def _with_ids(text: str, prefix: str) -> str:
-    """Remove unused ids from an SVG text, and add the prefix to each used id."""
     used = set(re.findall(r"url\(#([^)]+)\)", text)) | set(re.findall(r'href="#([^"]+)"', text))
     text = re.sub(
         r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", text

@@ -20,9 +20,8 @@ from urdfkin.robot.trajectory import Trajectory
 from urdfkin.view.plot import foot
 
 _SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
-#: Maximum number of updates per second while the viewer plays
 _UPDATE_RATE = 20.0
-#: Frames per second, maximum number of frames, and size in pixels of a saved motion
+#: Frames per second, maximum number of frames, and size in pixels of a saved motion.
 _FRAME_RATE, _MOST_FRAMES, _SIZE = 12.5, 250, (640, 480)
 
 
@@ -92,7 +91,6 @@ class Player:
             self.show(self._nearest(float(self.time.value)))
 
     def play(self) -> None:
-        """Play to the end, from the shown sample or, if this is the last one, from the first."""
         if not self._playing.is_set():
             self._playing.set()
             self.button.label = "pause"
@@ -129,7 +127,7 @@ class Player:
                 self.show(self._nearest(float(moment)))
                 frames.append(_new_picture(client, frames[-1] if frames else None))
                 note.body = f"{k + 1} of {count} pictures"
-        except (RuntimeError, TimeoutError):  # browsers draw nothing in a background tab
+        except (RuntimeError, TimeoutError):  # Browsers draw nothing in a background tab.
             return
         finally:
             note.remove()
@@ -139,11 +137,7 @@ class Player:
 
 
 def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
-    """Return the browser's picture of the robot.
-
-    A busy browser may draw the previous pose again, so a picture that equals the last one is requested again,
-    up to four times.
-    """
+    """Request a picture, and repeat the request if a busy browser has drawn the previous pose again."""
     for _ in range(5):
         picture: np.ndarray = client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0)
         if last is None or not np.array_equal(picture, last):
@@ -155,14 +149,13 @@ def as_gif(frames: list[np.ndarray], seconds: float) -> bytes:
     """Return an endless animation of frames (height, width, 3 or 4), each shown for `seconds`."""
     images = [_on_white(frame).quantize(128) for frame in frames]
     stream = io.BytesIO()
-    # A GIF stores durations in 1/100 s, and browsers show a frame of 1/100 s for longer than that.
+    # A GIF stores durations in 1/100 s, and browsers show frames of 1/100 s for too long.
     milliseconds = max(20, 10 * round(100 * seconds))
     images[0].save(stream, "gif", save_all=True, append_images=images[1:], duration=milliseconds, loop=0)
     return stream.getvalue()
 
 
 def as_png(frame: np.ndarray) -> bytes:
-    """Return a picture (height, width, 3 or 4) as the bytes of a PNG file."""
     stream = io.BytesIO()
     _on_white(frame).save(stream, "png", optimize=True)
     return stream.getvalue()

@@ -26,17 +26,15 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: Function that draws a motion over time, in seconds, into axes
+#: Function that draws a motion over time (s) into axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
-#: Line styles, by which lines differ even without colours
+#: Line styles, which make lines distinguishable without colours.
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), "-")
 
 
 _LINEAR, _ANGULAR = slice(0, 3), slice(3, 6)
-#: Maximum number of names in a legend
 _MOST_NAMES = 14
-#: Colour of lines without a name
 _UNNAMED = "#9AA7B5"
 
 
@@ -65,7 +63,6 @@ def _rotation(x: FrameMotion) -> FloatArray:
 
 
 def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the magnitudes of the linear acceleration and of each of its parts, m/s^2."""
     sizes = np.linalg.norm(x.parts.by_kind[..., :3], axis=-1)
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
     used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
@@ -75,7 +72,6 @@ def parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
 
 
 def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw the singular values of the linear or of the angular rows of a Jacobian; their units differ."""
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
@@ -83,24 +79,21 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:  # fewer than two powers of ten
+    # If the axis has fewer than two powers of ten, three other values get a tick.
+    if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylabel(f"singular values\n[{unit}] at |v| = 1")
 
 
 def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    """Draw Yoshikawa's manipulability: the product of the singular values of the linear or angular rows."""
     _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
     axes.set_ylabel(f"manipulability\n[{unit}]")
     axes.set_ylim(0.0, 1.08 * float(axes.dataLim.y1) or 1.0)
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the difference from Pinocchio at the same q, v and a, in eps * scale, and its bound (thin line).
-
-    A cross marks a sample outside its bound.
-    """
+    """Draw the difference from Pinocchio, in units of eps * scale, and the bound (thin line)."""
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.not_verified is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
@@ -112,13 +105,12 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The axis is logarithmic, because bounds are about a hundred times the usual disagreement.
-    # The plot's axis is linear below 1, the size of one rounding error, and logarithmic above it.
+    # Below 1, the size of one rounding error, the axis is linear.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
 
 
-#: Panels of the frame by name, in the order of the figure
 PANELS: dict[str, Panel] = {
     "position": _xyz(lambda x: x.placement[:, :3, 3], "position [m]"),
     "orientation": _xyz(_rotation, "rotation [rad]"),
@@ -134,14 +126,13 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: For q, v and a: the part of the unit after "rad" or "m"
+#: Suffix of the units of q, v and a after "rad" or "m".
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: Names of the panels of coordinates; each panel has one plot for each unit
+#: Names of the panels of coordinates; each panel has a plot for each unit.
 COORDINATES = tuple(_PER)
 
 
 def coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
-    """Return a panel of q, v or a over time for each unit, with the limits of the moving joints."""
     units = np.array(configuration.units(robot.tree, what))
     return [
         partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
@@ -160,11 +151,7 @@ def _coordinates(
     x: FrameMotion,
     t: FloatArray,
 ) -> None:
-    """Draw the coordinates that change, or all if none changes, and their limits (thin lines).
-
-    A cross marks a sample outside its limits. If a legend has no space for all names, only coordinates that
-    leave their limits have a colour and a name.
-    """
+    """Draw the coordinates that change, or all if none changes, and their limits (thin lines)."""
     del x
     values: FloatArray = getattr(trajectory, what)
     names = robot.coordinate_names if what == "q" else robot.rate_names
@@ -193,9 +180,9 @@ def _coordinates(
 
 
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
-    """Return whether each sample is outside the limits by more than one unit in the last place of a double.
+    """Return whether each value is outside its limits by more than one unit in the last place of a double.
 
-    One unit in the last place is the rounding error of a limit that is written in decimal notation.
+    This tolerance covers the rounding of a limit in decimal notation.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -208,25 +195,21 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
     return -largest, largest
 
 
-#: Maximum size of a figure (inches), which fits on a page of A4 or US Letter with a margin
+#: Maximum size of a figure (inches), which fits on a page of A4 or US Letter with a margin.
 _PAGE = (7.6, 10.4)
-#: Height of a panel, and height of the title and the footer together, in inches
+#: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
-#: Number of letters in one inch of the footer, and in one inch of a legend
+#: Number of letters in one inch of the footer, and in one inch of a legend.
 _LETTERS, _LETTERS_OF_LEGEND = 16, 22
-#: Width of the sample line in a legend, in letters
+#: Width of the sample line in a legend, in letters.
 _HANDLE = 8
-#: Sentence of the footer if v and a may not be the exact derivatives of q
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
 )
 
 
 def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
-    """Return a figure with panels from `COORDINATES` and `PANELS`; without `panels`, with all of them.
-
-    Raise UnknownNameError for an unknown panel, and InputError without matplotlib.
-    """
+    """Return a figure with the named panels of `COORDINATES` and `PANELS`; no names mean all panels."""
     drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)

@@ -22,7 +22,7 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.catalogue import catalogue, find_package, split_uri
 
-#: Maximum size (bytes) of a mesh, material or texture file; larger files are not shown
+#: Maximum size (bytes) of a mesh, material or texture file; larger files are not shown.
 LARGEST_FILE = 200_000_000
 
 
@@ -46,7 +46,7 @@ def _read(file: Path) -> Any:
 
 
 def mesh(shape: Shape) -> Any | None:
-    """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's axes; None if unreadable."""
+    """Return the mesh of a shape as a coloured trimesh.Trimesh in the link's frame; None if unreadable."""
     import trimesh
 
     if shape.file is None:
@@ -66,7 +66,7 @@ def mesh(shape: Shape) -> Any | None:
 
 
 def corners(shape: Shape) -> FloatArray:
-    """Return the corners (8, 3) of a box around a shape, in the link's frame. A mesh must be readable."""
+    """Return the corners (8, 3) of a box around a shape, in the link's frame; a mesh must be readable."""
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
     if shape.kind == "mesh":
         lower, upper = mesh(shape).bounds  # type: ignore[union-attr]
@@ -78,7 +78,6 @@ def corners(shape: Shape) -> FloatArray:
     return np.asarray(signs * half @ shape.T_link_shape[:3, :3].T + shape.T_link_shape[:3, 3])
 
 
-#: Default colour of a shape
 GREY = (0.72, 0.74, 0.78, 1.0)
 
 
@@ -91,8 +90,6 @@ class Shape:
         size: Lengths in metres: (x, y, z) for a box, (radius, length) for a cylinder, (radius,) for a sphere.
             For a mesh, the scale factors (x, y, z).
         colour: Red, green, blue and opacity, each from 0 to 1. None means the colours of the mesh file.
-        file: The mesh's file; None for other kinds, and for a file that is not found.
-        address: The mesh's address in the URDF; "" for other kinds.
     """
 
     link: str
@@ -110,7 +107,7 @@ class Shape:
 
 def shapes(robot: Robot) -> list[Shape]:
     """Return all visuals of a robot, except malformed ones."""
-    root = plain_xml(robot.urdf)  # the URDF of a loaded robot is already checked
+    root = plain_xml(robot.urdf)  # The URDF of a loaded robot is already checked.
     urdf_file = _file_of(robot)
     materials = {m.get("name"): _rgba(m) for m in root.findall("material") if m.find("color") is not None}
     found = []
@@ -123,7 +120,6 @@ def shapes(robot: Robot) -> list[Shape]:
 
 
 def _file_of(robot: Robot) -> Path | None:
-    """Return a robot's file, in whose folder meshes are searched; None if the robot has no file."""
     entry = catalogue().get(robot.source)
     path = entry.path if entry is not None else Path(robot.source)
     try:
@@ -199,7 +195,7 @@ def _candidates(address: str, urdf_file: Path | None) -> Iterator[Path]:
     if not address or "\0" in address:
         return
     if (parts := split_uri(address)) is not None:
-        # Some files have a third slash before the package's name.
+        # Some URDFs have a third slash before the package's name: package:///NAME.
         name, path = parts if parts[0] else parts[1].partition("/")[::2]
         package = find_package(name, urdf_file)
         if package is not None:

@@ -12,9 +12,9 @@ Four independent measures keep them out:
 
 Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
 server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that checks
-each request. Before a robot is shown, the module tests the running server with requests that it must refuse,
-and stops a server that accepts one of them. A new version of viser can therefore make the viewer fail, but it
-cannot make it insecure.
+each request. Before a robot is shown, the module sends forbidden requests to the running server, and stops
+the server if it accepts one of these requests. A new version of viser can therefore make the viewer fail, but
+not make the viewer insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read.
 Instead the browser opens a file in a private folder. This file redirects the browser to the address.
@@ -49,14 +49,14 @@ from urdfkin.system.locks import lock_over_forks
 
 
 def has_screen() -> bool:
-    """Return whether a started browser is visible: not over ssh and not in a container."""
+    """Return whether a browser that this process starts is visible to the user."""
     return sys.platform == "darwin" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 @contextmanager
 def opened_page(address: str) -> Iterator[None]:
     """Open the address in the user's browser, by a temporary file that redirects to the address."""
-    with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # only this user can read the folder
+    with tempfile.TemporaryDirectory(prefix="urdfkin-") as folder:  # Only this user can read the folder.
         page = Path(folder) / "view.html"
         page.write_text(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">', "utf-8")
         webbrowser.open(page.as_uri())
@@ -65,7 +65,7 @@ def opened_page(address: str) -> Iterator[None]:
 
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?P<port>:[0-9]{1,5})?")
 
-#: Headers of every response: they forbid caching, type guessing, embedding, and referrers with the key
+#: Headers of every response: they forbid caching, type guessing, embedding, and referrers with the key.
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -144,7 +144,6 @@ def policy(nonce: str, host: str) -> str:
 
     Scripts need the nonce, which is random for each page, so names in a URDF cannot inject a script. The page
     can connect only to this server; viser's client would otherwise connect to any server in `?websocket=`.
-    Styles and images are part of the page.
     """
     return "; ".join(
         [
@@ -164,20 +163,20 @@ def policy(nonce: str, host: str) -> str:
 
 LOOPBACK = "127.0.0.1"
 
-#: The only message that the server accepts from a page: a control has changed
+#: The only message that the server accepts from a page: a control has changed.
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements that add the nonce to viser's script, and to the script element that this script creates
+#: Replacements that add the nonce to viser's script, and to the script element that this script creates.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
 )
-#: Start of the page's head, after which urdfkin's script is added
+#: Start of the page's head, after which urdfkin's script is added.
 _HEAD = '<meta charset="utf-8" />'
 _serve_lock = lock_over_forks()
 
 
 class UnguardedError(UrdfkinError, RuntimeError):
-    """The installed viser cannot be secured by this version of urdfkin, so the viewer does not start."""
+    """This version of urdfkin cannot secure the installed viser, so the viewer does not start."""
 
     def __init__(self, what: str) -> None:
         super().__init__(
@@ -188,12 +187,7 @@ class UnguardedError(UrdfkinError, RuntimeError):
 
 
 def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
-    """Start viser's server with the request filter; `server.address` is the address to open.
-
-    Raises:
-        InputError: viser is not installed, or `host` is not an address of this machine.
-        UnguardedError: This version of viser cannot be secured.
-    """
+    """Start viser's server with the request filter; `server.address` is the address to open."""
     try:
         import viser
     except ImportError:
@@ -204,11 +198,11 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
         def request_share_url(self, verbose: bool = True) -> str | None:
             del verbose
-            return None  # sharing would open a tunnel to a third party
+            return None  # Sharing would open a tunnel to a third party.
 
     _require_address(host)
     requests = RequestFilter(host, secrets.token_urlsafe(16))
-    # Viser prints its address without the key.
+    # Viser would print its address without the key.
     with _filtered(_process_request(requests, _page())), contextlib.redirect_stdout(io.StringIO()):
         server = PrivateServer(host=host, port=port, label="urdfkin", verbose=False)
     try:
@@ -222,7 +216,7 @@ def new_server(host: str = LOOPBACK, port: int = 8080) -> Any:
 
 
 def _require_address(host: str) -> None:
-    """Raise InputError for an address that cannot be listened on; viser would search a port forever."""
+    """Raise InputError for an address that cannot be listened on; viser would search for a port forever."""
     try:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         with socket.create_server((host, 0), family=family):
@@ -237,10 +231,7 @@ def _require_address(host: str) -> None:
 
 
 def _process_request(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
-    """Return the callback `process_request` of the library websockets.
-
-    The callback returns a response, or None to accept a WebSocket connection.
-    """
+    """Return a callback of the library websockets: it returns a response, or None to accept a connection."""
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 
@@ -264,7 +255,7 @@ def _process_request(requests: RequestFilter, page: Callable[[str], bytes]) -> C
 
 
 def _page() -> Callable[[str], bytes]:
-    """Return a function that makes viser's page for a nonce, which is a random key of the page."""
+    """Return a function that makes viser's page for a nonce."""
     import viser
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
@@ -276,7 +267,7 @@ def _page() -> Callable[[str], bytes]:
         raise UnguardedError("the page of viser has unexpected scripts")
     if text.count(_HEAD) != 1:
         raise UnguardedError("the page of viser has no <head> element")
-    # urdfkin's style and script, which run before viser's
+    # urdfkin's style and script come first, so they run before viser's.
     own = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
 
     def page(nonce: str) -> bytes:

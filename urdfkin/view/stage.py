@@ -1,9 +1,9 @@
 """Draw a robot in viser's scene, with arrows, the velocity ellipsoid and Denavit-Hartenberg frames.
 
 - A column of the Jacobian is the frame's velocity if one joint velocity is 1 and all others are 0 (7.85).
-- If the vector of joint velocities has length 1, the tip of the frame's velocity is inside an ellipsoid or on
-  its surface. The axes of the ellipsoid are the left singular vectors of the Jacobian, and its half-lengths
-  are the singular values.
+- For joint velocities of length 1, the frame's velocity vector ends inside an ellipsoid or on the ellipsoid's
+  surface. The axes of the ellipsoid are the left singular vectors of the Jacobian, and the
+  half-lengths are the singular values.
 - The acceleration is the sum of transverse, centripetal, Coriolis and sliding parts (7.125, 7.130).
 """
 
@@ -25,7 +25,7 @@ from urdfkin.robot.frame_motion import FrameMotion
 from urdfkin.view.dh_drawing import row_corners
 from urdfkin.view.scene import GREY, Shape, corners, mesh, shapes
 
-#: Colours of the parts of the acceleration: red, green and blue from 0 to 255
+#: Colours of the parts of the acceleration: red, green and blue from 0 to 255.
 PART_COLOURS = {
     "transverse": (0, 114, 178),
     "centripetal": (213, 94, 0),
@@ -34,7 +34,7 @@ PART_COLOURS = {
     "sum": (30, 30, 30),
 }
 LINEAR, ANGULAR = (0, 114, 178), (204, 121, 167)
-#: Length of the longest arrow, as a fraction of the robot's size
+#: Length of the longest arrow, as a fraction of the robot's size.
 _SHARE = 0.3
 
 
@@ -57,11 +57,7 @@ class Ellipsoid:
 
 
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
-    """Return arrows for the columns of the Jacobian, in world axes, starting at the frame's origin.
-
-    The motion `x` has one sample, with reference frame LOCAL_WORLD_ALIGNED. The robot's size `reach` (m)
-    scales the arrows.
-    """
+    """Return arrows for the Jacobian's columns, for a motion with one sample in LOCAL_WORLD_ALIGNED."""
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
     keep = np.linalg.norm(columns, axis=1) > 1e-9
@@ -71,7 +67,7 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 
 
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
-    """Return arrows for the parts of the frame's linear acceleration and their sum, in world axes."""
+    """Return arrows for the acceleration's parts and sum; `x` has one sample in LOCAL_WORLD_ALIGNED."""
     parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
     names = tuple(name for name, used in zip((*KINDS, "sum"), keep, strict=True) if used)
@@ -95,9 +91,7 @@ def _arrows(
 def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -> Ellipsoid:
     """Return the ellipsoid of the frame's velocities for joint velocities of length 1.
 
-    The ellipsoid has a small thickness even in directions without motion, so that it is visible. The motion
-    `x` has one sample, with reference frame LOCAL_WORLD_ALIGNED. The robot's size `reach` (m) scales the
-    ellipsoid.
+    The motion `x` has one sample in LOCAL_WORLD_ALIGNED.
     """
     J = x.jacobian[0, slice(3, 6) if angular else slice(0, 3)]
     full = np.hstack([J, np.zeros((3, max(0, 3 - J.shape[1])))])
@@ -105,7 +99,7 @@ def velocity_ellipsoid(x: FrameMotion, reach: float, *, angular: bool = False) -
     U = U * np.array([1.0, 1.0, np.sign(np.linalg.det(U))])
     largest = float(s[0])
     half = _SHARE * reach * (s / largest if largest > 0.0 else np.zeros(3))
-    half = np.maximum(half, 0.002 * reach)
+    half = np.maximum(half, 0.002 * reach)  # A small thickness keeps a flat ellipsoid visible.
     return Ellipsoid(half, x.placement[0, :3, 3], scalar_first(U))
 
 
@@ -114,21 +108,19 @@ def scalar_first(R: FloatArray) -> FloatArray:
     return np.asarray(np.roll(quaternion_of(R), 1, axis=-1), dtype=np.float64)
 
 
-#: Maximum time (s) from the opening of a page to its final layout
+#: Maximum time (s) from the opening of a page to its final layout.
 _OPENING = 15.0
-#: Direction from the robot to the camera
 _TO_CAMERA = np.array([1.1, -1.3, 0.6])
-#: Fraction of the view that the robot fills
+#: Fraction of the view that the robot fills.
 _FILLED = 0.85
-#: Viser's vertical field of view (rad)
+#: Viser's vertical field of view (rad).
 _FOV = np.deg2rad(75.0)
 
 
 def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray, FloatArray]:
-    """Return the camera's position and the centre of its picture, so that the points (n, 3) fill the picture.
+    """Return the camera's position and the centre of the view (m) in which points (n, 3) fill the picture.
 
-    Points are in metres. `fov` is the vertical field of view (rad), `aspect` is the width divided by the
-    height.
+    `fov` is the vertical field of view (rad), and `aspect` is the width divided by the height.
     """
     middle = 0.5 * (points.max(axis=0) + points.min(axis=0))
     back = _TO_CAMERA / np.linalg.norm(_TO_CAMERA)
@@ -142,21 +134,17 @@ def camera(points: FloatArray, *, aspect: float, fov: float) -> tuple[FloatArray
 
 
 _BONE, _TURN, _SLIDE = (142, 153, 168), (0, 114, 178), (230, 159, 0)
-#: Display modes of the shapes
 SOLID, SEE_THROUGH = "solid", "see-through"
 SHAPES = (SOLID, SEE_THROUGH, "hidden")
 NAMES = ("none", "links", "joints")
-#: Opacity of transparent shapes
 _OPACITY = 0.3
 _NORMAL, _OFFSET = (230, 159, 0), (86, 180, 233)
 
 
 class Stage:
-    """A robot in viser's scene: link frames, shapes, and a skeleton of joints and lines between them.
+    """A robot in viser's scene; `reach` is the robot's size (m).
 
-    Attributes:
-        missing: Meshes that cannot be shown.
-        reach: The robot's size in metres.
+    `missing` lists the meshes that cannot be shown.
     """
 
     def __init__(self, server: Any, robot: Robot) -> None:
@@ -273,7 +261,7 @@ class Stage:
             self._set_camera(client)
 
     def _welcome(self, client: Any) -> None:
-        """Set the camera of a new page, and again when the panel has reduced the width of the view."""
+        """Set the camera of a new page, and set it again when the panel reduces the view's width."""
         begin, last_aspect = time.monotonic(), 0.0
 
         def fit(_: Any) -> None:
@@ -293,7 +281,6 @@ class Stage:
             client.camera.position, client.camera.look_at = position, middle
 
     def show(self, *, shapes: str, skeleton: bool, axes: bool, names: str) -> None:
-        """Show or hide shapes and names; `shapes` is one of `SHAPES`, and `names` is one of `NAMES`."""
         self.skeleton_shown = skeleton
         if shapes == SEE_THROUGH and not self._transparent:
             self._transparent = self._add_transparent()
@@ -309,7 +296,7 @@ class Stage:
         self._axes.visible = axes
 
     def move(self, Ts: FloatArray) -> None:
-        """Move all links to the placements (links, 4, 4)."""
+        """Move the links to the placements (links, 4, 4)."""
         wxyzs, positions = scalar_first(Ts[:, :3, :3]), Ts[:, :3, 3]
         with self._server.atomic():
             for link, wxyz, position in zip(self._links, wxyzs, positions, strict=True):
@@ -319,7 +306,6 @@ class Stage:
     # -- overlays ------------------------------------------------------------------------------------
 
     def arrows(self, name: str, arrows: Arrows | None) -> None:
-        """Replace the group of arrows called `name`; None hides the group."""
         size = 0.008 * self.reach
         visible = arrows is not None and len(arrows.points) > 0
         self._scene.add_arrows(
@@ -345,7 +331,6 @@ class Stage:
         )
 
     def table(self, table: DHTable | None, q: FloatArray, T_world_base: FloatArray) -> None:
-        """Draw the frames, offsets d and lengths a of a table in the configuration q; None removes them."""
         for handle in self._dh:
             handle.remove()
         self._dh = []

@@ -38,27 +38,22 @@ from urdfkin.view.stage import (
     velocity_ellipsoid,
 )
 
-#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited
+#: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited.
 _UNLIMITED = 100.0
-#: Change of an angle by an arrow key, in degrees or in radians
+#: Change of an angle by an arrow key, in degrees or in radians.
 _DEGREES, _RADIANS = 1.0, 0.01
-#: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten
+#: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten.
 _STEPS = 50.0
 _DIGITS, _DIGITS_OF_DEGREES = 4, 2
-#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) on sliders of joints without limits
+#: Largest joint velocity (rad/s, m/s) and acceleration (rad/s^2, m/s^2) on sliders of joints without limits.
 _VELOCITY, _ACCELERATION = 3.0, 5.0
-#: Maximum number of missing meshes that a message names
+#: Maximum number of missing meshes that a message names.
 _MOST_MISSING = 5
 
 
 @dataclass(frozen=True, slots=True)
 class SliderRow:
-    """Description of one slider, which sets one number of q, v or a.
-
-    Attributes:
-        at: Index of the number in q, v or a.
-        turns: Whether the number is an angle or a derivative of an angle.
-    """
+    """A slider for one number of q, v or a; `turns` is True for angles and their derivatives."""
 
     at: int
     name: str
@@ -70,8 +65,8 @@ class SliderRow:
 class Sliders:
     """A group of sliders in the viewer's panel, for example for all joint velocities.
 
-    The unit of a slider ends with `per`: "" for q, "/s" for v, "/s²" for a. When the user moves a slider,
-    `report` is called with the index and the new number. It is not called when the program sets a slider.
+    The text `per` follows the unit: "" for q, "/s" for v, "/s²" for a. When the user moves a slider, `report`
+    is called with the index and the new number. `report` is not called when the program sets a slider.
     """
 
     def __init__(
@@ -114,7 +109,6 @@ class Sliders:
             self._report(row.at, float(handle.value) / self._scale(row))
 
     def show(self, values: FloatArray) -> None:
-        """Set each slider to its number of `values`; a number beyond the range extends the range."""
         self._is_setting = True
         try:
             for row, handle in zip(self.rows, self.handles, strict=True):
@@ -126,7 +120,7 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # An equal value is not set again, so a slider that the user moves keeps its exact value.
+                # A slider with this value is not set, because a conversion of units could round the value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
@@ -170,7 +164,6 @@ def fixed_coordinates(robot: Robot) -> list[str]:
 
 
 def rate_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
-    """Describe a slider for each joint velocity, or for each joint acceleration if `second` is true."""
     rows = []
     for joint, at in zip(robot.tree.joints, robot.tree.v_index, strict=True):
         for k in range(joint.nv):
@@ -194,7 +187,6 @@ def _limits(joint: Joint, otherwise: float) -> tuple[float, float]:
 
 
 def within_limits(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the configuration nearest to `q` within all joint limits; quaternions are unchanged."""
     out = np.array(q, dtype=np.float64)
     for joint, at in zip(robot.tree.joints, robot.tree.q_index, strict=True):
         for k in range(min(joint.nq, 3)):
@@ -272,20 +264,7 @@ _REFERENCES = tuple(reference.name.lower() for reference in Reference)
 
 
 class Viewer:
-    """A robot in a browser tab.
-
-    Args:
-        server: The server from `urdfkin.view.server.new_server`.
-        robot: The robot to show.
-        q: (nq,) start configuration. None means the configuration within the limits nearest to zero.
-        trajectory: A trajectory to play; the viewer then starts at the first sample.
-        conversion: The convention of the text field of q. None means urdfkin's convention.
-
-    Attributes:
-        q: (nq,) configuration of the sliders, rad and m.
-        motion: The motion of the chosen frame in the chosen reference frame, with its check.
-        player: The controls of the trajectory; None without one.
-    """
+    """A robot in a browser tab; q (nq,) is the configuration of the sliders, rad and m."""
 
     def __init__(
         self,
@@ -313,7 +292,6 @@ class Viewer:
             self.player.show(0)
 
     def _fill(self) -> None:
-        """Set the camera to show the robot in the configuration q and along the whole trajectory."""
         q = self.q[np.newaxis]
         if self.player is not None:
             samples = self.player.trajectory.q
@@ -327,7 +305,6 @@ class Viewer:
 
     @property
     def file_name(self) -> str:
-        """The robot's name in characters that every system allows in a file name."""
         return re.sub(r"[^A-Za-z0-9_-]+", "-", self.robot.name).strip("-") or "robot"
 
     # -- controls ------------------------------------------------------------------------------------
@@ -335,7 +312,7 @@ class Viewer:
     def _build(self, trajectory: Trajectory | None) -> None:
         gui, robot = self.server.gui, self.robot
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
-        gui.main_panel.dock_right()  # the controls are beside the picture, not over it
+        gui.main_panel.dock_right()  # The controls do not cover the picture.
         gui.set_panel_label(printable(robot.name))
         if self.stage.missing:
             gui.add_markdown(missing_words(self.stage.missing))
@@ -418,7 +395,6 @@ class Viewer:
             self.update()
 
     def set_q(self, q: Given) -> None:
-        """Move the robot and all sliders to a configuration, or raise InputError."""
         with self._lock:
             self.set_state(checked(self.robot.tree, q, "q"), self.v, self.a)
 
@@ -451,7 +427,6 @@ class Viewer:
         self.wrong.content = ""
 
     def _read_q(self, event: Any) -> None:
-        """Read the configuration that the user typed; the text in the field is not changed."""
         if event.client is None:
             return
         with self._lock:
@@ -465,6 +440,7 @@ class Viewer:
             except UrdfkinError as error:
                 self.wrong.content = markdown_text(str(error))
                 return
+            # The text field keeps the text that the user typed.
             self.wrong.content = markdown_text("; ".join(degrees_lines(self.robot.tree, self.q)))
             self.sliders.show(self.q)
             self.update()
@@ -475,7 +451,7 @@ class Viewer:
                 sliders.build(values, degrees=self.units.value == "degrees")
 
     def _choose_convention(self) -> None:
-        """Make the shapes transparent while a table is shown, because frames of the table are inside them."""
+        """Make shapes transparent while a table is shown, because frames of the table are inside shapes."""
         with self._lock:
             shown = self.dh.value != "none"
             if self.shapes.value == (SOLID if shown else SEE_THROUGH):
@@ -483,7 +459,6 @@ class Viewer:
             self._choose()
 
     def _choose(self) -> None:
-        """Apply a new frame, reference or convention; derive and check the DH table for them."""
         with self._lock:
             self._table, words = None, ""
             if self.dh.value != "none":
@@ -492,7 +467,7 @@ class Viewer:
                     words = f"{self._table.base_frame} to {self._table.tip_frame}"
                 except UrdfkinError as error:
                     words = str(error)
-            # Viser would read images even in Markdown's code, so all characters are escaped.
+            # Viser would load images even inside Markdown code, so all characters are escaped.
             self.dh_words.content = markdown_text(words)
             self.update()
             if self.player is not None:

@@ -39,7 +39,11 @@ _dumps: Any = dumps
 
 
 class KernelCache(_Null):  # type: ignore[misc]
-    """The disk cache of one function; Numba reads it before a compilation and writes it afterwards."""
+    """The disk cache of one function, which Numba reads before a compilation and writes afterwards.
+
+    A function's source file may be in another package, so the name of the cache file also depends on the text
+    of that source file.
+    """
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
         self._folder, self._name, self._begin = folder, function_name(function), begin
@@ -107,7 +111,10 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
 
 
 class InlinedCompiler(_Compiler):  # type: ignore[misc]
-    """A compiler that produces LLVM code for kernels to inline, and no machine code."""
+    """A compiler of functions that only kernels call; it produces LLVM code, but no machine code.
+
+    The functions must not contain closures or array expressions, because the passes for them are skipped.
+    """
 
     def define_pipelines(self) -> list[Any]:
         passes = _Passes("inlined")
@@ -196,8 +203,8 @@ class Kernel:
 
     compiled: Any
 
-    def __init__(self, function: Callable[..., int], arguments: tuple[Any, ...], nogil: bool) -> None:
-        self._function, self._arguments, self._nogil = function, arguments, nogil
+    def __init__(self, function: Callable[..., int], arguments: tuple[Any, ...]) -> None:
+        self._function, self._arguments = function, arguments
         self.__doc__, self.__name__ = function.__doc__, function.__name__
 
     def __getattr__(self, name: str) -> Any:
@@ -210,7 +217,7 @@ class Kernel:
             return self.__dict__["compiled"]
 
     def _compile(self) -> Any:
-        dispatcher = jitted(nogil=self._nogil)(self._function)
+        dispatcher = jitted(nogil=True)(self._function)
         self._compile_or_load(dispatcher, lambda: dispatcher.compile(types.int64(*self._arguments)))
         dispatcher.disable_compile()
         return dispatcher
@@ -229,10 +236,13 @@ class Kernel:
 
 
 class Core(Kernel):
-    """A compiled function of integers for callers in C; calls from Python release the interpreter lock."""
+    """A compiled function with integer arguments that C code can call.
+
+    A call from Python releases the global interpreter lock, because the call uses ctypes.
+    """
 
     def __init__(self, function: Callable[..., int]) -> None:
-        super().__init__(function, (types.int64,) * function.__code__.co_argcount, nogil=True)
+        super().__init__(function, (types.int64,) * function.__code__.co_argcount)
 
     def _compile(self) -> Any:
         core: Any = CFunc(self._function, (self._arguments, types.int64), {}, COMPILED)
@@ -251,6 +261,6 @@ def helper(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     return jitted(**_INLINED, **options)
 
 
-def kernel(*arguments: Any, nogil: bool = True) -> Callable[[Callable[..., int]], Kernel]:
-    """Return a decorator for a kernel with these Numba types of arguments."""
-    return lambda function: Kernel(function, arguments, nogil)
+def kernel(*arguments: Any) -> Callable[[Callable[..., int]], Kernel]:
+    """Return a decorator for kernels whose arguments have these Numba types."""
+    return lambda function: Kernel(function, arguments)

@@ -122,7 +122,11 @@ def _concatenate(builder: Any, pieces: Sequence[Any]) -> Any:
 
 
 def _transpose_blocks(builder: Any, vectors: Sequence[Any]) -> list[Any]:
-    """Transpose each square block of numbers in the matrix whose rows are the given vectors."""
+    """Transpose each square block of numbers in the matrix whose rows are the given vectors.
+
+    The number of vectors is a power of two. Blocks of 2 by 2 numbers are transposed first. To transpose a
+    larger block, the function exchanges the block's upper right quarter with the lower left quarter.
+    """
     x, w = list(vectors), 1
     while w < len(x):
         for i in range(len(x)):
@@ -189,7 +193,11 @@ _write_8, _write_4, _write_2, _write_1 = map(_make_writer, (8, 4, 2, 1))
 
 @compiled
 def read_rows(m, x, at, stride, count, s, row):
-    """Read `count` numbers of each of eight configurations; if `m` is 1, all eight are equal."""
+    """Read `count` numbers of each of eight configurations into rows of scratch memory.
+
+    The numbers of configuration k begin at `x[at + k * stride]`. If `m` is 1, the numbers of the first
+    configuration are used for all eight configurations.
+    """
     i = 0
     if m == 1:
         for i in range(count):
@@ -327,7 +335,7 @@ def stream(x, count, to, at, address):
     """Copy `count` numbers to `to[at]`, `to[at + 1]` and so on, without writing them to the caches.
 
     A processor reads a cache line before it writes a part of the line, but not before it writes the whole
-    line.
+    line. `address` is the address of `to[0]`.
     """
     edge = -(address // 8 + at) % LANES
     lines = edge + (count - edge) // LANES * LANES

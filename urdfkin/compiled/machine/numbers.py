@@ -7,7 +7,8 @@ decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)` are t
 doubles, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. `nothing()` is the placeholder for a
-number that is not needed. Operations with these constants are simplified at compile time.
+number that is not needed; each operation with `nothing()` gives `nothing()`. Operations with these constants
+are simplified at compile time.
 """
 
 from __future__ import annotations

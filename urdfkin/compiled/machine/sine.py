@@ -2,11 +2,11 @@
 
 Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the rest is in [-pi/4, pi/4]. The
 rounding error of this subtraction is computed too. The polynomials come from fdlibm (Sun Microsystems,
-k_sin.c and k_cos.c). For angles below 2^20 quarter turns, pi/2 is the sum of two doubles. Two doubles are
-enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the cosine is
-near 0, and this small value has an error of up to 1e-27. The C library computes the sine and the cosine of a
-larger angle, but not of the other angles in the vector, so that a result does not depend on other
-configurations.
+k_sin.c and k_cos.c). For angles below 2^20 quarter turns, the sum of two doubles represents pi/2. Two
+doubles are enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the
+cosine is near 0, and this small value has an error of up to 1e-27. The C library computes the sine and the
+cosine of larger angles. Only the larger angles of a vector use the C library. Otherwise, the result of a
+configuration would depend on the other configurations in the vector.
 """
 
 from __future__ import annotations
@@ -66,6 +66,7 @@ def _of_small(context: Any, x: Any) -> Any:
         n = builder.fsub(shifted, all_lanes(NO_FRACTION))
         # Let d be the double nearest to pi/2. If n is not 0, x and n d are multiples of 2^-53.
         # The difference x - n d is then exact, because x and n d differ by less than 1.
+        # If n is 0, the difference is x.
         # The variable `lost` is the rounding error of r, and `z_lost` is the rounding error of z = r^2.
         near = fused(builder, n, all_lanes(-PI_2), x)
         r = fused(builder, n, all_lanes(-PI_2_REST), near)

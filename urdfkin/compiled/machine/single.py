@@ -1,6 +1,7 @@
 """Compute one configuration with compiled functions that Python calls like built-in functions.
 
-CPython passes the addresses of the arguments to a built-in function. The compiled function reads a few 8-byte
+In a call through Numba, checking the arguments takes as long as the recursion itself. CPython only passes the
+addresses of the arguments to a built-in function. The compiled function reads a few 8-byte
 words of each array object, at the offsets that CPython and NumPy guarantee to C code. The function holds
 Python's global interpreter lock for about a microsecond. For unsupported arguments, the function returns
 None.
@@ -201,8 +202,9 @@ def single(
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
     """Return a function that computes a quantity for one configuration, and the kernel's arguments.
 
-    The compiled tree must have only one frame, and the base must be fixed. The function that is returned
-    gives None for unsupported arguments.
+    The compiled tree must have only one frame, and the base must be fixed. The returned
+    function returns None for unsupported arguments. The entry `KernelArgs.COUNT` of the kernel's arguments
+    counts the computed results.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes

@@ -19,7 +19,14 @@ from urdfkin.dh.compare.fit import (
     tip_derivatives,
 )
 from urdfkin.dh.compare.mistakes import MistakeSearch
-from urdfkin.dh.compare.result import EXPLAINED, AbsorbedOffset, CellDifference, TableComparison
+from urdfkin.dh.compare.result import (
+    EXPLAINED,
+    TRAVEL,
+    AbsorbedOffset,
+    CellDifference,
+    TableComparison,
+    has_range,
+)
 from urdfkin.dh.convert import free_tree, link_names, serial_tree, to_convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference
@@ -29,30 +36,22 @@ from urdfkin.model.configuration import values_within
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, is_bounded
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
-#: Default tolerance of the tip's position (metres).
-#: It covers the effect of one or two cells that are rounded to 0.1 mm.
+#: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
 TOLERANCE = 2e-4
-#: Number of sampled configurations for the fit, and for the check of the fit.
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
 #: Differing cells are reported only if their correction reduces the tip error to this fraction.
 _CORRECTED = 0.5
-#: A single mistake is reported only if its correction reduces the tip error to this fraction, or to the
-#: tolerance.
+#: The correction of a mistake must reduce the tip error to this fraction, or to the tolerance.
 _MISTAKE_CORRECTED = 0.05
-#: Smallest reported change of a cell, relative to the reach (a tenth of `EXPLAINED`).
 _LEAST_CHANGE = 1e-10
-#: The cells that differ without a fit are reported unless they exceed the cells after a fit by more than this
-#: number.
+#: The list of differing cells without a fit may have this many more cells than the list after a fit.
 _MORE_CELLS = 2
-#: The diameter of the tip's positions is used as the reach if it is at least this fraction of the path
-#: length.
+#: If the tip moves by less than this fraction of the path length, the reach is the path length.
 _FIXED_TIP = 1e-6
-#: Range of a prismatic joint without limits (metres).
-_SLIDE = (-0.5, 0.5)
-#: For each row, the rounding error (metres or radians) of each cell: half a unit of its last digit.
+#: Half a unit of the last digit (metres or radians) of each cell, for each row.
 Digits = Sequence[Mapping[str, float]]
 
 
@@ -64,19 +63,10 @@ def compare(
     fit: bool = True,
     digits: Digits = (),
 ) -> TableComparison:
-    """Compare a reference table with a path of a URDF.
+    """Compare a reference table with a path of a URDF; `tolerance` is the tolerance at the tip (metres).
 
-    Args:
-        chain: The path, from base to tip. The table may have other base and tip frames than the path, if they
-            are fixed to the same links.
-        reference: The table in either convention, with a row for each moving joint in the path's order.
-        tolerance: Tolerance at the tip (metres).
-        fit: Whether to fit base, tool, joint offsets and joint signs. If False, the table is compared as it
-            is written.
-        digits: Precision of each cell in the table's file (`urdfkin.dh.rows.last_digits`).
-
-    Raises:
-        InputError: the table and the path differ in the number or in the kinds of their joints.
+    The table may have other base and tip frames than the path, if they are fixed to the same links. If `fit`
+    is true, base, tool, joint offsets and joint signs are fitted before the comparison.
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -127,10 +117,9 @@ def compare(
 
 
 def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tuple[float, float]:
-    """Return the largest tip error on samples (metres, radians) after a fast fit of the free parameters.
+    """Return the largest tip error on samples (metres, radians) after a fast fit.
 
-    The fit tries only a few combinations of joint signs, and stops when the tip error is at most `enough`
-    (metres). If the joints differ in number or kind, InputError is raised.
+    The fit stops at a tip error of at most `enough` (metres).
     """
     check_joints(chain, reference)
     standard = to_convention(reference, DHConvention.STANDARD)
@@ -141,9 +130,7 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tup
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach (metres); angles are multiplied by it to compare them with lengths.
 
-    The reach is twice the largest distance of a tip position from the mean position. If the path length is
-    shorter, or if the tip hardly moves, the reach is the path length. The path length is not always used,
-    because it may be kilometres in a URDF that was made from a table without Hayati rows.
+    The path length may be kilometres in a URDF that was made from a table without Hayati rows.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -151,12 +138,7 @@ def _reach(chain: FrameChain, poses: FloatArray) -> float:
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
-    """Check that a table and a path have the same number (at least one) and the same kinds of joints.
-
-    Raises:
-        InputError: the joints are different.
-        RangeError: the square of a length is outside the range of doubles.
-    """
+    """Raise InputError if the joint kinds of table and path differ, or if both have no joints."""
     in_table, in_urdf = (
         "".join("R" if item.kind.turns else "P" for item in items) for items in (reference.rows, chain.joints)
     )
@@ -178,18 +160,19 @@ def _target_poses(chain: FrameChain) -> tuple[TargetPoses, TargetPoses]:
 
 
 def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return random joint values (count, n), and the tip's poses at these values; mimic rules are ignored."""
-    slides = _slides(chain)
-    ranges = [slides.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
+    """Return random joint values (count, n) and the tip's poses, without mimic rules."""
+    travels = _travels(chain)
+    ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
     values = values_within(ranges, count, seed)
     free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
     return values, free.placement(values)
 
 
-def _slides(chain: FrameChain) -> dict[str, tuple[float, float]]:
+def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
+    """Return the range (m) of each prismatic joint."""
     limits = {joint.name: joint.limit for joint in chain.joints if not joint.kind.turns}
     return {
-        name: (limit.lower, limit.upper) if is_bounded(limit) and limit.lower < limit.upper else _SLIDE
+        name: (limit.lower, limit.upper) if has_range(limit) else (-TRAVEL, TRAVEL)
         for name, limit in limits.items()
     }
 
@@ -208,16 +191,13 @@ def _absorbed_offset(written: FloatArray, fitted: FloatArray) -> AbsorbedOffset:
 
 
 def _reference_row(reference: DHTable, i: int, cell: str) -> int | None:
-    """Return the index of the reference row that contains a cell of row i of the standard table, or None.
-
-    If the reference is modified, it contains a, alpha and beta in row i + 1.
-    """
+    """Return the index of the reference row that contains a cell of standard row i; None if no row does."""
     at = i + (reference.convention is DHConvention.MODIFIED and cell not in ("theta", "d"))
     return at if at < len(reference.rows) else None
 
 
 def _mask(reference: DHTable) -> FloatArray:
-    """Return an (n, 5) mask of cells in standard rows: 1 if the reference table contains the cell, else 0."""
+    """Return an (n, 5) mask of cells in standard rows: 1 if the reference contains the cell, else 0."""
     rows = range(len(reference.rows))
     return np.array([[float(_reference_row(reference, i, cell) is not None) for cell in CELLS] for i in rows])
 
@@ -225,10 +205,7 @@ def _mask(reference: DHTable) -> FloatArray:
 def _hidden(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of each cell with the same effect on the tip as base, tool or joint offsets.
-
-    Cells beta with the value 0 are not included.
-    """
+    """Return row and name of each cell whose error base, tool or joint offsets can compensate."""
     hidden = []
     for i, k in hidden_cells(fitted, check_targets):
         at = _reference_row(reference, i, CELLS[k])
@@ -246,7 +223,7 @@ def _differences(
     digits: Digits,
     free: bool,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ by more than rounding, in descending order of their effect on the tip."""
+    """Return the cells that differ by more than rounding, the largest effect on the tip first."""
     by_cells, scale = tip_derivatives(fitted, check_targets)[2], check_targets.scale
     linear = by_cells.reshape(len(check_targets.values), 6, len(fitted.cells), len(CELLS))[:, :3]
     largest = np.linalg.norm(linear, axis=1).max(axis=0)
@@ -274,7 +251,7 @@ def _differences_without_fit(
     check_targets: TargetPoses,
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ without a fit; () if correcting these cells leaves a tip error."""
+    """Return the cells that differ without a fit; () if correcting them leaves a tip error."""
     corrected = fit_cells(written, targets, _mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > EXPLAINED * targets.scale or radians > EXPLAINED:
@@ -283,7 +260,6 @@ def _differences_without_fit(
 
 
 def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> DHTable:
-    """Return the fitted reference table, with the joint names and limits of the URDF."""
     rows = []
     for i, (row, joint) in enumerate(zip(standard.rows, chain.joints, strict=True)):
         theta, d = fitted.cells[i, :2].tolist()
@@ -295,11 +271,10 @@ def _fitted_table(chain: FrameChain, standard: DHTable, fitted: TableArrays) -> 
 
 
 def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]:
-    """Return an upper bound of a table's tip error (metres, radians) for every configuration.
+    """Return an upper bound of a table's tip error (metres, radians) for all joint values.
 
-    The bound does not include rounding errors. Mimic rules are ignored. The path and the table are converted
-    to two mechanisms with the same joints, and the difference of the mechanisms is bounded as in `urdfkin
-    same`.
+    The bound does not include rounding errors, and mimic rules are ignored. Prismatic joints are within their
+    limits, or within `TRAVEL` of zero if they have no limits.
     """
     mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)
@@ -311,11 +286,11 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
 
 def _free(path: FrameChain, table: DHTable) -> KinematicTree:
     """Return a path as a tree without mimic rules, with the link names of the table."""
-    slides, z = _slides(path), np.array([0.0, 0.0, 1.0])
+    travels, z = _travels(path), np.array([0.0, 0.0, 1.0])
     joints = []
     for joint in path.joints:
         kind = JointKind.CONTINUOUS if joint.kind.turns else JointKind.PRISMATIC
-        limit = Limit(*slides[joint.name], math.inf, math.inf) if joint.name in slides else None
+        limit = Limit(*travels[joint.name], math.inf, math.inf) if joint.name in travels else None
         joints.append(Joint(joint.name, kind, 0, joint.T_previous_joint, z, limit))
     joints.append(replace(free_tree(table).joints[-1], T_parent_joint=path.T_last_tip))
     return serial_tree(path.robot, link_names(table), joints)

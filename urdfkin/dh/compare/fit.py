@@ -5,10 +5,9 @@ twist. A small change of any number in the table also moves the tip by a twist, 
 changes that remove the error. If changes of different cells can remove the same error, reweighted least
 squares change as few cells as possible.
 
-Two joints with nearly coinciding axes have nearly the same effect on the tip. An angle that is added to one
-joint offset and subtracted from the other hardly moves the tip, so a fit changes such offsets slowly. When
-the error no longer decreases, `fit_free_parameters` changes two such offsets by a large angle, and fits
-again.
+If the axes of two joints nearly coincide, an angle that is added to one joint offset and subtracted from the
+other hardly moves the tip, so a fit changes such offsets slowly. When the error no longer decreases,
+`fit_free_parameters` changes two such offsets by a large angle, and fits again.
 """
 
 from __future__ import annotations
@@ -30,7 +29,6 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, pose
 
-#: Elementary motion that each cell of a row describes, in the order of the transforms.
 _MOTIONS = {
     "theta": ElementaryMotion(2, True),
     "d": ElementaryMotion(2, False),
@@ -40,29 +38,21 @@ _MOTIONS = {
 }
 CELLS = tuple(_MOTIONS)
 _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
-#: Longest step of a fit, in radians for angles, and in metres per metre of reach for lengths.
+#: Longest step of a fit (rad, or metres per metre of reach).
 _LONGEST_STEP = 0.5
-#: Maximum number of steps in the fit of the cells.
 _MAX_STEPS = 40
-#: Smallest relative decrease of the error that counts as an improvement.
 _LEAST_DECREASE = 1e-9
 #: Mean error, relative to the reach, at which the fit of the cells ends.
 _SOLVED = 1e-14
-#: Relative cutoffs for singular values: in the fit of the free parameters, and in the fit of the cells.
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
-#: Number of times that the weights of the cells are recomputed.
 _REWEIGHTINGS = 25
-#: Smallest weight of a table cell, as a fraction of the robot's reach.
 _LEAST_WEIGHT = 1e-9
-#: Initial weight of the last cell; initial weights increase linearly from 1 at the first cell.
-#: Because these weights differ, the fit changes only one of two cells with the same effect on the tip.
+#: Initial weights increase from 1 to this number, so that only one of two equivalent cells changes.
 _LAST_WEIGHT = 1.2
-#: Initial weight of beta, and the factor that reduces it at each reweighting.
-#: With a small weight, beta changes only if a change of alpha is not enough.
+#: Initial weight of beta, and its factor at each reweighting.
+#: Both are small, so that beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
-#: Largest relative difference between two effects on the tip that are treated as equal.
 _SAME_EFFECT = 1e-6
-#: Number of consecutive steps with little improvement after which the fit of the free parameters ends.
 _PATIENCE = 4
 #: Below this mean error, relative to the reach, joint offsets are not changed by large angles.
 _ROUNDING = 1e-13
@@ -78,15 +68,7 @@ FAST_SEARCH = (3, 16)
 
 @dataclass(frozen=True)
 class TableArrays:
-    """The numbers of a standard table, as arrays for a fit.
-
-    Attributes:
-        cells: (n, 5) theta, d, a, alpha, beta of each row.
-        turns: (n,) 1 for revolute rows, 0 for prismatic rows.
-        senses: (n,) +1 or -1.
-        base: (4, 4) T_base_0 (metres).
-        tool: (4, 4) T_n_tip (metres).
-    """
+    """Numbers of a standard table; the columns of `cells` (n, 5) are theta, d, a, alpha and beta."""
 
     cells: FloatArray
     turns: FloatArray
@@ -106,7 +88,7 @@ class TableArrays:
 
     @cached_property
     def first(self) -> FloatArray:
-        """(4, 4) pose of the first revolute joint's frame relative to frame 0, with all joints at zero."""
+        """(4, 4) pose of the first revolute joint's frame in frame 0, with all joints at zero."""
         turning = np.flatnonzero(self.turns)
         end = len(CELLS) * int(turning[0]) if turning.size else 0
         return Path((np.eye(4), *self._motions[:end])).poses(self.cells.ravel()[:end])
@@ -128,7 +110,7 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and (s, 5 n) angles and lengths of its motions.
+        """Return the path from base to tip, and the angles and lengths (s, 5 n) of its motions.
 
         `values` (s, n) contains the joint values of s samples.
         """
@@ -144,13 +126,7 @@ class TableArrays:
 
 @dataclass(frozen=True, slots=True)
 class TargetPoses:
-    """The poses that the tip of the table should have: those of the URDF's tip.
-
-    Attributes:
-        values: (s, n) joint values of the URDF in s samples.
-        poses: (s, 4, 4) poses of the URDF's tip at these values.
-        scale: Length (metres) that converts radians to metres.
-    """
+    """Poses of the URDF's tip at the joint `values` (s, n); `scale` (m) converts radians to metres."""
 
     values: FloatArray
     poses: FloatArray
@@ -173,9 +149,8 @@ def tip_derivatives(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the tip's poses, and their derivatives (twists) by the free parameters and by the cells.
 
-    The derivatives have six rows for each sample. The free parameters have six columns for the base, six for
-    the tool, and one for the joint offset of each row. The columns of the cells are in row order. Angles are
-    multiplied by the scale. `frames` are the poses of all frames at all samples; if None, they are computed.
+    The derivatives have the shapes (6 s, 12 + n) and (6 s, 5 n). The free parameters have 6 columns for the
+    base, 6 for the tool, and 1 for each joint offset. Angles are multiplied by the scale.
     """
     scale = targets.scale
     path, amounts = model.path_at(targets.values)
@@ -192,10 +167,7 @@ def tip_derivatives(
 
 
 def _frame_twists(poses: FloatArray, frames: FloatArray, scale: float) -> FloatArray:
-    """Return the twists (6 s, 6) of the tip if the chain after a frame is translated or rotated.
-
-    The first three columns are translations along the axes of the frame, the last three rotations about them.
-    """
+    """Return the tip's twists (6 s, 6) for translations along and rotations about the axes of a frame."""
     arm = poses[:, :3, 3] - frames[:, :3, 3]
     axes = np.swapaxes(frames[:, :3, :3], 1, 2)
     twists = np.zeros((len(poses), 6, 6))
@@ -229,11 +201,7 @@ def _with_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 
 
 def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, free: bool) -> TableArrays:
-    """Fit the table to the URDF with the fewest and smallest changes of cells.
-
-    `mask` (n, 5) is 1 for cells that may change, and 0 for all other cells. If `free` is true, base, tool and
-    joint offsets may change too.
-    """
+    """Fit the table, with changes of few cells; `mask` (n, 5) is 1 for cells that may change."""
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
         poses, by_free, by_cells = tip_derivatives(model, targets)
@@ -261,7 +229,7 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes of cells that remove the error; as few cells as possible then differ from `start`.
+    """Return changes that remove the error; as few cells as possible then differ from `start`.
 
     A cell does not change if a free parameter, for example the joint offset of its row, has the same effect.
     """
@@ -283,15 +251,11 @@ def _sparse_changes(
 
 
 def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the column space; an empty basis if all columns are zero."""
     return np.linalg.qr(by_free)[0] if by_free.any() else np.zeros((len(by_free), 0))
 
 
 def hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of each cell that the tip's poses do not determine.
-
-    A change of such a cell moves the tip in the same way as some change of the free parameters.
-    """
+    """Return (row, cell index) of each cell whose effect on the tip the free parameters can reproduce."""
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
     remaining = np.linalg.norm(by_cells - Q @ (Q.T @ by_cells), axis=0)
@@ -310,11 +274,7 @@ def fitted_model(
     *,
     fast: bool = False,
 ) -> TableArrays:
-    """Fit the free parameters, and return the best fit; stop at a tip error of at most `enough` (metres).
-
-    The fits start from the written table, and from tables with other joint signs or directions of x. A fit
-    from one of the other tables is used only if it halves the smallest error so far.
-    """
+    """Fit the free parameters; stop at a tip error of at most `enough` (metres)."""
     written = TableArrays.of(standard)
 
     def size(model: TableArrays) -> float:
@@ -337,7 +297,6 @@ def fitted_model(
 
 
 def with_end_offsets_in_base_and_tool(model: TableArrays, written: TableArrays) -> TableArrays:
-    """Move the fitted offset of the first joint into the base, and that of the last joint into the tool."""
     cells, n = model.cells.copy(), len(model.cells)
     _, _, a, alpha, beta = cells[-1]
     X = between_axes(a, alpha, beta)
@@ -355,7 +314,7 @@ def with_end_offsets_in_base_and_tool(model: TableArrays, written: TableArrays) 
 
 
 def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator[TableArrays]:
-    """Yield the table as it is written, then the table with each likely combination of joint signs."""
+    """Yield the written table, then the table with each likely combination of joint signs."""
     yield TableArrays.of(standard)
     for alignment in align(chain, replace(standard, base=np.eye(4), tool=np.eye(4)), *effort):
         senses = np.array(alignment.senses, dtype=np.float64)
@@ -367,10 +326,7 @@ def start_models(chain: FrameChain, standard: DHTable, *effort: int) -> Iterator
 def fit_free_parameters(
     model: TableArrays, targets: TargetPoses, *, large_angles: bool, only_ends: bool = False
 ) -> TableArrays:
-    """Fit base, tool and joint offsets, or only base and tool.
-
-    If `large_angles` is true, two joint offsets change by a large angle when the error stops decreasing.
-    """
+    """Fit base, tool and joint offsets, or only base and tool if `only_ends` is true."""
     for _ in range(2 * len(model.cells)):
         model, size = _least_squares_fit(model, targets, only_ends)
         if not large_angles or size <= _ROUNDING * targets.scale * math.sqrt(6 * len(targets.values)):
@@ -408,10 +364,7 @@ def _least_squares_fit(
 
 
 def _with_large_angles(model: TableArrays) -> list[TableArrays]:
-    """Return models with an angle added to one joint offset and subtracted from the next joint offset.
-
-    If the axes of the two joints nearly coincide, this change has little effect on the tip.
-    """
+    """Return models with an angle added to one joint offset and subtracted from the next joint offset."""
     models = []
     for i in range(len(model.cells) - 1):
         sense = math.copysign(1.0, math.cos(float(model.cells[i, CELLS.index("alpha")])))

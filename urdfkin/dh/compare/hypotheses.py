@@ -1,8 +1,8 @@
 """Find another convention, other units or other column names with which a table agrees with a URDF.
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
-robot a different shape; the shape consists of the distances and angles between consecutive axes, and the
-offsets along these axes. `diagnose` fits only the few interpretations with a shape close to the URDF's shape.
+robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
+`diagnose` fits only the few interpretations with a shape close to the URDF's shape.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from urdfkin.errors import InputError, QuestionsSection, RangeError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Maximum number of interpretations that are fitted.
 _MOST_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL = 2e-2
@@ -35,22 +34,17 @@ _PARALLEL = 2e-2
 _DIFFERENCE_COST = 0.1
 #: Largest tip error of a better interpretation, as a fraction of the original tip error and of the reach.
 _BETTER = 0.05
-#: Keys of a row that `diagnose` uses; it ignores limits and mimic rules.
+#: `diagnose` ignores all other keys of a row, such as limits and mimic rules.
 _CELLS = ("joint", "kind", "sense", "beta", *COLUMNS)
 #: `diagnose` ignores these keys of a table, because it fits base and tool.
 _ENDS = ("base", "tool", "coordinates")
-#: Plausible lengths of an arm (metres)
+#: Plausible lengths of an arm (metres).
 _LONGEST, _SHORTEST = 20.0, 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class BetterInterpretation:
-    """Another interpretation of a table, with which the table agrees with the URDF.
-
-    Attributes:
-        stated: The interpretation that the file of the table states.
-        metres, radians: Largest errors of the tip on the samples, after a fit of base, tool and offsets.
-    """
+    """Another interpretation of a table, with the largest tip errors on samples after a fit."""
 
     interpretation: Interpretation
     stated: Interpretation
@@ -79,9 +73,9 @@ def diagnose(
 ) -> BetterInterpretation | None:
     """Return the interpretation with which a table agrees with a URDF; None if there is none.
 
-    `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` is the
-    tip error of the table as its file states it, and `tolerance` is the tolerance at the tip (metres). With
-    the returned interpretation, the tip error is at most 5 % of `stated_error`, or within `tolerance`.
+    `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
+    is the tip error of the table as its file states it. With the returned interpretation, the tip error is at
+    most 5 % of `stated_error`, or within `tolerance` (metres).
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = shape(derive(chain, Choices(last="flange")), chain.reach)
@@ -117,12 +111,9 @@ def diagnose(
 def convention_that_fits(
     chain: FrameChain, data: Mapping[str, Any], tolerance: float, where: str = "table"
 ) -> DHConvention:
-    """Find the convention of a table that states no convention, by a comparison of the table with a path.
+    """Return the convention with which a table fits a path better.
 
-    `tolerance` is the tolerance at the tip (metres).
-
-    Raises:
-        InputError: both conventions fit equally well, or neither convention fits, even in other units.
+    InputError is raised if both conventions fit equally well, or if neither fits, even in other units.
     """
     comparisons = dict[DHConvention, TableComparison]()
     errors = list[InputError]()
@@ -159,9 +150,8 @@ def convention_that_fits(
 def shape(table: DHTable, scale: float) -> FloatArray:
     """Return offset, distance and angle (times `scale`) of each pair of consecutive axes.
 
-    The offset is measured along the first of the two axes; offsets along parallel axes are summed. Joint
-    signs, joint offsets, base and tool do not change the result. Numbers that depend on free choices are set
-    to 0: distances and offsets next to a prismatic axis, and the offset along the first axis of the path.
+    Joint signs, joint offsets, base and tool do not change the result. Numbers that depend on free choices
+    are 0: all lengths next to a prismatic axis, and the offset along the first axis of the path.
     """
     rows = to_convention(table, DHConvention.STANDARD).rows
     numbers, offset, is_defined = list[float](), 0.0, False
@@ -182,13 +172,7 @@ def shape(table: DHTable, scale: float) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Interpretation:
-    """Convention, units and columns of a table.
-
-    Attributes:
-        convention: Standard or modified; None if the table names no convention.
-        columns: Quantities that the columns with the headings a, alpha, d and theta contain. If the table has
-            no headings: quantities that the four columns contain.
-    """
+    """Convention, units, and the true contents of the columns a, alpha, d and theta."""
 
     convention: DHConvention | None
     lengths: Lengths
@@ -204,7 +188,7 @@ class Interpretation:
         return table_from_mapping({**rest, **stated, "rows": rows})
 
     def difference_count(self, other: Interpretation) -> int:
-        """Return the number of differences; two exchanged columns are counted as one difference."""
+        """Return the number of differences; two exchanged columns count as one difference."""
         columns = sum(mine != theirs for mine, theirs in zip(self.columns, other.columns, strict=True))
         return len(self._convention_and_units(other)) + (columns + 1) // 2
 
@@ -216,13 +200,11 @@ class Interpretation:
         return ", ".join(names)
 
     def _convention_and_units(self, other: Interpretation) -> list[str]:
-        """Return which of convention and units differ between this interpretation and another one."""
         mine, theirs = ((one.convention, one.lengths, one.angles) for one in (self, other))
         return [str(name) for name, other_name in zip(mine, theirs, strict=True) if name is not other_name]
 
 
 def stated_interpretation(data: Mapping[str, Any]) -> Interpretation:
-    """Return the interpretation that a file states; raise InputError for an unknown convention or unit."""
     units = units_of(data.get("angles", "radians"), data.get("lengths", "metres"))
     convention = convention_of(data["convention"]) if "convention" in data else None
     return Interpretation(convention, units.lengths, units.angles)
@@ -245,14 +227,7 @@ def other_interpretations(data: Mapping[str, Any]) -> Iterator[tuple[Interpretat
 
 
 def table_warnings(table: DHTable) -> list[str]:
-    """Return warnings about units or columns that look wrong, each with a remedy.
-
-    Most angles of an arm are multiples of 30 degrees, and lengths hardly ever look like such angles.
-
-    >>> from urdfkin.dh.rows import table_from_rows
-    >>> table_warnings(table_from_rows([[425, 0, 0, 0], [392.25, 0, 0, 0]], "standard"))
-    ["lengths up to 425 m look like millimetres: if they are millimetres, write lengths = 'millimetres'"]
-    """
+    """Return warnings about units or columns that look wrong, each with a remedy."""
     warnings = []
     columns = {name: [getattr(row, name) for row in table.rows if getattr(row, name)] for name in COLUMNS}
     lengths = [abs(length) for length in (*columns["a"], *columns["d"])]

@@ -1,8 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
 A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. After the
-cell is corrected, the table agrees with the URDF after a smaller fit, or without a fit. `MistakeSearch` tries
-each single correction, and reports the corrections that leave the fewest parameters to fit.
+cell is corrected, the table agrees with the URDF after a smaller fit, or without a fit.
 """
 
 from __future__ import annotations
@@ -32,16 +31,14 @@ from urdfkin.kinematics.rotation import log_rotation, polar_factor
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
-#: Largest difference (rad) between two angles that are treated as equal.
 _SAME_ANGLE = 1e-9
-#: Joint offsets and joint signs are fitted only if there are at most this many corrections.
-#: A table of nine rows has about this number of possible corrections.
+#: With more possible corrections, joint offsets and joint signs are not fitted.
 _MOST_FITS = 100
 
 
 @dataclass(frozen=True, slots=True)
 class _TableCorrection:
-    """A table in which one possible mistake is corrected; `cell` is None if the correction exchanges rows."""
+    """A table with one correction; `cell` is None if the correction exchanges rows."""
 
     kind: MistakeKind
     rows: tuple[int, ...]
@@ -51,13 +48,7 @@ class _TableCorrection:
 
 @dataclass(frozen=True, slots=True)
 class MistakeSearch:
-    """A search for a single mistake in the table of a path.
-
-    Attributes:
-        targets: Samples of the path's tip poses, used in the fits.
-        check_targets: Other samples of the path's tip poses, used to check the fits.
-        tolerance: Tolerance at the tip (metres).
-    """
+    """A search for a single mistake in a table; `tolerance` is the tolerance at the tip (metres)."""
 
     chain: FrameChain
     targets: TargetPoses
@@ -67,11 +58,9 @@ class MistakeSearch:
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
         """Return the mistakes whose correction leaves the fewest parameters to fit.
 
-        The result is empty if no correction reduces the number of these parameters. If `fit` is true, base,
-        tool, joint offsets and joint signs may be fitted after a correction. `agrees` is true if the table
-        agrees after a fit of these parameters. A table that agrees may be correct and differ from the URDF
-        only in its frames. Therefore, its corrections are reported only if they need no fit, or a fit of only
-        the base or only the tool.
+        The result is empty if no correction reduces the number of these parameters. A table that `agrees`
+        after a fit may be correct and differ from the URDF only in its frames. Corrections of such a table
+        are reported only if they need no fit, or a fit of only the base or only the tool.
         """
         if self._as_written(reference) is not None:
             return ()
@@ -192,7 +181,7 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # The reverse order of three rows is an exchange of the first and the last row, which is tried above.
+    # For three rows, the reverse order is the exchange of the first and the last row.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))
@@ -213,7 +202,7 @@ def _with_cell(table: DHTable, i: int, cell: str, value: float) -> DHTable:
 
 
 def _mean(poses: FloatArray) -> FloatArray:
-    """Return the (4, 4) mean of nearly equal poses, or the first pose if the mean is not a rotation."""
+    """Return the (4, 4) mean of nearly equal poses."""
     mean = poses.mean(axis=0)
     R = polar_factor(mean[:3, :3])
     return pose(R, mean[:3, 3]) if np.linalg.det(R) > 0.0 else np.array(poses[0])

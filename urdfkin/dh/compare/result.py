@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeGuard
 
 import numpy as np
 
@@ -15,33 +16,29 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import QuestionsSection
 from urdfkin.errors.display import Matrix, Table, TextDocument
 from urdfkin.kinematics.roundings import EPS, of_a_fit
+from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: Largest tip error that may remain after the differing cells are corrected.
-#: The unit is rad for angles, and metres per metre of reach for positions.
+#: Tip error (rad, or metres per metre of reach) that may remain after the differing cells are corrected.
 #: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
 EXPLAINED = 1e-9
+#: Largest distance (m) from zero that is assumed for a prismatic joint without limits.
+TRAVEL = 0.5
 #: Finest resolution of printed fitted numbers (rad, or metres per metre of reach).
 _FINEST = 1e-12
-#: Largest difference that rounding can cause, as a multiple of half a unit of the last digit.
-#: The number exceeds 1 because doubles cannot represent most decimal numbers exactly.
+#: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
 _HALF = 1.0 + 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class CellDifference:
-    """One cell of a published table that differs from the URDF's value.
+    """One cell of a published table that differs from the URDF's value (metres or radians).
 
     Attributes:
-        row: Index of the row in the reference table, from 0.
-        joint: Name of the joint in the URDF.
-        cell: "a", "alpha", "d", "theta" or "beta".
-        reference: The table's value (metres or radians).
-        urdf: The URDF's value (metres or radians).
-        tip: Largest displacement (metres) of the tip in the sampled configurations if only this cell differs.
-        last_digit: Half a unit of the value's last digit in the table's file (metres or radians). 0 if the
-            value is exact, or if its text is unknown.
+        tip: Largest displacement (metres) of the tip on the samples if only this cell differs.
+        last_digit: Half a unit of the last digit of `reference`; 0 if the value is exact or its text is
+            unknown.
     """
 
     row: int
@@ -85,12 +82,7 @@ class MistakeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """The parameters that a fit must change so that a table agrees with the URDF.
-
-    Attributes:
-        zeros: Number of joints whose zero position the fit changed.
-        reversed: Number of joints whose positive direction the fit changed.
-    """
+    """Parameters that a fit must change; `zeros` and `reversed` are numbers of joints."""
 
     base: bool = False
     tool: bool = False
@@ -112,12 +104,7 @@ class Fitted:
 class Mistake:
     """A likely mistake in a table: after its correction, fewer other parameters must be fitted.
 
-    Attributes:
-        rows: Indices of the changed rows, from 0.
-        cell: The changed cell; None if rows are exchanged.
-        table: The table after the change.
-        fitted: The parameters that must still be fitted after the change.
-        metres, radians: Largest errors of the tip on the samples after the change.
+    `table`, `fitted` and the tip errors `metres` and `radians` are those after the correction.
     """
 
     kind: MistakeKind
@@ -136,25 +123,17 @@ class TableComparison:
     Attributes:
         reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
             offsets. The method `placement` of this table accepts the coordinates of the URDF.
-        reach: Reach of the robot (metres). Angles are multiplied by the reach to compare them with lengths.
-        fitted: Whether base, tool, joint signs and joint offsets were fitted.
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
-        offsets: Offset of each joint (radians or metres).
         metres, radians: Largest errors of the fitted table's tip on the samples.
-        most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all joint
-            values. The bounds do not include rounding errors.
+        most_metres, most_radians: Proven upper bounds of the errors of the fitted table's tip for all angles,
+            and for all displacements within limits. A prismatic joint without limits is assumed to be within
+            0.5 m of zero. The bounds do not include rounding errors.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
-        differences: The cells that differ, in descending order of their effect at the tip. If exactly one
-            mistake is likely, the only entry is the cell of this mistake.
-        instead: The cells that would have to change if base, tool, joint signs and joint offsets were not
-            fitted; empty if this would change too many cells, or would not remove the tip error.
-        hidden: Row index and name of each cell whose value the tip's poses do not determine, because base,
-            tool and joint offsets compensate for every change.
-        mistakes: The likely mistakes: those whose corrections leave the fewest parameters to fit.
+        instead: The cells that would have to change without a fit; empty if this would change too many cells,
+            or would not remove the tip error.
+        hidden: Row index and name of each cell whose error base, tool and joint offsets can compensate.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
-        tolerance: Tolerance at the tip (metres).
-        samples: Number of configurations at which the fitted table was checked.
     """
 
     reference: DHTable
@@ -199,7 +178,10 @@ class TableComparison:
 
     @property
     def exact(self) -> bool:
-        """Whether the table is proven to differ from the URDF only by rounding, in every configuration."""
+        """Whether the table is proven to differ from the URDF only by rounding.
+
+        The proof covers the same joint values as `most_metres`.
+        """
         return self.most_metres <= self.rounding * self.reach and self.most_radians <= self.rounding
 
     @property
@@ -208,10 +190,15 @@ class TableComparison:
         return self.written_metres <= self.rounding * self.reach and self.written_radians <= self.rounding
 
 
+def has_range(limit: Limit | None) -> TypeGuard[Limit]:
+    """Return whether a prismatic joint's limits allow more than one value, and are finite."""
+    return is_bounded(limit) and limit.lower < limit.upper
+
+
 def resolution(share: float, radians: float) -> float:
     """Return the power of ten to which fitted numbers are rounded: at least twice the tip error.
 
-    `share` is the position error of the tip in metres per metre of reach; `radians` is the orientation error.
+    `share` is the position error of the tip in metres per metre of reach.
     """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
 
@@ -225,7 +212,9 @@ def document(found: TableComparison, units: Units) -> TextDocument:
             " unexplained."
         )
         if not found.fitted:
-            parts.append("The table may have another base frame or tool. Omit --no-fit to fit base and tool.")
+            parts.append(
+                "The table may have a different base frame or tool. Omit --no-fit to fit base and tool."
+            )
     if found.agrees or not found.mistakes:
         parts += _fitted(found, units)
     if not found.agrees:
@@ -256,7 +245,10 @@ def _verdict(found: TableComparison) -> list[str]:
     agrees = "agrees only" if found.mistakes else "agrees exactly" if found.exact else "agrees"
     verdict = agrees if found.agrees else "DIFFERS"
     error = _tip_error(found.metres, found.radians)
-    proof = f"{found.samples} samples; proven bound for all joint values: {_proven(found)}"
+    values = "for all joint values within limits"
+    if free := [row.joint for row in table.rows if not row.kind.turns and not has_range(row.limit)]:
+        values += f", with {', '.join(free)} within {TRAVEL} m of zero"
+    proof = f"{found.samples} samples; proven bound {values}: {_proven(found)}"
     if found.as_written:
         return [f"The table {verdict} without a fit: {path}: {error}", f"({proof})."]
     if not found.fitted:
@@ -373,7 +365,7 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset with the resolution `fine`; write nearly exact multiples of 15 degrees exactly."""
+    """Format an offset with the resolution `fine`; write near-multiples of 15 degrees exactly."""
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

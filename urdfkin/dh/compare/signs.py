@@ -3,8 +3,7 @@
 The author of a table makes three choices that do not change the robot: the positive direction of each joint,
 the direction of x along each common normal, and the zero position of each theta. A sign +1 or -1 represents a
 direction, and the zero positions follow from the signs. Each combination of signs gives a table of the path.
-A beam search extends the combinations joint by joint, and keeps the combinations whose tables differ least
-from the reference table.
+A beam search keeps the combinations whose tables differ least from the reference table.
 """
 
 from __future__ import annotations
@@ -27,18 +26,14 @@ from urdfkin.dh.table import DHRow, DHTable, along_axis, angle_difference
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
 from urdfkin.model.tree import FloatArray
 
-#: Maximum number of alignments that `align` returns.
 PATTERNS = 12
-#: Maximum number of partial alignments that the search keeps at each joint.
 BEAM = 128
-#: Cost (metres) of each reversed joint.
-#: Among equally good alignments, the search therefore selects the joint signs of the URDF.
+#: This cost (metres) of a reversed joint selects the URDF's joint signs among equal alignments.
 _REVERSAL_COST = 1e-9
-#: Weight of length differences next to a prismatic axis; it is small, because this axis can be shifted.
+#: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
 _SLIDING_WEIGHT = 1e-3
-#: Distance (metres) below which two axes are treated as coinciding, so that x can have any direction.
+#: Below this distance (metres), two axes count as coinciding, so that x can have any direction.
 _NO_OFFSET = 1e-5
-#: Number of decimals (metres, radians) in which equivalent alignments agree.
 _DECIMALS = 6
 
 _HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -49,7 +44,7 @@ class SignFit:
     """A combination of joint signs, with the joint offsets, the base and the tool that belong to these signs.
 
     Attributes:
-        senses: +1 or -1 for each joint. With -1, the reference's variable decreases if the URDF's joint value
+        senses: Sign of each joint. With -1, the reference's variable decreases if the URDF's joint value
             increases.
         offsets: Number that is added to theta of each row in the reference (to d for a prismatic joint).
         base: (4, 4) pose of the reference's frame 0 in the URDF's base.
@@ -64,19 +59,15 @@ class SignFit:
 
 @dataclass(frozen=True, slots=True)
 class _PartialAlignment:
-    """Joint signs and offsets for the first joints of the chain; the search extends them joint by joint.
+    """Joint signs and offsets for the first joints of the chain.
 
     Attributes:
-        cost: Sum of the differences between the cells of the two tables, in metres. Differences of angles are
-            multiplied by the reach.
-        senses: Sign (+1 or -1) of each of these joints.
+        cost: Sum of the differences between cells (metres); angles are multiplied by the reach.
         offsets: Offsets of these joints except the last joint.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
         carry: Offset along z from the last joint's DH frame to its URDF frame (metres).
-        base: (4, 4) transform that is multiplied with the base; it contains the offset of the first row.
-        free_offset: Row index and sign of a joint offset that can be chosen freely; None if no offset can. If
-            axes before the last joint coincide, only the sum of their joint angles is determined. The sign is
-            the direction in which this offset rotates x. If the index is 0, the offset is part of the base.
+        free_offset: Row index and sign of a joint offset that can be chosen freely, because axes coincide.
+            The sign is the direction in which this offset rotates x.
     """
 
     cost: float
@@ -89,10 +80,10 @@ class _PartialAlignment:
 
 
 def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: int = BEAM) -> list[SignFit]:
-    """Return up to `count` alignments of a path with a reference table, the closest first.
+    """Return up to `count` alignments of a path with a standard reference table, the closest first.
 
-    The reference table must be standard and have the same kinds of joints as the path. With prismatic joints,
-    several combinations of signs may give equal tables, and only a fit can distinguish them.
+    The table must have the same kinds of joints as the path. With prismatic joints, several combinations of
+    signs may give equal tables, and only a fit can distinguish them.
     """
     reach = max(chain.reach, reference.span, LEAST_SIZE)
     costs = {1: 0.0, -1: _REVERSAL_COST}
@@ -105,8 +96,7 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # If axes nearly coincide, many directions of x are nearly equivalent.
-    # A fit that starts from one of these directions can reach all of them.
+    # If axes nearly coincide, a fit from one direction of x can reach all nearly equivalent directions.
     # Therefore, only the best alignment is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
@@ -175,7 +165,7 @@ def _free_offset(
 
 
 def _with_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
-    """Change the free joint offset so that the row of the next joint, a prismatic joint, has this theta."""
+    """Change the free joint offset so that the next row, of a prismatic joint, has this theta."""
     if partial.free_offset is None:
         return partial
     excess = partial.phi_in + step.phi - theta
@@ -191,12 +181,7 @@ def _with_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -
 def _steps(
     A: FloatArray, row: DHRow, delta: float, reach: float, phi_free: float, both_turn: bool
 ) -> Iterator[AxisTransform]:
-    """Yield the possible transforms between two axes, with both directions of x.
-
-    A Hayati row is possible if the axes are nearly parallel in the URDF and in the reference; its offset d is
-    that of the reference. The transform along the common normal is possible unless the reference has a Hayati
-    row. Next to a prismatic joint, x can have any direction, because the axis of this joint can be shifted.
-    """
+    """Yield the possible transforms between two axes, with both directions of x."""
     steps = []
     sine = tilt_of(A)
     near = abs(math.sin(row.alpha)) < LARGEST_HAYATI_TILT and sine < LARGEST_HAYATI_TILT
@@ -204,9 +189,11 @@ def _steps(
         steps.append(step_between(A, reach, phi_free, hayati=False))
     if near:
         shifted = shifted_along_z(A, -delta)
+        # A prismatic joint's axis can be shifted, so x can have any direction next to a prismatic joint.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _NO_OFFSET or not both_turn:
             shifted[:2, 3] = 0.0
-        # With reach 0, `step_between` makes a Hayati row for all axes that are not exactly parallel.
+        # With reach 0, every common normal that misses a joint's origin counts as far away.
+        # Therefore, `step_between` makes a Hayati row.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = step_between(shifted, hayati_reach, phi_free, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

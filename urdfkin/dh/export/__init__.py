@@ -12,7 +12,6 @@ from urdfkin.system.lazy_import import hook
 if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
 
-#: Module of the formats in which units can be chosen.
 _TEXT = "urdfkin.dh.export.text"
 #: For each format: the module that contains its function `write_NAME`, and a description.
 #: The module name is "" if `urdfkin.export` writes the format.
@@ -37,15 +36,10 @@ FORMATS: dict[str, tuple[str, str]] = {
 
 
 def export(table: DHTable, format: str, units: Units | None = None, *, verify: bool = True) -> str:
-    """Return the table in a format of `FORMATS`.
+    """Return the table in a format of `FORMATS`; raise InputError if the format cannot express the table.
 
-    `units` is the number format of printed tables; data and code are in metres and radians. Numeric code
-    computes the placement, the Jacobian and the acceleration of the tip, and contains a self-test. With
-    `verify`, Pinocchio checks numeric code.
-
-    Raises:
-        UnknownNameError: an unknown format.
-        InputError: the format cannot express this table; for example, roboticstoolbox has no mimic joints.
+    `units` applies only to printed tables; data and code are in metres and radians. With `verify`, Pinocchio
+    checks numeric code.
     """
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)

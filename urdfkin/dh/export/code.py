@@ -32,13 +32,11 @@ def identifier(name: str) -> str:
 
 
 def docstring(table: DHTable) -> list[str]:
-    """Return the lines of `header` as the docstring of a Python module."""
     first, *others = (f"{line}." for line in header(table))
     return ['"""' + first, "", *others, '"""', ""]
 
 
 def header(table: DHTable) -> list[str]:
-    """Return the lines of the comment at the beginning of a file, without comment marks."""
     lines = [
         f"{table.robot}: {table.base_frame} to {table.tip_frame}",
         f"{table.convention} Denavit-Hartenberg parameters, metres and radians",
@@ -61,7 +59,6 @@ def numbers(values: FloatArray | list[float]) -> str:
 
 
 def check_no_mimic(table: DHTable, what: str) -> None:
-    """Raise InputError for a table with mimic joints, which the format `what` does not support."""
     if any(row.mimic is not None for row in table.rows):
         raise InputError(
             f"{what} does not support mimic joints",
@@ -76,14 +73,12 @@ def bounds(row: DHRow) -> str:
 
 
 def matrix(name: str, rows: list[list[float]] | FloatArray, columns: int) -> list[str]:
-    """Return the lines that assign a matrix; the matrix may have no rows."""
     if not len(rows):
         return [f"{name} = zeros(0, {columns});"]
     return [f"{name} = [", *(f"    {numbers(row)}" for row in rows), "];"]
 
 
-#: Largest denominator of an exact fraction, and upper limit of an exact integer.
-#: Other numbers are written as decimals.
+#: Fractions with a larger denominator are written as decimals.
 _LARGEST = 10**9
 
 

@@ -24,8 +24,7 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: Factor that is applied to a bound before the bound is rounded up to three digits.
-#: A rounding error of 1e-12 in the bound therefore does not increase the last digit.
+#: With this factor, a relative rounding error below 1e-12 does not increase a bound's last printed digit.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
@@ -49,7 +48,7 @@ def variable(
 
 
 def coordinate_names(table: DHTable) -> str:
-    """Return text such as "with q1 = left, q2 = right"; "" if the coordinates are the joints of the rows."""
+    """Return text such as "with q1 = left, q2 = right" if rows and coordinates differ."""
     if [row.joint for row in table.rows] == list(table.joint_names):
         return ""
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
@@ -62,14 +61,12 @@ def constant_of(row: DHRow) -> float:
 
 
 def format_sum(variable: str, constant: str) -> str:
-    """Format `variable + constant` without zero terms and double signs."""
     if constant == "0":
         return variable
     return f"{variable} - {constant[1:]}" if constant.startswith("-") else f"{variable} + {constant}"
 
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
-    """Return a row's cells as text with the joint's variable; beta only if the table has Hayati rows."""
     q = variable(table, row, **style)
     theta, d = units.angle(row.theta, pi), units.length(row.d)
     if row.kind.turns:
@@ -92,7 +89,6 @@ def headings(table: DHTable, units: Units) -> list[str]:
 
 
 def _with_units(table: DHTable, units: Units, symbols: dict[str, str], angle: str) -> list[str]:
-    """Return the symbols of the columns with their units; `angle` is the text for the unit of angles."""
     return [
         f"{symbols[name]} [{units.length_name if name in ('a', 'd') else angle}]"
         for name in _columns(table, units)
@@ -100,7 +96,6 @@ def _with_units(table: DHTable, units: Units, symbols: dict[str, str], angle: st
 
 
 def pose_matrix(T: FloatArray, digits: int = 10) -> Matrix:
-    """Return the three upper rows of a pose, with the position in metres."""
     return Matrix([[f"{x + 0.0:.{digits}g}" for x in row] for row in T[:3]])
 
 
@@ -117,7 +112,6 @@ def at_most(value: float) -> str:
 
 
 def snap_lines(table: DHTable) -> list[str]:
-    """Return lines about the snapped angles: first their effect on the tip, then a line for each angle."""
     snap = table.snap
     if snap is None:
         return []
@@ -139,7 +133,6 @@ def snap_lines(table: DHTable) -> list[str]:
 
 
 def document(table: DHTable, units: Units, pi: str = "pi", *, wrapped: bool = False) -> TextDocument:
-    """Return the table as a document; `pi` is the text for pi. With `wrapped`, long sentences are wrapped."""
     rows = [(str(i), row.joint, *cells(table, row, units, pi)) for i, row in enumerate(table.rows, 1)]
     parts: list[str | Table | Matrix] = [CodeLine(formula(table)), ""]
     parts.append(Table(("i", "joint", *headings(table, units)), rows, left=(1,), names=(1,)))
@@ -207,20 +200,18 @@ def _caption(table: DHTable) -> str:
 
 
 def scaled_to_fit(lines: list[str]) -> list[str]:
-    """Return LaTeX code that scales a table down to the width of the text if the table is wider."""
+    """Return LaTeX code that scales a wide table down to the width of the text."""
     size = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
     return [rf"  \resizebox{{{size}}}{{!}}{{%", *(f"    {line}" for line in lines), "  }"]
 
 
 def latex_pose(what: str, T: FloatArray) -> list[str]:
-    """Return LaTeX lines with a pose, in metres."""
     rows = (" & ".join(_with_powers_of_ten(f"{x + 0.0:.6g}") for x in row) for row in T)
     matrix = r"\begin{bmatrix}" + r" \\ ".join(rows) + r"\end{bmatrix}"
     return [r"  \par\medskip", *scaled_to_fit([rf"{what} (m): ${matrix}$"])]
 
 
 def latex_math(text: str) -> str:
-    """Write a cell in LaTeX's math mode."""
     return f"${_with_powers_of_ten(text)}$"
 
 

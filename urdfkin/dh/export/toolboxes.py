@@ -99,7 +99,6 @@ def write_ets(table: DHTable) -> str:
 
 
 def _sense_and_limits(row: DHRow) -> list[str]:
-    """Return roboticstoolbox's arguments for a joint's sense and limits."""
     limits = bounds(row)
     return ["flip=True"] * (row.sense < 0) + ([f"qlim=[{limits}]"] if limits else [])
 
@@ -179,7 +178,6 @@ def _matlab(screws: ProductOfExponentials) -> str:
     return "\n".join([*lines, "end"]) + "\n"
 
 
-#: Functions that write the screws with unrounded numbers, by format.
 _EXACT_FORMS: dict[str, Callable[[ProductOfExponentials], str]] = {
     "toml": lambda screws: "".join(f"{key} = {json.dumps(x)}\n" for key, x in screws.as_mapping().items()),
     "json": lambda screws: json.dumps(screws.as_mapping(), indent=2) + "\n",

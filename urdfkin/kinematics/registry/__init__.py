@@ -69,7 +69,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Misprint:
-    """A wrong or incomplete statement in the chapter; `test` is the proving test, as "file::name"."""
+    """A wrong or incomplete statement in the chapter; `test` names the proving test, as "file::name"."""
 
     where: str
     printed: str

@@ -62,9 +62,6 @@ class JointRule:
     """The rule that converts a joint's value to another program's value: `factor * value + zero`.
 
     Attributes:
-        name: The joint's name in the target program. None means the name in the URDF.
-        sign: 1 or -1.
-        zero: The joint value in the target program if the joint value of the URDF is 0.
         unit: "rad", "deg", "turn", "m", "mm", or the number of units in one turn. None means the convention's
             unit.
     """
@@ -76,14 +73,12 @@ class JointRule:
 
     @property
     def factor(self) -> float | None:
-        """Number of units in one rad or m, multiplied by `sign`; None if `unit` is None."""
         if self.unit is None:
             return None
         return self.sign * (_UNITS[self.unit] if isinstance(self.unit, str) else self.unit / math.tau)
 
     @property
     def of(self) -> str:
-        """Kind of unit: "angle" or "length"; "" if the joint uses the convention's unit."""
         if self.unit is None:
             return ""
         return "length" if self.unit in _LENGTHS else "angle"
@@ -95,9 +90,6 @@ class Convention:
 
     The default values of the attributes are urdfkin's own convention. `conventions.toml` explains each
     attribute.
-
-    >>> find_convention("mujoco").quaternion, find_convention("drake").base_q
-    ('wxyz', 'quaternion first')
     """
 
     name: str
@@ -124,7 +116,6 @@ class Convention:
 
     @property
     def angle_factor(self) -> float:
-        """Number of the convention's angle units in one radian."""
         return _UNITS[self.angle]
 
 
@@ -145,11 +136,7 @@ BUILT_IN = (
 
 
 def find_convention(name: str | Path | Convention) -> Convention:
-    """Find a convention by its name or read it from a TOML file. Return a `Convention` unchanged.
-
-    An unknown name raises UnknownNameError, and an unreadable file raises SourceError. An invalid file raises
-    the errors of `read_convention`.
-    """
+    """Return a convention by its name or from a TOML file; an unknown name raises UnknownNameError."""
     if isinstance(name, Convention):
         return name
     if not isinstance(name, str | Path):
@@ -166,11 +153,7 @@ def find_convention(name: str | Path | Convention) -> Convention:
 
 
 def read_convention(text: str, where: str, name: str) -> Convention:
-    """Return the convention of a TOML text; `name` replaces a missing name.
-
-    Invalid TOML, an invalid value or a repeated name raises InputError; an unknown key or an unknown `like`
-    raises UnknownNameError.
-    """
+    """Parse the TOML text of a convention; `name` replaces a missing name."""
     try:
         found = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -247,12 +230,6 @@ def _rule(rule: dict[str, Any], where: str) -> JointRule:
 
 
 def as_toml(how: Convention) -> str:
-    """Return a convention as TOML text, from which `read_convention` makes the same convention again.
-
-    >>> print(as_toml(Convention(name="mine", order="given", joints=("b", "a"))), end="")
-    like = "urdfkin"
-    joints = ["b", "a"]
-    """
     lines = [f"{word} = {_quoted(text)}" for word in ("title", "note") if (text := getattr(how, word))]
     lines.append('like = "urdfkin"')
     if how.order == "given":
@@ -324,11 +301,11 @@ def identifier(name: str) -> str:
 def transcoded(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    Different names give different results. The result consists of "tn__", the allowed characters of the name,
-    "_", and a number in base 62 for each other character, sorted by code point. As in Punycode, the number
-    d n + p encodes a character and its position p in the name: d is the character's code point minus that of
-    the previous character, and n is the number of possible positions. Source:
-    github.com/PixarAnimationStudios/OpenUSD-proposals, proposals/transcoding_invalid_identifiers.
+    The result consists of "tn__", the allowed characters of the name, "_", and a number in base 62 for each
+    other character, sorted by code point. As in Punycode, the number d n + p encodes a character and its
+    position p in the name: d is the character's code point minus that of the previous character, and n is the
+    number of possible positions. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
+    proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')

@@ -34,9 +34,8 @@ _SWAPPED = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """One number of the target program's q or v: `factor * x[at] + zero`, where x is urdfkin's q or v.
 
-    Attributes:
-        part: "cos" or "sin" for a continuous joint that the target program stores as two numbers.
-        copy: Whether the number belongs to a mimic joint, which has no number in urdfkin.
+    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `copy` marks a number of a
+    mimic joint, which has no number in urdfkin.
     """
 
     name: str
@@ -52,11 +51,8 @@ class _TargetNumber:
 class _FreeJoint:
     """A planar or floating joint whose velocity has other axes or another point in the target program.
 
-    Attributes:
-        q: Index of the joint's first number in urdfkin's q.
-        v: Index of the joint's first number in urdfkin's v.
-        rows: Indices of the joint's numbers in the target program's v.
-        point: (3,) point whose velocity is the linear velocity, in the joint's frame.
+    `q` and `v` are the indices of the joint's first numbers in urdfkin's vectors, and `rows` are the joint's
+    indices in the target program's v. The linear velocity is that of `point` (3,), in the joint's frame.
     """
 
     joint: Joint
@@ -108,7 +104,6 @@ class Conversion:
     # -- layout --------------------------------------------------------------------------------------
 
     def _ordered(self) -> list[int]:
-        """Return the indices of the joints that the target program's q contains, in its order."""
         tree, how = self.tree, self.convention
         moving = {i for i, joint in enumerate(tree.joints) if joint.kind.nv}
         if how.order == "given":
@@ -148,7 +143,7 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _follows(self, i: int) -> bool:
-        """Return whether a joint's value determines its coordinate; a mimic multiplier of 0 prevents this."""
+        """Return whether a joint's value determines a coordinate; false for a mimic multiplier of 0."""
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
 
@@ -160,7 +155,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # A root joint that urdfkin added is not in the file; -1 puts it first.
+        # A root joint that urdfkin added is not in the file; -1 puts this joint first.
         place = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
@@ -182,14 +177,15 @@ class Conversion:
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
     ) -> list[int]:
-        """Return the joints in order of their depth in the tree; siblings are in the order of their keys.
+        """Return the joints breadth first; siblings are in the order of their keys.
 
-        If `merged` is True, links that are connected by fixed joints count as one link.
+        If `merged` is true, links that fixed joints connect count as one link.
         """
 
         def below(link: int) -> list[int]:
             found, links = list[int](), [link]
-            for parent in links:  # The loop appends the child links of fixed joints.
+            # The loop also visits the links that it appends to the list.
+            for parent in links:
                 for i in children.get(parent, []):
                     # A locked joint is still a moving joint in the target program.
                     if self.tree.joints[i].unlocked.kind.nv or not merged:
@@ -204,7 +200,6 @@ class Conversion:
         return order
 
     def _add(self, i: int) -> str:
-        """Append a joint's numbers to the columns of q, and return the joint's name in the target program."""
         how, joint = self.convention, self.tree.joints[i]
         rule = how.rules.get(joint.name, JointRule())
         name = rule.name or spelled(joint.name, how.names)
@@ -282,7 +277,7 @@ class Conversion:
             self._blocks.append(_FreeJoint(joint, q, v, slice(first, first + 3), np.zeros(3)))
 
     def _centre_of_mass(self, link: str) -> FloatArray:
-        """Return the centre of mass (3,) of a link in the link's frame, from the URDF text."""
+        """Return the centre of mass (3,) in the link's frame, from the URDF text."""
         for element in plain_xml(self._urdf).iterfind("link"):
             if element.get("name") == link and (origin := element.find("inertial/origin")) is not None:
                 return np.array([float(x) for x in origin.get("xyz", "0 0 0").split()])
@@ -350,7 +345,7 @@ class Conversion:
 
     @cached_property
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
-        """Indices of each joint in the target program's q and v, by its name in the URDF."""
+        """Indices of each joint in the target program's q and v, by the joint's name in the URDF."""
         names = [self.tree.joints[i].name for i in self._order]
         found, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
@@ -544,7 +539,10 @@ class Conversion:
         return found
 
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
-        """Return M^-1 for joint velocities of the other tool: v = M^-1 v_tool; 0 for mimic joints."""
+        """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
+
+        If several numbers of v_tool belong to one number of v, the columns of all but one of them are 0.
+        """
         if not self._blocks:
             found = np.zeros((self.tree.nv, self.nv))
             found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
@@ -555,10 +553,7 @@ class Conversion:
         return found
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
-        """Return the block of `matrix` for a planar joint (..., 3, 3) or a floating joint (..., 6, 6).
-
-        If the joint's velocity v is given, return the time derivative of the block.
-        """
+        """Return a joint's block (..., k, k) of `matrix`; with v, return the time derivative of the block."""
         how, unit = self.convention, self.convention.angle_factor
         if block.joint.kind is JointKind.PLANAR:
             angle = q[..., block.q + 2]
@@ -607,9 +602,8 @@ class Conversion:
     def columns(self, q: Given, J: ArrayLike) -> FloatArray:
         """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
-        The rows of J are derivatives of quantities that are the same in both conventions, such as Euler
-        angles. If a column of J belongs to several joints of the target program, because one of them mimics
-        another, InputError is raised.
+        The rows must have the same meaning in both conventions, such as derivatives of Euler angles. If
+        several columns of the target program belong to one column of J, InputError is raised.
         """
         self._demand_own_columns()
         array = np.asarray(J, dtype=np.float64)
@@ -636,7 +630,7 @@ class Conversion:
         return found + array @ _for_frames(change, array.ndim)
 
     def hessian(self, q: Given, J: ArrayLike, H: ArrayLike) -> FloatArray:
-        """Convert the derivatives (..., 6, nv, nv) of a Jacobian with respect to the joint coordinates."""
+        """Convert a Jacobian's derivatives H (..., 6, nv, nv) with respect to the joint coordinates."""
         self._demand_own_columns()
         inverse, tensor, columns = self.inverse_matrix(q), self.six(H, -3), self.six(J, -2)
         W = _for_frames(inverse, columns.ndim)
@@ -684,7 +678,7 @@ class Conversion:
         if (name := next(copies, None)) is not None:
             raise InputError(
                 f"{self.convention.title or self.convention.name} has a Jacobian column for each mimic"
-                " joint, but urdfkin adds it to that of the mimicked joint",
+                " joint, but urdfkin adds this column to the mimicked joint's column",
                 where=f"joint {name}",
                 remedy="load with mimic=False (--no-mimic)",
                 question=QuestionsSection.MIMIC_JOINTS,
@@ -715,10 +709,9 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that converts "q" or "v" from convention `start` to `end`; None if there is none.
+    """Return the formula that converts "q" or "v" between two conventions; None if there is no formula.
 
-    There is no formula if one convention stores the cosine and the sine of an angle, or if the two
-    conventions express a base velocity in different frames.
+    There is no formula between an angle and its cosine and sine, or between velocities in different frames.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -755,7 +748,7 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each entry of urdfkin's vector, return the index of the entry of `numbers` that determines it.
+    """For each entry of urdfkin's vector, return the index of the number that determines the entry.
 
     A mimic joint's number is used only if no other number is available.
     """
@@ -774,7 +767,6 @@ def _inverse(B: FloatArray) -> FloatArray:
 
 
 def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
-    """Write `part` to the slice `where` of the last axis, and return the array; all other axes broadcast."""
     shape = np.broadcast_shapes(array.shape[:-1], part.shape[:-1])
     if array.shape[:-1] != shape:
         array = np.broadcast_to(array, (*shape, array.shape[-1])).copy()
@@ -783,5 +775,5 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 
 
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
-    """Return M (..., k, l), with one more axis before k if the Jacobian contains several frames."""
+    """Insert an axis for frames into M (..., k, l) if the Jacobian contains several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

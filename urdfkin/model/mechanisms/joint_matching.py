@@ -1,13 +1,13 @@
 """Find joints of two mechanisms that may correspond, and poses and zero offsets that align their axes.
 
 Joints at two matched bodies are paired by the names that the user gives, by equal names, or by geometry.
-`MechanismMatcher` tries each proposed pose and zero offset.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. The value of the joint before a subtree does not matter, because the joint's zero offset
-can compensate any value. Therefore, the result depends only on the two joints before the subtrees, and on the
-pose of one joint's axis relative to the other. The search stores the results of each pair of joints, so it is
-fast even for long chains.
+the other subtree. Links with equal labels must also coincide. The multipliers of the mimic rules must
+correspond, unless `Congruence.ignore_rules` was called. The value of the joint before a subtree does not
+matter, because the joint's zero offset can compensate any value. Therefore, the result depends only on the
+two joints before the subtrees, and on the pose of one joint's axis relative to the other. `Congruence` stores
+the result of each such case, so that the search is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -43,15 +43,12 @@ Via = tuple[Edge | None, Edge | None]
 
 
 def family(kind: JointKind) -> str:
-    """Return a joint's kind of motion; joints of different kinds of motion are never paired."""
+    """Return "turns" for a revolute or continuous joint, else the name of the joint's kind."""
     return "turns" if kind.turns else str(kind.value)
 
 
 class Pairing:
-    """Pair the joints of mechanism A with joints of mechanism B, for each pair of bodies.
-
-    `given` contains names of joints of `a`, each with the name of the corresponding joint of `b`.
-    """
+    """Find corresponding joints of A and B; `given` maps joint names of A to joint names of B."""
 
     def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
         self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
@@ -63,7 +60,6 @@ class Pairing:
         ]()
 
     def links(self, body_a: int, body_b: int) -> tuple[tuple[int, int], ...]:
-        """Return the pairs of links with equal labels, one on a body of A and one on a body of B."""
         if (known := self._links.get((body_a, body_b))) is None:
             there = {self.b.labels[link]: link for link in self.b.bodies[body_b]}
             known = self._links[body_a, body_b] = tuple(
@@ -78,9 +74,9 @@ class Pairing:
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
         """Pair the joints at two bodies; return the joint pairs, and the unpaired joints of A and of B.
 
-        `via` contains the joints before these bodies; None at the first bodies. G (4, 4) moves the body of A
-        from its zero configuration to the current pose of B's body. XC (4, 4) moves the body of B from its
-        zero configuration to its current pose.
+        `via` contains the joints before these bodies. G (4, 4) moves A's body from its zero configuration to
+        the current pose of B's body. XC (4, 4) moves B's body from its zero configuration to its current
+        pose.
         """
         named, left_a, left_b = self.by_names(bodies, via)
         pairs = list(named)
@@ -105,7 +101,6 @@ class Pairing:
     def by_names(
         self, bodies: tuple[int, int], via: Via
     ) -> tuple[Sequence[Pair], Sequence[Edge], Sequence[Edge]]:
-        """Pair joints by name; return the pairs, and the remaining joints of A and of B."""
         if (known := self._by_names.get((bodies, via))) is None:
             left_a = [edge for edge in self.a.edges_of[bodies[0]] if edge is not via[0]]
             left_b = [edge for edge in self.b.edges_of[bodies[1]] if edge is not via[1]]
@@ -119,7 +114,7 @@ class Pairing:
         return known
 
     def same_shape(self, bodies: tuple[int, int], via: Via) -> bool:
-        """Return whether the subtrees of two bodies have the same branching and the same kinds of joints."""
+        """Return whether two subtrees have the same branching and the same kinds of joints."""
         shapes = (
             sorted(self._signature(m, body, edge) for edge in m.edges_of[body] if edge is not by)
             for m, body, by in zip((self.a, self.b), bodies, via, strict=True)
@@ -127,11 +122,10 @@ class Pairing:
         return next(shapes) == next(shapes)
 
     def alike(self, bodies: tuple[int, int], e: Edge, f: Edge) -> bool:
-        """Return whether the subtrees after two joints have the same branching and kinds of joints."""
         return self._signature(self.a, bodies[0], e) == self._signature(self.b, bodies[1], f)
 
     def all_lie_alike(self, bodies: tuple[int, int], X: FloatArray) -> bool:
-        """Return whether each joint axis of A's body coincides with one of B's body, after B moves by X."""
+        """Return whether each axis at A's body coincides with an axis at B's body, after B moves by X."""
         return all(
             any(
                 family(self.a.joint(e).kind) == family(self.b.joint(f).kind)
@@ -143,10 +137,9 @@ class Pairing:
         )
 
     def likeliest(self, bodies: tuple[int, int], e: Edge, edges: Sequence[Edge], X: FloatArray) -> list[Edge]:
-        """Sort joints of B by their similarity to a joint of A; the most similar joint comes first.
+        """Return the joints of B, most similar to `e` first; omit joints that the user matched.
 
-        Joints that the user matched with `--map` are omitted. The motion X (4, 4) moves B from its zero
-        configuration to the pose of A.
+        The motion X (4, 4) moves B from its zero configuration to the pose of A.
         """
         one = self._geometries(self.a, bodies[0], [e], IDENTITY)
         others = self._geometries(self.b, bodies[1], edges, X)
@@ -154,7 +147,6 @@ class Pairing:
         return [edges[j] for _, j in ranked]
 
     def _pairs_by_name(self, bodies: tuple[int, int], ours: list[Edge], theirs: list[Edge]) -> Iterator[Pair]:
-        """Yield pairs of joints by joint names, then by the labels of the links after the joints."""
         by_name = {self.b.joint(f).name: f for f in theirs}
         for e in ours:
             name = self.a.joint(e).name
@@ -169,7 +161,6 @@ class Pairing:
     def _geometries(
         self, mechanism: Mechanism, body: int, edges: Sequence[Edge], T: FloatArray
     ) -> list[tuple[int, _JointGeometry]]:
-        """Return index and geometry (after the motion T) of each joint that the user did not match."""
         return [
             (i, _JointGeometry.of(mechanism, edge, T, self._signature(mechanism, body, edge)))
             for i, edge in enumerate(edges)
@@ -177,7 +168,6 @@ class Pairing:
         ]
 
     def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
-        """Return a sort key that is smaller for more similar joints."""
         angle, shift = one.mismatch(other)
         axes = 0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, LEAST_SIZE) + shift
         origins = math.dist(one.origin, other.origin)
@@ -185,7 +175,6 @@ class Pairing:
         return one.shape != other.shape, axes, origins + self.a.size * is_opposite
 
     def _signature(self, mechanism: Mechanism, body: int, edge: Edge) -> str:
-        """Return a text that contains the kinds of a joint and of all joints after it."""
         key = mechanism is self.a, body, edge.joint
         if (known := self._signatures.get(key)) is None:
             beyond = edge.other_body(body)
@@ -199,7 +188,7 @@ class Pairing:
         return known
 
     def mismatch(self, e: Edge, f: Edge, G: FloatArray, XC: FloatArray) -> tuple[float, float]:
-        """Return the angle (rad) and the distance (m) between two axes; opposite axes count as equal."""
+        """Return the angle (rad) and distance (m) between two axes; (0, 0) for different kinds of joints."""
         kind = family(self.a.joint(e).kind)
         if kind != family(self.b.joint(f).kind):
             return 0.0, 0.0
@@ -220,13 +209,11 @@ class _JointGeometry:
 
     @classmethod
     def of(cls, mechanism: Mechanism, edge: Edge, T: FloatArray, shape: str = "") -> _JointGeometry:
-        """Return a joint's geometry in the zero configuration, moved by T."""
         pose = T @ mechanism.homes[edge.joint + 1]
         screw = mechanism.screw(edge).moved(T)
         return cls(family(mechanism.joint(edge).kind), shape, screw, pose[:3, 3].tolist(), pose[:3, 2])
 
     def mismatch(self, other: _JointGeometry) -> tuple[float, float]:
-        """Return the angle (rad) and the distance (m) between the axes of two joints of the same kind."""
         if self.kind == "planar":
             normals = (Screw(one.normal, one.normal) for one in (self, other))
             return between_lines(*normals, placed=False)
@@ -234,25 +221,20 @@ class _JointGeometry:
 
 
 def _lines_apart(kind: str, s: Screw, t: Screw) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) between the axes of two joints of the same kind."""
     if kind == "floating":  # any two floating joints agree, because a floating joint reaches every pose
         return 0.0, 0.0
     return between_lines(s, t, placed=kind == "turns")
 
 
 _Some = TypeVar("_Some")
-#: Pair of an object of mechanism A and an object of mechanism B.
 Both = tuple[_Some, _Some]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axis:
-    """A joint's screw in the zero configuration.
+    """A joint's axis in the zero configuration, and a reference line, usually the previous joint's axis.
 
-    Attributes:
-        screw: The axis as a directed line; only its direction has a meaning for a prismatic joint.
-        turns: Whether the joint is revolute.
-        reference: A reference line, usually the axis of the joint before this joint.
+    For a prismatic joint, only the direction of `screw` has a meaning.
     """
 
     screw: Screw
@@ -263,9 +245,9 @@ class Axis:
         return Axis(self.screw.moved(T), self.turns, self.reference.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Find the reference line's point nearest to the joint's axis; return its coordinate (m) along u.
+        """Return the coordinate (m) along u of the reference line's point nearest to the axis.
 
-        If the two lines are parallel, or if the joint is prismatic, the result is None.
+        The result is None for a prismatic joint, and for parallel lines.
         """
         s, start = self.screw, self.reference
         along_s = float(start.direction @ s.direction)
@@ -277,7 +259,7 @@ class Axis:
 
 
 def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield joint values (rad or m) for which a joint with the axis u moves the axis `theirs` to `ours`."""
+    """Yield values (rad or m) for which a joint with the axis u may move the axis `theirs` to `ours`."""
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -298,10 +280,7 @@ def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of joint axes, one at a body of A and one at a body of B.
-
-    If a joint's axis is parallel to the line `reference`, the function also yields the axes after this joint.
-    """
+    """Yield pairs of axes at two bodies; after an axis parallel to `reference`, also the next axes."""
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
         yield axes
@@ -312,15 +291,11 @@ def later_axes(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root in which an axis of B's root body coincides with an axis of A's.
-
-    After this alignment, B may still rotate about the first axis and translate along the axis. The function
-    chooses this rotation and this translation so that later axes coincide too. If no axes follow the first
-    axis, other axes of the body are used, for example the rotor axes of a drone.
-    """
+    """Yield poses of B's root that align an axis of B, and if possible later axes, with axes of A."""
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (ours, theirs), before, after in firsts:
         lines = ours.screw, theirs.screw
+        # Without later axes, other axes of the body determine the pose, such as a drone's rotor axes.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (theirs.screw, theirs.screw.reversed()):
             K = smallest_motion(start, ours.screw, turns=True)[0]
@@ -333,10 +308,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align up to three joint axes of two bodies with several joints.
-
-    The function `alike` returns whether a joint of A may be paired with a joint of B.
-    """
+    """Yield poses of B's root that align up to three joint axes at two bodies."""
     edges = _with_axes(a, bodies[0])
     ours = [_axis(a, edge) for edge in edges]
     turning = [i for i, axis in enumerate(ours) if axis.turns]
@@ -360,7 +332,8 @@ def root_poses_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            if not ours[second].turns:  # a prismatic joint has no `height`
+            # `Axis.height` is None for a prismatic joint, so later axes must determine the shift.
+            if not ours[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
@@ -387,9 +360,9 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return pairs of the first revolute axes after two bodies, or else pairs of prismatic axes.
+    """Return the first pairs of revolute axes, each with the pairs of axes before and after this pair.
 
-    Each result has three parts: a pair of axes, the pairs before it, and the pairs after it.
+    If only pairs of prismatic axes follow, the function returns the last pair.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -406,7 +379,6 @@ def _first_axes(
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    """Yield all pairs of two revolute or two prismatic joints, one at a body of A and one at a body of B."""
     ours, theirs = (
         [edge for edge in mechanism.edges_of[body] if edge is not by and mechanism.joint(edge).kind.has_axis]
         for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
@@ -421,8 +393,8 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
     return Axis(screw, mechanism.joint(edge).kind.turns, reference or screw)
 
 
-#: Function that proposes poses of the child body of B's joint, for a pair of matched joints.
-#: Its arguments are the two child bodies, the two joints, and the pose of the parent body in B.
+#: Function that proposes poses of B's body after two matched joints.
+#: The arguments are the bodies after the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
 #: Maximum number of joint pairs at two bodies that the search for exact matches tries.
@@ -434,14 +406,14 @@ Rates = Mapping[str, tuple[str, float]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Match:
-    """Matched subtrees after two joints: the pose X (4, 4) of B's body, and the subtrees' coordinates."""
+    """The pose X (4, 4) of B's body after two joints, and the coordinates of the matched subtrees."""
 
     X: FloatArray
     rates: Rates
 
 
 class Congruence:
-    """Exact matches between subtrees of mechanism A and subtrees of mechanism B."""
+    """Find subtrees of A and B that match exactly (module docstring)."""
 
     def __init__(
         self, a: Mechanism, b: Mechanism, pairing: Pairing, tolerance: Tolerance, poses: Poses
@@ -451,21 +423,16 @@ class Congruence:
         self._rules = True
 
     def ignore_rules(self) -> None:
-        """Ignore the mimic rules in all later comparisons; only the joint axes must agree."""
         self._rules = False
         self._known.clear()
 
     def joint_pairs(self, bodies: tuple[int, int], via: Via, X: FloatArray) -> Sequence[Pair] | None:
-        """Return the joint pairs at two bodies if the subtrees of the bodies match exactly, else None.
-
-        `via` contains the joints that lead to the bodies; None for the first bodies. The motion X (4, 4)
-        moves B's body from B's zero configuration to the pose of A's body.
-        """
+        """Return the joint pairs if the subtrees match exactly after B moves by X (4, 4), else None."""
         found = self._at(bodies, via, X)
         return None if found is None else found[0]
 
     def pose_after(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> FloatArray | None:
-        """Return the pose (4, 4) of B's body after joint f if the subtrees match exactly, else None."""
+        """Return the pose (4, 4) of B's body after joint f for an exact match, else None."""
         found = self._behind(e, f, bodies, X)
         return None if found is None else found.X
 
@@ -495,7 +462,6 @@ class Congruence:
         tries: list[int],
         rates: Rates,
     ) -> tuple[Sequence[Pair], Rates] | None:
-        """Pair all joints of A with joints of B so that all subtrees match exactly; None if impossible."""
         if not left:
             return [], rates
         at = min(range(len(left)), key=lambda i: len(candidates[i]))
@@ -531,7 +497,7 @@ class Congruence:
         return found
 
     def _rate(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> Rates:
-        """Return the corresponding coordinates of two joints; empty if a joint has no coordinate."""
+        """Return the coordinates that move two joints, and the ratio of the coordinates' velocities."""
         joints = self.a.joint(e), self.b.joint(f)
         if not self._rules or not joints[0].kind.has_axis:
             return {}
@@ -546,7 +512,7 @@ class Congruence:
         return {x: (y, (1.0 if alike != back else -1.0) * m / n)}
 
     def _together(self, some: Rates, others: Rates) -> Rates | None:
-        """Merge two sets of corresponding coordinates; return None if the sets contradict each other."""
+        """Merge two sets of matched coordinates; return None if the sets contradict each other."""
         for x in some.keys() & others.keys():
             (y, rate), (other, other_rate) = some[x], others[x]
             tolerance = self.tolerance.angle * max(1.0, abs(other_rate))
@@ -562,7 +528,10 @@ class Congruence:
         return self.tolerance.holds(*self.pairing.mismatch(e, f, IDENTITY, X))
 
     def _same_case(self, e: Edge, X: FloatArray, other: FloatArray) -> bool:
-        """Return whether a motion of the joint leads from the pose X of B's body to the pose `other`."""
+        """Return whether a motion of the joint leads from the pose X to the pose `other`.
+
+        For a planar joint, the result is true only if the two poses are equal.
+        """
         kind = self.a.joint(e).kind
         if kind.nq > 1:
             return family(kind) == "floating" or self.tolerance.holds(*pose_difference(X, other))

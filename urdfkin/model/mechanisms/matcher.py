@@ -1,15 +1,13 @@
-"""Align mechanism B with mechanism A: pair their joints, and find the sign and zero offset of each joint.
+"""Align mechanism B with mechanism A: match their joints, and find the sign and zero offset of each joint.
 
-`MechanismMatcher` starts at a body of A and the corresponding body of B, and goes through both trees, joint
-by joint. At each joint, the matcher chooses the sign (`sense`) and the zero offset for which most later links
-and axes of B coincide with those of A. `align` calls the matcher for several first bodies and joint orders,
-and returns the best result.
+`MechanismMatcher` starts at a body of A and a body of B, and visits both trees joint by joint. At each joint,
+the matcher chooses the sign (`sense`) and the zero offset for which most later links and axes of B coincide
+with those of A. `align` compares the results for several first bodies and joint orders.
 
-In most cases, the axes and link frames after a joint determine its zero offset. If no axis and no link frame
-follows a joint, only a mimic rule can determine its zero offset. Let v = m w + c be a mimic rule of A, and
-let v' = m' w' + c' be the corresponding rule of B. The two rules are equivalent if inserting v' = s v + o and
-w' = s' w + o' into the second rule gives the first rule. For a revolute joint, a multiple of a full turn may
-always be added to o.
+If no axis and no link frame follows a joint, only a mimic rule can determine the joint's zero offset. Let v =
+m w + c be a mimic rule of A, and let v' = m' w' + c' be the corresponding rule of B. The two rules are
+equivalent if inserting v' = s v + o and w' = s' w + o' into the second rule gives the first rule. For a
+revolute joint, a multiple of a full turn may always be added to o.
 """
 
 from __future__ import annotations
@@ -53,14 +51,14 @@ from urdfkin.model.mechanisms.mechanism import (
 )
 from urdfkin.model.tree import FloatArray, Joint, inverse
 
-#: Longest path, in joints, for which the recursive search for an exact match is used.
+#: Maximum depth of a tree, in joints, for the recursive search for an exact match.
 DEEPEST = 200
-#: Number of further joints that the matcher compares if two choices agree equally well.
+#: Number of further joints that the matcher compares if several choices are equally good.
 AHEAD = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
-#: If two choices have equally many agreeing links and axes, their largest differences are compared.
-#: The first choice is better if its difference is less than this fraction of the second's difference.
+#: If two scores have equally many matches, their largest differences are compared.
+#: The better score has less than this fraction of the other score's difference.
 TWICE_AS_WELL = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -71,20 +69,18 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """Number of joint pairs that all matchers together may still compare beyond the current joint."""
+    """Remaining number of joint pairs that one or several matchers together may compare ahead."""
 
     left: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPair:
-    """A body of A, the corresponding body of B, and their poses in the matcher.
+    """A body of A, the corresponding body of B, and the joints `via` before these bodies.
 
     Attributes:
-        via: The joint of A and the joint of B before these bodies; None at the base.
-        previous: Index of the joint pair before these bodies; -1 at the base.
-        G: (4, 4) motion that moves the body of A from its zero configuration to the current pose of B's body.
-        XC: (4, 4) motion that moves the body of B from its zero configuration to its current pose.
+        G: (4, 4) motion of A's body from its zero configuration to the current pose of B's body.
+        XC: (4, 4) motion of B's body from its zero configuration to its current pose.
     """
 
     bodies: tuple[int, int]
@@ -95,18 +91,11 @@ class BodyPair:
 
 
 class MechanismMatcher:
-    """Match the joints of two mechanisms, from a common body to the ends of all branches.
+    """Match the joints of two mechanisms, from the links `base` to the ends of all branches.
 
-    Args:
-        a: One mechanism.
-        b: The other mechanism, which is aligned with `a`.
-        pairing: Object that finds the joints of `a` and `b` that may be matched.
-        choices: Prescribed choices, for example zero offsets. None: the matcher finds the choices for which
-            most joints and links agree.
-        ahead: Number of joint pairs that the matcher may compare ahead of the current joint.
-        tolerance: Tolerance for the comparison of poses and axes.
-        base: The link of `a` and the link of `b` at whose bodies the matcher starts. None: the matcher starts
-            at the bodies with most link names in common.
+    Without `choices`, the matcher finds the choices for which most joints and links agree. Without `base`,
+    the matcher starts at A's root body and the body of B that shares most link names with A's root body. If
+    no body of B shares a link name, the matcher tries all bodies of B.
     """
 
     def __init__(
@@ -123,9 +112,7 @@ class MechanismMatcher:
         self.tolerance, self.base = tolerance, base
         self.size = size_of(a, b)
         self.subtree_sizes = _subtree_sizes(a), _subtree_sizes(b)
-        #: Number of joints and links that agree in the best alignment so far.
         self.matched = 0
-        #: Search for exactly matching subtrees; None if the choices are prescribed.
         self.exact: Congruence | None = None
         if choices is None and max(*a.depths, *b.depths) <= DEEPEST:
             self.exact = Congruence(a, b, pairing, tolerance, self._poses_after)
@@ -133,7 +120,6 @@ class MechanismMatcher:
     # -- first bodies ------------------------------------------------------------------------------
 
     def best(self) -> Alignment:
-        """Return the best alignment over all first bodies; if several are equally good, the first of them."""
         best: Alignment | None = None
         for bodies, X in self._starts():
             found = self._match_from(bodies, X)
@@ -145,11 +131,7 @@ class MechanismMatcher:
         return best
 
     def _starts(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield pairs of bodies at which the matcher can start, with a pose of B's root in A's root frame.
-
-        The most likely pair comes first. A pair is omitted if it allows fewer matches than the best alignment
-        so far has.
-        """
+        """Yield pairs of first bodies, each with a pose of B's root in A's root frame."""
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
@@ -177,14 +159,13 @@ class MechanismMatcher:
                     yield base, X
 
     def _most_matches(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
+        """Return an upper bound on the number of matches from the first bodies `base`.
 
         Two matched branches have at most as many matches as the smaller branch has joints and links. The sum
-        over all branches is largest if the branches at the two bodies are matched in the order of their
-        sizes.
+        of matches over all branches is largest if the branches are matched in the order of their sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
-        for k in (0, 1):  # joints, then links
+        for k in (0, 1):
             branches = list[list[int]]()
             for m, body, sizes in zip((self.a, self.b), base, self.subtree_sizes, strict=True):
                 own = [
@@ -198,7 +179,6 @@ class MechanismMatcher:
     def _exact_start(
         self, exact: Congruence, bases: Sequence[tuple[int, int]]
     ) -> tuple[tuple[int, int], FloatArray] | None:
-        """Return two bodies and a pose of B's root for which A matches B exactly, or None."""
         for base in bases:
             if self.pairing.same_shape(base, (None, None)):
                 for X in self._exact_root_poses(base):
@@ -207,7 +187,6 @@ class MechanismMatcher:
         return None
 
     def _exact_root_poses(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root for which all axes at the first body of B coincide with axes of A."""
         yield from self._root_poses_by_names(base)
         siblings = root_poses_by_siblings(self.a, self.b, base, lambda e, f: self.pairing.alike(base, e, f))
         some = (
@@ -218,19 +197,11 @@ class MechanismMatcher:
         yield from islice(some, MOST_ROOT_POSES)
 
     def _root_poses_by_names(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield poses of B's root: first the identity, then those that align links of equal names."""
         yield IDENTITY
         for link_a, link_b in self.pairing.links(*base):
             yield self.a.homes[link_a] @ inverse(self.b.homes[link_b])
 
     def _start_bodies(self) -> Iterator[tuple[int, int]]:
-        """Yield pairs of bodies (one of A and one of B) at which the matcher may start.
-
-        A's root body is paired with the body of B that has most link names in common with it. If no body of B
-        has a common link name, A's root body is paired with every body of B. In this case, B's root body is
-        also paired with the body of A that has most link names in common with it. This happens, for example,
-        if a floating joint follows A's root.
-        """
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
             return
@@ -239,12 +210,12 @@ class MechanismMatcher:
             yield 0, theirs
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
+        # B's root body can correspond to a later body of A, for example after a floating root joint.
         ours = _most_shared(self.b, self.a)
         if ours is not None:
             yield ours, 0
 
     def _root_poses_by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
-        """Yield the best poses of B's root that align the first axes of A and B."""
         scored = list[tuple[float, BodyPair, Score]]()
         for X in root_poses_by_axes(self.a, self.b, base):
             bodies = BodyPair(base, (None, None), -1, IDENTITY, X)
@@ -255,7 +226,6 @@ class MechanismMatcher:
     # -- matching ------------------------------------------------------------------------------------
 
     def _match_from(self, base: tuple[int, int], X: FloatArray) -> Alignment:
-        """Pair all joints and links, starting at two bodies; X is the pose of B's root in A's root frame."""
         found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
         stack = [BodyPair(base, (None, None), -1, IDENTITY, X)]
         while stack:
@@ -282,7 +252,7 @@ class MechanismMatcher:
         return self.pairing.edges(place.bodies, place.via, place.G, place.XC)
 
     def _poses_after(self, beyond: tuple[int, int], via: Pair, X: FloatArray) -> Iterator[FloatArray]:
-        """For the pose X of the body before a joint, yield possible poses of B's body after the joint."""
+        """Yield possible poses of B's body after a joint, for the pose X of B's body before the joint."""
         there = BodyPair(beyond, via, -1, IDENTITY, X)
         kind, f = family(self.a.joint(via[0]).kind), via[1]
         if kind in ("turns", "prismatic"):
@@ -313,9 +283,9 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, distance))
 
     def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Return two links of matched bodies that can be different end-effector frames.
+        """If no links match, return two links as different end-effector frames.
 
-        The result is None if links of the bodies match, or if the other model has all link names of a body.
+        The result is None if links match, or if the other model has all link names of a body.
         """
         ours, theirs = self._own_links(place)
         if matched or not ours or not theirs:
@@ -325,10 +295,6 @@ class MechanismMatcher:
         return FramePair(ours[0], theirs[0], place.previous, home, IDENTITY, 0.0, 0.0, tool)
 
     def _all_links(self, place: BodyPair) -> list[tuple[int, int]]:
-        """Return pairs of links with equal names, then pairs of links with equal poses.
-
-        A link is paired by its pose only if its name does not exist in the other model.
-        """
         pairs = list(self.pairing.links(*place.bodies))
         taken = {j for _, j in pairs}
         ours, theirs = self._own_links(place)
@@ -342,7 +308,6 @@ class MechanismMatcher:
         return pairs
 
     def _own_links(self, place: BodyPair) -> tuple[list[int], list[int]]:
-        """Return the links of two matched bodies whose names do not occur in the other model."""
         names_a, names_b = self.a.labels, self.b.labels
         ours = [i for i in self.a.bodies[place.bodies[0]] if names_a[i] not in names_b]
         return ours, [j for j in self.b.bodies[place.bodies[1]] if names_b[j] not in names_a]
@@ -350,7 +315,6 @@ class MechanismMatcher:
     def _match_joints(
         self, place: BodyPair, e: Edge, f: Edge, index: int, depth: int
     ) -> tuple[MatchedJoints, BodyPair, Score]:
-        """Match two joints; return the joint pair, the bodies after the joints, and their score."""
         kinds = family(self.a.joint(e).kind), family(self.b.joint(f).kind)
         via = e, f
         backwards = e.outer == place.bodies[0], f.outer == place.bodies[1]
@@ -378,7 +342,6 @@ class MechanismMatcher:
     def _match_free_joints(
         self, place: BodyPair, there: BodyPair, backwards: tuple[bool, bool], depth: int, kind: str
     ) -> tuple[MatchedJoints, BodyPair, Score]:
-        """Match two planar or two floating joints, whose frames and zeros may differ."""
         e, f = _both(there.via)
         homes = self.a.homes[e.joint + 1], self.b.homes[f.joint + 1]
         at, seen = place.G @ homes[0], place.XC @ homes[1]
@@ -426,17 +389,9 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        The first candidate is the identity, or `plane` for a planar joint. The second candidate keeps B in
-        its zero configuration. The others make a link or an axis of B coincide with a link or an axis of A.
-
-        Args:
-            there: The bodies after the joint, with B in its zero configuration.
-            at: (4, 4) the joint's frame.
-            home_b: (4, 4) the frame of B's joint in the zero configuration.
-            plane: (4, 4) one possible N of a planar joint; every possible N is the product of this N and a
-                planar pose. None for a floating joint.
-            poses_after: Poses (4, 4) of B's body after the joint; at each pose, some of the body's axes
-                coincide with axes of A.
+        `at` (4, 4) is the frame of A's joint after the motion G. `home_b` (4, 4) is the frame of B's joint in
+        B's zero configuration. `plane` is one possible N of a planar joint, and None for a floating joint.
+        Every possible N of a planar joint is the product of `plane` and a planar pose.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -450,7 +405,7 @@ class MechanismMatcher:
     def _match_axes(
         self, place: BodyPair, there: BodyPair, backwards: tuple[bool, bool], depth: int, *, turns: bool
     ) -> tuple[MatchedJoints, BodyPair, Score]:
-        """Match two revolute or two prismatic joints: choose the sign and the zero offset of B's joint."""
+        """Match two revolute or prismatic joints, and choose the sign and zero offset."""
         e, f = _both(there.via)
         s = _outwards(self.a.screw(e), backwards[0])
         t = _outwards(self.b.screw(f), backwards[1])
@@ -470,7 +425,7 @@ class MechanismMatcher:
                 zero = 0.0 if self.tolerance.holds(*pose_difference(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return replace(step, offset=offset), there, score
-        # Either the joint and all bodies after the joint have another pose in B, or only the axis differs.
+        # Either all bodies after the joint also have a different pose in B, or only the axis differs.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(place.G)
         with_bodies = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
@@ -480,7 +435,6 @@ class MechanismMatcher:
         return replace(step, offset=with_bodies[0], before=back @ K @ place.G), *with_bodies[1:]
 
     def _exact_pose(self, place: BodyPair, there: BodyPair) -> FloatArray | None:
-        """Return the pose `XC` of the bodies after two joints if the subtrees match exactly, else None."""
         if self.exact is None:
             return None
         X = self.exact.pose_after(*_both(there.via), place.bodies, inverse(place.G) @ place.XC)
@@ -489,13 +443,12 @@ class MechanismMatcher:
     # -- zero offsets ------------------------------------------------------------------------------
 
     def _prescribed(self, joint: str) -> tuple[int, float | None]:
-        """Return the prescribed sign and zero offset of a joint; (0, None) if they are not prescribed."""
+        """Return a joint's prescribed sign and zero offset; (0, None) without `choices`."""
         return (0, None) if self.choices is None else self.choices.zeros.get(joint, (1, 0.0))
 
     def _best_zero(
         self, there: BodyPair, G: FloatArray, t: Screw, turns: bool, zero: float | None, depth: int
     ) -> tuple[float, BodyPair, Score]:
-        """Return the zero offset of B's joint for which most links and axes agree; 0 is tried first."""
         offsets = self._offsets(there, G, t, turns) if zero is None else (zero,)
         moved = (
             (offset, there.XC @ screw_motion(t, offset, turns=turns) if offset else there.XC)
@@ -508,9 +461,8 @@ class MechanismMatcher:
     ) -> tuple[_Choice, BodyPair, Score]:
         """Return the choice for which most links and axes agree.
 
-        If several choices are equally good, the method compares the next `depth` joints too. Example: if two
-        axes intersect at right angles in A and in B, two poses of B make these axes coincide, and a third
-        axis must decide.
+        If several choices are equally good, the method also compares the next joints. For example, two axes
+        that intersect at right angles allow two poses of B, so a third axis must decide.
         """
         scored = list[tuple[_Choice, BodyPair, Score]]()
         for choice, place in choices:
@@ -518,7 +470,8 @@ class MechanismMatcher:
                 continue
             score = self._score(place)
             scored.append((choice, place, score))
-            if not score[1] and self.pairing.links(*place.bodies):  # no other choice can agree better
+            # If all axes and links agree, no other choice can agree better.
+            if not score[1] and self.pairing.links(*place.bodies):
                 return scored[-1]
         best = _best_of(scored)
         equal = [one for one in scored if not better(best[2], one[2])]
@@ -532,7 +485,6 @@ class MechanismMatcher:
         return _best_of(scored_ahead)
 
     def _score_ahead(self, place: BodyPair, own: Score, depth: int) -> Score:
-        """Return the sum of the score `own` of two bodies and the scores of the next `depth` joints."""
         pairs = self.pairing.edges(place.bodies, place.via, place.G, place.XC)[0]
         self.ahead.left -= len(pairs)
         scores = [own, *(self._match_joints(place, e, f, -1, depth - 1)[2] for e, f in pairs)]
@@ -553,7 +505,6 @@ class MechanismMatcher:
         return len(differences) - len(wrong), max(wrong, default=0.0)
 
     def _offsets(self, there: BodyPair, G: FloatArray, t: Screw, turns: bool) -> Iterator[float]:
-        """Yield zero offsets of B's joint: 0, then offsets for which later links or axes coincide."""
         yield 0.0
         u = t.moved(there.XC)
         for i, j in self.pairing.links(*there.bodies):
@@ -569,14 +520,13 @@ class MechanismMatcher:
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
     """For each body, return the numbers of bodies and links in its subtree, including the body itself."""
     sizes = [(1, len(links)) for links in mechanism.bodies]
-    for edge in reversed(mechanism.edges):  # from the tips to the root
+    for edge in reversed(mechanism.edges):
         bodies, links = sizes[edge.outer]
         sizes[edge.inner] = sizes[edge.inner][0] + bodies, sizes[edge.inner][1] + links
     return sizes
 
 
 def _most_shared(one: Mechanism, other: Mechanism) -> int | None:
-    """Return the body of `other` with most link names in common with the root body of `one`, or None."""
     names = {one.labels[link] for link in one.bodies[0]}
     shared = [len(names & {other.labels[k] for k in body}) for body in other.bodies]
     return max(range(len(shared)), key=shared.__getitem__) if any(shared) else None
@@ -590,7 +540,6 @@ def _best_of(scored: Sequence[tuple[_Choice, BodyPair, Score]]) -> tuple[_Choice
 
 
 def better(score: Score, than: Score) -> bool:
-    """Return whether the first score has more matches, or equally many and less than half the difference."""
     return score[0] > than[0] or (score[0] == than[0] and score[1] < TWICE_AS_WELL * than[1])
 
 
@@ -607,7 +556,6 @@ def _both(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
 
 
 def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    """Return the indices of the given joints of a body, and of all joints after these joints."""
     found, stack = [], [(body, edge) for edge in edges]
     while stack:
         here, edge = stack.pop()
@@ -618,7 +566,10 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 
 
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest motion between two planes, its tilt and its shift; ignore the normals' signs."""
+    """Return the smallest rotation between two planes, its angle (rad), and a shift of 0 m.
+
+    The signs of the normals and the distance of the planes do not count.
+    """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
     return smallest_motion(
         start, end.reversed() if start.direction @ end.direction < 0.0 else end, turns=False
@@ -627,23 +578,19 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
 
 #: Maximum number of joint orders that are tried; five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: Maximum number of joint pairs ahead of the current joint that one search compares; it takes some seconds.
+#: Maximum number of joint pairs that one search compares ahead of the current joint.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_AHEAD = 2000
-#: Larger tolerances that are tried if A and B differ: rad, and distances divided by the robot's size.
+#: Larger angle tolerances (rad) that are tried in this order if A and B differ.
 LARGER_TOLERANCES = (1e-11, 1e-9, 1e-7, 1e-5, 1e-3)
-#: Maximum number of exchanges that are tried: (a, d) and (c, b) instead of the pairs (a, b) and (c, d).
+#: Maximum number of attempts to exchange the partners of two joint pairs.
 MOST_EXCHANGED = 12
 
 
 def align(
     a: Mechanism, b: Mechanism, given: Mapping[str, str], choices: AlignmentChoices | None = None
 ) -> Alignment:
-    """Align B with A.
-
-    `given` contains names of joints of A, each with the name of the matched joint in B. Without prescribed
-    `choices`, such as zero offsets, the function finds the choices for which most joints and links agree.
-    """
+    """Align B with A; `given` maps joint names of A to joint names of B."""
     if choices is not None:
         for taken in choices.orders:
             b = b.reordered(taken)
@@ -665,11 +612,6 @@ def align(
 def _orders_to_try(
     a: Mechanism, b: Mechanism, given: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
 ) -> Iterator[Sequence[str]]:
-    """Yield other orders of consecutive joints of B that give the same motion.
-
-    If A has joints with all these names, the function yields A's order and its reverse. Otherwise it yields
-    the first `MOST_ORDERS` of `orders`. `run` contains the joints in their current order, from base to tip.
-    """
     called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
         yield from islice(orders, MOST_ORDERS)
@@ -681,7 +623,7 @@ def _orders_to_try(
 
 
 def _with_zeros_by_rules(best: Alignment) -> Alignment:
-    """Return the alignment with the zero offsets that fit the mimic rules, or `best` if it is better."""
+    """Use the zero offsets that fit the mimic rules, unless the alignment becomes worse."""
     zeros = zeros_by_rules(best, tolerance_of(best.a, best.b))
     if not zeros:
         return best
@@ -691,8 +633,9 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 
 def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignment:
-    """Replace joint pairs (a, b), (c, d) by (a, d), (c, b) if this is better, as for two mirrored arms."""
-    if best.only_a or best.only_b:  # some joints have no partner, so no exchange can make A and B equal
+    """Exchange the partners of two joint pairs if this is better, as for mirrored arms."""
+    # If a joint has no partner, no exchange can make A and B equal.
+    if best.only_a or best.only_b:
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_AHEAD)
     while (pairs := next((one for one in best.exchangeable(given) if one not in tried), None)) is not None:
@@ -711,10 +654,9 @@ def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignme
 def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignment:
     """Return an alignment whose largest difference is less than half that of `best`, or else `best`.
 
-    If all axes differ slightly, the normal search cannot find the right choices, because no axes agree. This
-    function repeats the search with larger and larger tolerances, until all axes agree. Finally the function
-    aligns the mechanisms with the choices of this search and the normal tolerance, so that the result
-    contains the small differences.
+    If all axes of A and B differ slightly, no axes agree, so the normal search cannot find the right choices.
+    This function repeats the search with larger tolerances. The new choices are then used with the normal
+    tolerance, so that the result contains the small differences.
     """
     a, b, (least, most), ahead = best.a, best.b, best.inner_differences, LookAhead(MOST_AHEAD)
     size = size_of(a, b)
@@ -748,7 +690,7 @@ def _best_alignment(
 #: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.
 TURNS = (0, 1, -1)
 #: Tolerance of a zero offset, divided by the angle tolerance.
-#: It is large, because a zero offset is inexact if it is computed from two axes close to each other.
+#: The factor is large, because two axes close to each other determine a zero offset inexactly.
 LEVER = 1e4
 
 
@@ -757,20 +699,13 @@ class _Rule:
     """The mimic rules of two matched joints.
 
     A's joint has the value m x + c, with a coordinate x of A. B's joint has the value n y + d, with a
-    coordinate y of B. In the alignment, B's value is s times A's value plus o, with the sign s and the zero
-    offset o.
+    coordinate y of B. In the alignment, B's value is s times A's value plus o (`offset`), with the sign s.
 
     Attributes:
-        step: Index of the joint pair.
-        slope: Number s m.
-        constant: Number s c.
-        n: Multiplier of B's rule.
-        d: Offset of B's rule.
-        offset: Zero offset o of B's joint in the alignment.
-        turns: Whether the joint is revolute.
-        free: Whether any offset o is possible: no axis, and no link with a matching name, comes after the
-            joint.
-        meets: Whether links of A and of B on the body after the joint have equal poses.
+        slope: The product s m.
+        constant: The product s c.
+        free: Whether any o is possible, because no link and no axis after the joint determines o.
+        meets: Whether matched links, or an axis that the joint moves, follow the joint.
     """
 
     step: int
@@ -784,15 +719,14 @@ class _Rule:
     meets: bool
 
     def beta(self, turn: int) -> float:
-        """Return beta of the resulting relation y = alpha x + beta, if `turn` full turns are added to o."""
+        """Return beta in y = alpha x + beta if `turn` full turns are added to o."""
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the zero offset o for which the mimic rules result in y = alpha x + beta."""
+        """Return the zero offset o that gives y = alpha x + beta."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:
-        """Return whether the joint can have this zero offset, up to rounding and (if revolute) full turns."""
         difference = offset - self.offset
         if self.turns:
             difference = math.remainder(difference, 2.0 * math.pi)
@@ -828,7 +762,6 @@ def _near(x: float, y: float, tolerance: Tolerance) -> bool:
 
 
 def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
-    """Group the joint pairs that depend on the same coordinate of A and the same coordinate of B."""
     groups = dict[tuple[str, str], list[_Rule]]()
     for i, step in enumerate(alignment.steps):
         if step.unlike or step.kind not in ("turns", "prismatic"):
@@ -843,13 +776,12 @@ def _groups(alignment: Alignment) -> Iterator[list[_Rule]]:
 
 
 def _as_rule(joint: Joint) -> tuple[str, float, float]:
-    """Return the coordinate that moves a joint, and the multiplier and offset of its mimic rule."""
     rule = joint.mimic
     return (joint.name, 1.0, 0.0) if rule is None else (rule.leader, rule.multiplier, rule.offset)
 
 
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether later axes or links with equal names determine a zero offset; also return `meets`."""
+    """Return whether later axes or links determine a zero offset, and `_Rule.meets`."""
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):

@@ -7,14 +7,15 @@ the path from the root leads through a joint from its child link to its parent l
 reversed.
 
 **Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define the
-joint's frame differently, and also the frame of the body after the joint. With constant rigid motions M and N
-for these two differences, A and B move in the same way if
+joint's frame differently, and also the frame of the body after the joint. Let the constant rigid motions M
+and N describe these two differences. A and B move in the same way if
 
     P_b = M P_a N,      or P_b = M P_a^-1 N if the joint is reversed in one model.
 
 For a floating joint, M and N may be any rigid motions. A planar joint reaches only translations and rotations
 in its plane (planar poses), so M P N must be a planar pose for every planar pose P. If M raises the plane by
-some distance, N must lower the plane by the same distance. If M turns the plane over, N must do so too.
+some distance, N must lower the plane by the same distance. If M turns the plane over, N must also turn the
+plane over.
 
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
 body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
@@ -26,14 +27,15 @@ poses differ, a constant rigid motion L describes the change of G. The link pose
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
 If A and B agree at joint i, then S'_i = S_i, t'_i = t_i, and L_i is the identity. If A and B agree
-everywhere, the two models have the same motion. If A and B differ somewhere, their motions differ, with one
-exception. If two revolute joints have the same line as axis, only the sum of their angles matters for the
-links after them.
+everywhere, the two models have the same motion. If A and B differ somewhere, their motions differ, with few
+exceptions. If two revolute joints have the same line as axis, only the sum of their angles matters for the
+links after them. If two consecutive prismatic joints are parallel, only the sum of their displacements
+matters.
 
 **Variables.** Each joint value of A or B is a constant plus a multiple of one variable. Each coordinate of A
 is a variable. A coordinate of B is a linear function of a variable. The sign and the zero offset of the joint
-determine this function. If a joint can move independently only in B, its coordinate is one more variable. In
-A, such a joint is a mimic joint or a fixed joint, for example.
+determine this function. If a joint can move independently only in B, the joint's coordinate is an additional
+variable. For example, the joint is a mimic joint or a fixed joint in A.
 """
 
 from __future__ import annotations
@@ -73,9 +75,8 @@ def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
-    The motion first rotates the axis about the first joint's origin to the direction of the second axis, and
-    then shifts the axis sideways. A rotation about the axis or a shift along the axis would only change the
-    joint's zero. The axis of a prismatic joint has only a direction, so its shift is 0.
+    The motion contains no rotation about the axis and no shift along the axis, because they only change the
+    joint's zero. The axis of a prismatic joint has only a direction, so the shift is 0.
     """
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
@@ -98,7 +99,7 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
 
 def pose_difference(T: FloatArray, other: FloatArray) -> tuple[float, float]:
     """Return the angle (rad) and the distance (m) between two poses."""
-    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # in thousands of calls, floats are faster than arrays
+    R = (other[:3, :3] @ T[:3, :3].T).tolist()  # Python floats are faster than small NumPy arrays
     sine = math.hypot(R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1])
     angle = math.atan2(sine, R[0][0] + R[1][1] + R[2][2] - 1.0)
     return angle, math.dist(other[:3, 3].tolist(), T[:3, 3].tolist())
@@ -111,7 +112,7 @@ def angle_about(u: FloatArray, R: FloatArray) -> float:
 
 
 def angle_from_to(u: FloatArray, x: FloatArray, y: FloatArray) -> float | None:
-    """Return the angle about u from x to y (after projection along u); None if x or y is parallel to u."""
+    """Return the angle (rad) about u from x to y; None if x or y is parallel to u."""
     x, y = x - u * (u @ x), y - u * (u @ y)
     if min(np.linalg.norm(x), np.linalg.norm(y)) < ALONG:
         return None
@@ -129,8 +130,8 @@ _Z = np.array([0.0, 0.0, 1.0])
 class JointTransform:
     """The conversion of a planar or floating joint: P_b = before P_a behind.
 
-    `before` is M and `behind` is N, both (4, 4). If the joint is reversed in one model (`back`), the
-    conversion is P_b = before P_a^-1 behind.
+    `before` and `behind` are the rigid motions M and N (4, 4) of the module docstring. If the joint is
+    reversed in one model (`back`), the conversion is P_b = before P_a^-1 behind.
     """
 
     before: FloatArray
@@ -138,15 +139,12 @@ class JointTransform:
     back: bool = False
 
     def __call__(self, kind: JointKind, own: FloatArray) -> FloatArray:
-        """Convert A's coordinates (..., 3 or 7) of a planar or floating joint to B's."""
+        """Convert coordinates (..., 3 or 7) of A's joint to coordinates of B's joint."""
         P = pose_of(kind, own)
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
-        """Return whether M and N are rigid motions, and the joint can reach M P N.
-
-        Two poses P are tested: the identity and the planar pose with the coordinates `_AWAY`.
-        """
+        """Return whether M and N are rigid motions, and the joint can reach M P N for two test poses P."""
         if not all(is_pose(JointKind.FLOATING, T) for T in (self.before, self.behind)):
             return False
         away = pose_of(JointKind.PLANAR, _AWAY)
@@ -167,7 +165,6 @@ def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
 
 
 def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
-    """Return the coordinates of a pose (..., 4, 4) of a planar or floating joint."""
     if kind is JointKind.PLANAR:
         return np.concatenate((P[..., :2, 3], planar_angle(P)[..., np.newaxis]), axis=-1)
     if kind is not JointKind.FLOATING:
@@ -176,7 +173,6 @@ def coordinates_of(kind: JointKind, P: FloatArray) -> FloatArray:
 
 
 def is_pose(kind: JointKind, T: FloatArray) -> bool:
-    """Return whether a planar or floating joint can reach a pose; a floating joint can reach every pose."""
     tolerance = _POSE_TOLERANCE * (1.0 + np.abs(T).max())
     if not is_rigid(T, tolerance):
         return False
@@ -234,19 +230,13 @@ class Mechanism:
 
     Args:
         tree: The robot.
-        separating: Indices of joints that are fixed in this model and move in the other model. The links
-            before and after such a joint belong to different bodies.
-        labels: A label for each link; links of two models with equal labels are paired. The default labels
-            are the link names.
+        separating: Indices of joints that are fixed in this model and move in the other model.
+        labels: A label for each link, by default the link's name. Links with equal labels are paired.
 
     Attributes:
-        homes: (4, 4) pose of each link in the zero configuration.
-        body_of: Index of each link's body.
-        bodies: The links of each body.
-        edges: The joints between the bodies.
+        homes: (4, 4) pose of each link in the root frame, in the zero configuration.
         orders: Each entry lists consecutive joints whose order `reordered` changed, in their new order.
         lengths: Length (m) of the path from the root to each link.
-        depths: Number of joints on the path from the root to each link.
     """
 
     def __init__(
@@ -274,16 +264,15 @@ class Mechanism:
         return self.tree.joints[edge.joint]
 
     def screw(self, edge: Edge) -> Screw:
-        """Return the screw of a revolute or prismatic joint in the zero configuration, in the root frame."""
         if (known := self._screws.get(edge.joint)) is None:
             T = self.homes[edge.joint + 1]
             known = self._screws[edge.joint] = Screw(T[:3, :3] @ self.joint(edge).axis, T[:3, 3])
         return known
 
     def reordered(self, names: Sequence[str]) -> Mechanism:
-        """Return a mechanism with consecutive joints in the order `names`, from the inner body outwards.
+        """Return a copy with joints in another order; remove links whose pose depends on the order.
 
-        The motion stays the same. The result does not contain the links between these joints.
+        `names` lists consecutive joints outwards. The caller must check that the order gives the same motion.
         """
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
@@ -299,7 +288,7 @@ class Mechanism:
         return other
 
     def allows_order(self, names: Sequence[str], tolerance: Tolerance) -> bool:
-        """Return whether the named joints are consecutive, and the order of `names` gives the same motion."""
+        """Return whether the joints are consecutive, and the order `names` gives the same motion."""
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         consecutive = all(self._follows(inner, outer) for inner, outer in pairwise(run))
@@ -315,11 +304,13 @@ class Mechanism:
         )
 
     def _follows(self, inner: Edge, outer: Edge) -> bool:
-        """Return whether only one joint follows `inner`, and this joint is `outer`."""
         return inner.outer == outer.inner and len(self.edges_of[outer.inner]) == 2
 
     def orders_of_runs(self, tolerance: Tolerance) -> Iterator[Iterator[list[str]]]:
-        """For each sequence of joints without a branch, yield all joint orders that give the same motion."""
+        """For each unbranched sequence of joints, yield all orders that give the same motion.
+
+        The current order comes first.
+        """
         run: list[Edge] = []
         for edge in self.edges:
             if run and self._follows(run[-1], edge):
@@ -330,7 +321,6 @@ class Mechanism:
         yield self._orders(run, tolerance)
 
     def _orders(self, run: Sequence[Edge], tolerance: Tolerance) -> Iterator[list[str]]:
-        """Yield all orders of the joints of `run` that give the same motion, first the order of `run`."""
         if not run:
             yield []
         for k, edge in enumerate(run):
@@ -354,7 +344,6 @@ class Mechanism:
 
     @cached_property
     def edges_of(self) -> list[list[Edge]]:
-        """The joints at each body."""
         found: list[list[Edge]] = [[] for _ in self.bodies]
         for edge in self.edges:
             found[edge.inner].append(edge)
@@ -371,8 +360,8 @@ class Mechanism:
         """Rounding error of poses that are read from a file (rad, and as a fraction of `size`).
 
         The parser and the writer of the file round each joint's constant transform and axis. A program that
-        merges fixed joints rounds only their product, so it rounds less often. The error includes the small
-        tilts of Pinocchio's axes (URDF514).
+        merges fixed joints rounds less often, because the program rounds only the product of the joints'
+        transforms. The error includes the small tilts of Pinocchio's axes (URDF514).
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT + WRITTEN + AXES) * joints) + 2.0 * sum(j.tilt for j in self.tree.joints)
@@ -401,8 +390,11 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) and the distance (m) of two axes; the distance is 0 if `placed` is false."""
-    ux, uy, uz = s.direction.tolist()  # in thousands of calls, floats are faster than arrays
+    """Return the angle (rad) between two axes, and the distance (m) of the point of `s` from the line `t`.
+
+    Axes with opposite directions count as parallel. If `placed` is false, the distance is 0.
+    """
+    ux, uy, uz = s.direction.tolist()  # Python floats are faster than small NumPy arrays
     vx, vy, vz = t.direction.tolist()
     sine = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     angle = math.atan2(sine, abs(ux * vx + uy * vy + uz * vz))
@@ -419,27 +411,22 @@ IDENTITY.setflags(write=False)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchedJoints:
-    """A joint of A and the matched joint of B.
+    """A joint of A and the matched joint of B, with their indices in the two trees.
 
     Attributes:
-        a: Joint of A (index in its tree).
-        b: Joint of B (index in its tree).
         kind: Kind of motion: "turns" (revolute), "prismatic", "planar" or "floating".
         previous: Index of the previous joint pair on the path from the base; -1 for the first pair.
         sense: +1 or -1, the factor in the formula of `offset`.
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) rigid motion L before B's joint (module docstring), in A's zero configuration.
-        axis: Screw of A's joint in the zero configuration. The screw describes the motion of the body that is
-            farther from the base.
-        other: Screw of B's joint, with the sign convention of `axis`. If the screws agree, `other` is the
-            same object as `axis`.
+        axis: Screw of A's joint in the zero configuration, for the motion of the body farther from the base.
+        other: Screw of B's joint, with the sign convention of `axis`; `axis` itself if the screws agree.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
-        shift: Distance (m) between the axes of the two joints; for planar or floating joints, between the
-            origins of their frames.
-        conversion: Converts the coordinates of A's planar or floating joint to those of B's joint; None if
-            the coordinates are equal.
-        unlike: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds of motion
-            differ; else "".
+        shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
+        unlike: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds differ;
+            else "".
+        conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
+            equal.
     """
 
     a: int
@@ -463,18 +450,16 @@ class MatchedJoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramePair:
-    """A link of A and the matched link of B.
+    """A link of A and the matched link of B, with their indices in the two trees.
 
     Attributes:
-        a: Link of A (index in its tree).
-        b: Link of B (index in its tree).
         previous: Index of the last joint pair on the path to the links; -1 if no joint moves the links.
         home: (4, 4) pose of A's link in the zero configuration.
         end: (4, 4) rigid motion L after the last joint (module docstring), in A's zero configuration.
         tilt: Angle (rad) between the frames of the two links.
         shift: Distance (m) between the origins of these two frames.
-        tool: (4, 4) pose of B's link in the frame of A's link, if the links are different end-effector
-            frames on the same body. Otherwise the identity.
+        tool: (4, 4) pose of B's link in the frame of A's link if the links are different end-effector
+            frames; else the identity.
     """
 
     a: int
@@ -501,14 +486,9 @@ class Alignment:
     """The result of aligning two mechanisms.
 
     Attributes:
-        a: One mechanism.
-        b: The other mechanism.
         base: The link of A and the link of B at which the search for matching joints started.
         X: (4, 4) pose of B's root in A's root frame.
         steps: The joint pairs, ordered outwards from the base.
-        frames: The pairs of matched links.
-        only_a: Indices of the joints that only A has.
-        only_b: Indices of the joints that only B has.
         matched: Number of joint pairs and link pairs that agree.
         worst: Largest difference (m) between matched joints or links. Angles are multiplied by `size_of`.
     """
@@ -532,7 +512,6 @@ class Alignment:
 
     @property
     def differing(self) -> int:
-        """Number of joint pairs and link pairs that differ."""
         return sum(step.differs or bool(step.unlike) for step in self.steps) + sum(
             frame.differs for frame in self.frames
         )
@@ -543,10 +522,7 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest distance (m) between matched axes or matched links with child joints.
-
-        Differences of 0 do not count.
-        """
+        """Smallest and largest nonzero difference (m) of matched axes and matched links with child joints."""
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
         size = size_of(self.a, self.b)
@@ -556,13 +532,11 @@ class Alignment:
 
     @property
     def names(self) -> dict[str, str]:
-        """The name of each matched joint in A, mapped to its name in B."""
         joints = self.a.tree.joints, self.b.tree.joints
         return {joints[0][step.a].name: joints[1][step.b].name for step in self.steps}
 
     @property
     def choices(self) -> AlignmentChoices:
-        """The choices that this alignment made, for example the zero offset of each joint."""
         joints = self.a.tree.joints
         return AlignmentChoices(
             (self.a.tree.links[self.base[0]], self.b.tree.links[self.base[1]]),
@@ -572,11 +546,10 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two matched joint pairs (a, b) and (c, d) for which (a, d) and (c, b) are possible too.
+        """Yield two joint pairs (a, b) and (c, d) for which (a, d) and (c, b) are possible too.
 
-        The two pairs have the same kind of motion and the same previous pair. The user did not match the
-        joints. The names of A's two joints do not occur in B. Each of the two pairs differs, or a joint or
-        link after it differs.
+        The names of a and c occur neither in B nor in `given`. Each of the two pairs differs, or a joint or
+        link after the pair differs.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -595,7 +568,7 @@ class Alignment:
         for a, b in pairs:
             if (known := matched_on.get((self.a.body_of[a], self.b.body_of[b]))) is None:
                 continue
-            # A matched pair of links on these bodies gives the transform from B's body to A's.
+            # A matched pair of links on these bodies gives the transform from B's body to A's body.
             T_a_b = known.end @ known.home @ known.tool @ inverse(self.b.homes[known.b])
             home, end = self.a.homes[a], IDENTITY
             tilt, shift = pose_difference(home, T_a_b @ self.b.homes[b])
@@ -607,7 +580,6 @@ class Alignment:
         return frames
 
     def indices(self, last: int) -> list[int]:
-        """Return the indices of the joint pairs on the path from the base to the pair `last`."""
         found = []
         while last >= 0:
             found.append(last)
@@ -628,11 +600,9 @@ class AlignmentChoices:
     """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
-        base: The search for matching joints starts at the bodies of these two links, one of A and one of B.
-            If `base` is None, the search chooses its first bodies by link names.
+        base: Links of A and B at which the search starts; None if the search chooses its first bodies.
         X: (4, 4) pose of B's root in A's root frame.
         zeros: (`sense`, `offset`) of `MatchedJoints`, by the joint's name in A; a missing joint has (1, 0.0).
-        conversions: Converts A's coordinates of a planar or floating joint to B's if they differ.
         orders: Each entry lists some consecutive joints of B in their new order.
     """
 
@@ -656,11 +626,10 @@ class LinearFunction:
     constant: float
 
     def moved(self, slope: float, constant: float) -> LinearFunction:
-        """Return slope * f + constant for this linear function f."""
         return LinearFunction(self.variable, slope * self.slope, slope * self.constant + constant)
 
     def at(self, values: Mapping[str, float | FloatArray]) -> float | FloatArray:
-        """Return the function's value for values of the variables; a variable without a value is 0."""
+        """Return the function's value; a variable that is not in `values` is 0."""
         return self.constant + (self.slope * values.get(self.variable, 0.0) if self.slope else 0.0)
 
 
@@ -670,14 +639,15 @@ class MatchedValues:
 
     a: LinearFunction
     b: LinearFunction
-    #: The value of B's joint as B's URDF defines it: sense * b + offset.
+    #: The value of B's joint as B's URDF defines the value: sense * b + offset.
     written: LinearFunction
-    #: Part of the constants' difference (rad or m) that exceeds the rounding error of one joint.
+    #: Amount (rad or m) by which the difference of the constants exceeds the rounding error of one joint.
+    #: The amount is 0 if the functions of A and B differ by more than rounding.
     rounding: float = 0.0
 
     @property
     def variable(self) -> str | None:
-        """The variable that moves both joints; None if two different variables move them."""
+        """The variable that moves both joints; None if two different variables move the joints."""
         if self.a.slope and self.b.slope and self.a.variable != self.b.variable:
             return None
         return self.a.variable if self.a.slope else self.b.variable
@@ -700,7 +670,6 @@ class Variables:
     leaders: dict[str, LinearFunction]
 
     def range(self, line: LinearFunction) -> tuple[float, float]:
-        """Return the smallest and the largest value of a linear function over its variable's range."""
         if not line.slope:
             return line.constant, line.constant
         ends = sorted(line.slope * end + line.constant for end in self.ranges[line.variable])
@@ -719,7 +688,6 @@ class Variables:
 
 
 def variables_of(alignment: Alignment, tolerance: Tolerance) -> Variables:
-    """Return the values of all matched joints of an alignment, and the ranges of their variables."""
     return _VariablesBuilder(alignment, tolerance).variables()
 
 
@@ -790,7 +758,8 @@ class _VariablesBuilder:
 
         The constants depend on zero offsets, which urdfkin computes from poses. In a pose, the rounding
         errors of all joints of the path add up, so the tolerance for the constants is the sum of these
-        errors. The slopes do not depend on zero offsets: their tolerance is the rounding error of one joint.
+        errors. The slopes do not depend on zero offsets, so the tolerance for the slopes is the rounding
+        error of one joint.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
@@ -800,10 +769,11 @@ class _VariablesBuilder:
         return self.tolerance.angle * max(1.0, abs(line.slope), abs(line.constant))
 
     def _ranges(self, pairs: list[MatchedValues | None]) -> dict[str, tuple[float, float]]:
-        """Return the range of each variable: the intersection of the limits of the joints that it moves.
+        """Return the range of each variable.
 
-        If A's limits and B's limits do not intersect, the range consists of A's limits. The limits of a mimic
-        joint do not count, because a mimic joint follows its rule even beyond its limits.
+        The range is the intersection of the limits of the joints that the variable moves. If this
+        intersection is empty or a single value, the range consists of A's limits. The limits of a mimic joint
+        do not count, because a mimic joint follows its rule even beyond its limits.
         """
         first: dict[str, tuple[float, float]] = {}
         own: dict[str, tuple[float, float]] = {}
@@ -835,11 +805,10 @@ class _VariablesBuilder:
                 if joint.nq == 1 and (name := f"{'ab'[k]}:{joint.name}") in mimic:
                     restrict(k, name, limits(joint))
         ranges = {name: own.get(name, (-math.inf, math.inf)) for name in [*own, *sorted(mimic - set(own))]}
-        return {name: ends if ends[0] < ends[1] else first[name] for name, ends in ranges.items()}
+        return {name: ends if ends[0] < ends[1] else first.get(name, ends) for name, ends in ranges.items()}
 
 
 def limits(joint: Joint) -> tuple[float, float]:
-    """Return the lower and the upper limit of a joint's value; infinite without limits."""
     if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
         return -math.inf, math.inf
     low, high = sorted((joint.limit.lower, joint.limit.upper))

@@ -29,7 +29,7 @@ distances by which each L can move the frame.
 
 **Second derivatives.** `curvature` bounds the second derivatives of D = p_B - p_A joint by joint. The
 derivative of a rotated vector with respect to the angle is the cross product of the axis u with the rotated
-vector. With d and y as above, the derivatives with respect to a joint value are
+vector. The derivatives of y and d with respect to a joint value are
 
     y_i = u' x (Y - o'),    d_i = u x (Y - e(S t) (y - d)) + (u' - u) x (Y - o') + u x (o - o'),
 
@@ -67,11 +67,10 @@ _CORNERS = 64
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A grid of points on the surface of a cube; each point represents a direction.
+    """Grid points on the surface of a cube, with `cells` cells along each edge of the cube.
 
-    Attributes:
-        cells: Number of cells along an edge of a face.
-        segments: Number of sides of the polygon that replaces a full circle of directions.
+    Each grid point represents a direction. `segments` is the number of sides of the polygon that replaces a
+    full circle of directions.
     """
 
     cells: int
@@ -84,7 +83,6 @@ class Grid:
 
     @property
     def lengths(self) -> FloatArray:
-        """The distances (n,) of the grid points from the cube's centre."""
         return np.asarray(np.linalg.norm(self.points, axis=1))
 
 
@@ -137,7 +135,7 @@ class Support:
         return np.where(largest > 0.0, found, 0.0).reshape(u.shape[:-1])
 
     def rotate(self, screw: Screw, low: float, high: float) -> Support:
-        """Return the support function after rotations about a screw by all angles from low to high (rad)."""
+        """Return the support function after rotations by all angles from low to high (rad)."""
         angles, factors = np.array(_corners(low, high, self.grid.segments)).T
         G = self.grid.points
         centred = Support(self.grid, self.values - G @ screw.point)
@@ -145,11 +143,11 @@ class Support:
         return Support(self.grid, best + G @ screw.point)
 
     def rotated_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
-        """Rotate the set by each angle; return the support function (angles, n) at the n grid points.
+        """Return the support function at the n grid points after a rotation by each angle; shape (angles, n).
 
-        The set rotates about `axis` by each of `angles` (rad). Since h'(u) is h(R^T u), the method rotates
-        the grid points by the opposite angle. For each angle, `factors` contains a multiplier for the grid
-        points' components perpendicular to the axis.
+        For each angle (rad), a rotation R about `axis` moves the original set. Since h'(u) is h(R^T u), the
+        method rotates the grid points by the opposite angle. `factors` contains a multiplier for each angle.
+        The method multiplies the grid points' components perpendicular to the axis by this multiplier.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -158,14 +156,13 @@ class Support:
         return self.at(along + across)
 
     def translate(self, direction: FloatArray, low: float, high: float) -> Support:
-        """Return the support function of the set after translations by all distances from low to high (m)."""
+        """Return the support function after translations by all distances from low to high (m)."""
         c = self.grid.points @ direction
         with np.errstate(invalid="ignore"):
             shifts = np.where(c == 0.0, 0.0, np.maximum(low * c, high * c))
         return Support(self.grid, self.values + shifts)
 
     def transform(self, T: FloatArray) -> Support:
-        """Return the support function of the set after a rigid motion T."""
         return Support(self.grid, self.at(self.grid.points @ T[:3, :3]) + self.grid.points @ T[:3, 3])
 
     def radius(self, screw: Screw) -> float:
@@ -199,7 +196,7 @@ def point(grid: Grid, p: FloatArray) -> Support:
 def _corners(low: float, high: float, segments: int) -> list[tuple[float, float]]:
     """Return the corners of a polygon that contains the arc of the unit circle from angle `low` to `high`.
 
-    Each corner is a pair: its angle (rad) and its distance from the circle's centre.
+    Each corner is a pair of an angle (rad) and a distance from the circle's centre.
     """
     if high - low >= _FULL_TURN:
         half = math.pi / segments
@@ -225,8 +222,8 @@ def upper_bounds(
     """Return upper bounds on the distance (m) and the angle (rad) between a frame's poses in A and in B.
 
     The bounds hold for all joint values within the limits. The bounds are 0 if nothing differs on the path.
-    They are inf if the difference grows without bound with the value of an unlimited joint, or if two matched
-    joints are of different kinds.
+    The bounds are inf if two matched moving joints are of different kinds, or if the difference grows without
+    bound with the value of an unlimited joint.
     """
     steps, pairs = from_first_difference(alignment, variables, frame)
     if not steps and frame.end is IDENTITY:
@@ -243,7 +240,7 @@ def upper_bounds(
 def from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the joint pairs and their values on the path to a frame, from the first pair that differs."""
+    """Return the joint pairs and values on the path to a frame, from the first pair that differs."""
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -260,7 +257,7 @@ def _angle_bound(
     variables: Variables,
     frame: FramePair,
 ) -> float:
-    """Bound the angle (rad) between A and B by a sum: the largest angle that each difference can cause."""
+    """Bound the angle (rad) between A and B: add the largest angle that each difference can cause."""
     total = pose_difference(IDENTITY, frame.end)[0]
     for step, pair in zip(steps, pairs, strict=True):
         total += pose_difference(IDENTITY, step.before)[0]
@@ -304,7 +301,7 @@ def _product(factor: float, reach: float) -> float:
 
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return d and y of the recursion (module docstring) at the frame, where the recursion begins."""
+    """Return d and y of the recursion (module docstring) at the frame."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -353,7 +350,7 @@ def d_after_joint(
 def _prismatic_difference(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, grid: Grid
 ) -> Support:
-    """Return the support function of the difference between the translations by two matched prismatic joints.
+    """Return the support function of the difference between the translations of two matched prismatic joints.
 
     The difference is largest if each joint value is at a limit.
     """
@@ -372,7 +369,7 @@ def _prismatic_difference(
 
 
 def _values(pair: MatchedValues, variables: Variables, grid: Grid) -> FloatArray | None:
-    """Return sample values (n,) of the variable that moves a revolute joint of A and its matched joint of B.
+    """Return sample values (n,) of the variable that moves a revolute joint of A and the matched joint of B.
 
     The result is None if different variables move the two joints, or if more than `MOST_VALUES` samples are
     needed. The result is also None if the variable has no limits and a slope is not 0, 1 or -1.
@@ -396,13 +393,17 @@ def _common_difference(
 
     `z` contains sample values of the variable; let h be the distance between two neighbouring samples.
     Between two samples, the bound is the larger of the bounds at these samples, plus h^2/8 times the largest
-    second derivative. If t' = t + c, the second derivative is R' P' x' - R P x, up to its sign. Here x is the
-    vector from A's axis to y, P is the projection perpendicular to A's axis, and R is the rotation about A's
-    axis. The corresponding symbols for B's axis are x', P' and R'. With the axes' directions u and u', |R' -
-    R| <= 2 |u'
-    - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part of x' - x is the offset of the axes. If t and
-    t' have different slopes, the second derivative is at most the sum of two terms, one for each joint. Each
-    term is the square of the slope of t or t', times the largest distance of y from the joint's axis.
+    second derivative.
+
+    Let x be the vector from A's axis to y. Let P be the projection perpendicular to A's axis, and let R be
+    the rotation about A's axis. The symbols x', P' and R' are the same quantities for B's axis. If t' = t +
+    c, the second derivative is R' P' x' - R P x, up to its sign. With the directions u and u' of the axes,
+    the following bounds hold: |R' - R| <= 2 |u' - u| + |c| and |P' - P| <= |u' - u|. The perpendicular part
+    of x' - x is the offset of the axes.
+
+    If t and t' have different slopes, the second derivative is at most the sum of two terms, one for each
+    joint. Each term is the square of the slope of t or t', times the largest distance of y from the joint's
+    axis.
     """
     G = y.grid.points
     axis, other = step.axis, step.other
@@ -506,7 +507,7 @@ def _second_derivatives(
 def _pass_to_front(
     vectors: _Vectors, steps: Sequence[MatchedJoints], pairs: Sequence[MatchedValues], variables: Variables
 ) -> float:
-    """Return the largest length of d at the base; `vectors` contains d and y at the last joint."""
+    """Bound the length of d at the base; `vectors` contains d and y at the last joint."""
     vectors = after_constant_motion(steps[-1], *vectors)
     for step, pair in zip(reversed(steps[:-1]), reversed(pairs[: len(steps) - 1]), strict=True):
         slides = step.kind != "turns"
@@ -519,7 +520,10 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return the derivatives of d and y (module docstring) with respect to a joint's value, without L."""
+    """Return the derivatives of d and y with respect to a joint's value, before the motion L.
+
+    The module docstring defines the symbols.
+    """
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
         return point(d.grid, other - u), point(d.grid, other)
@@ -528,9 +532,9 @@ def _derivatives(
 
 
 def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
-    """Return bounds on u x d and u' x y, where u and u' are the axes of a joint in A and in B.
+    """Return bounds on u x d and u' x (y - o'), with the symbols of the module docstring.
 
-    If u and u' differ, their difference is added to the bound on u x d.
+    The bound on u x d includes the terms (u' - u) x (Y - o') and u x (o - o') of the module docstring.
     """
     G, axis, other = d.grid.points, step.axis, step.other
     by_axes = 0.0
@@ -567,7 +571,7 @@ def relevant_joints(
     first = len(steps) - len(from_first_difference(alignment, variables, frame)[0])
     for i in reversed(range(first)):
         if _variables(pairs[i : i + 1]) & _variables(pairs[first:]):
-            first = i  # the result contains all joints from joint i on
+            first = i
     return steps[first:], pairs[first:]
 
 

@@ -33,7 +33,7 @@ from urdfkin.urdf.lint.runner import Examined
 from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
-#: Maximum number of passes of `--fix` over a file. One pass applies the fixes of one code without overlap.
+#: Maximum number of passes of `--fix` over a file. One pass applies non-overlapping fixes of one code.
 PASSES = 100
 
 #: Maximum angle (rad) by which rounding the numbers of a unit vector to doubles rotates the vector.
@@ -52,10 +52,9 @@ class Mended:
 def mend(
     text: Text, look: Callable[[Text], Examined], choose: Callable[[], Callable[[Finding], bool]]
 ) -> Mended:
-    """Apply the automatic fixes of a file, one code after another; do not change a file with errors.
+    """Apply the automatic fixes, one code after another; do not change a file with errors.
 
-    `choose` is called for each pass over the file, and returns a function that decides whether a finding is
-    fixed.
+    `choose` returns a new filter of findings for each pass over the file.
     """
     now, fixed, kept = look(text), list[Finding](), dict[str, str]()
     for _ in range(PASSES):
@@ -103,10 +102,7 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield the differences between two robots, except in unused values.
-
-    `turns` contains upper bounds on the allowed rotation (rad) of each joint's frame, by joint name.
-    """
+    """Yield the differences between two robots; `turns` has the allowed rotations (rad) by joint name."""
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return
@@ -163,10 +159,7 @@ _COUNTS = string.ascii_uppercase + string.ascii_lowercase
 
 
 def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -> str:
-    """Return the patch of one file; an empty string if the file does not change.
-
-    `before` and `after` are UTF-8. `shown` escapes the control characters of a text.
-    """
+    """Return the patch of one file, or an empty string; `shown` escapes control characters."""
     if before == after:
         return ""
     name = _relative(file)
@@ -178,7 +171,6 @@ def patch(file: str, before: bytes, after: bytes, shown: Callable[[str], str]) -
 
 
 def _relative(file: str) -> str:
-    """Return the name relative to the current folder if the file is in this folder."""
     below = os.path.relpath(file)
     return file if below.startswith(os.pardir) else Path(below).as_posix()
 
@@ -194,7 +186,6 @@ def _unified_diff(name: str, before: bytes, after: bytes) -> str:
 
 
 def _quote(name: str) -> str:
-    """Return a file name as git writes it."""
     if name.isascii() and name.isprintable() and not set(name) & {'"', "\\"}:
         return name
     return '"' + "".join(
@@ -204,7 +195,6 @@ def _quote(name: str) -> str:
 
 
 def _binary(name: str, before: bytes, after: bytes) -> str:
-    """Return git's binary patch, with the file name relative to the root of the repository."""
     here = Path.cwd()
     top = next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
     place = os.path.relpath(name, top)

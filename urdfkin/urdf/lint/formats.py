@@ -22,11 +22,7 @@ SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sar
 
 
 def as_sarif(findings: Sequence[Finding], version: str, silenced: Sequence[tuple[Finding, str]] = ()) -> str:
-    """Return a SARIF document with all rules about URDF files, and a result for each finding.
-
-    A rule about MJCF or USD files is included only if a finding has the rule's code. A silenced finding is
-    marked as "suppressed in source".
-    """
+    """Return a SARIF document with all rules about URDF files and a result for each finding."""
     codes = {finding.code for finding in findings}
     rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}
@@ -103,7 +99,6 @@ JSON_VERSION = 1
 
 
 def summary(findings: Sequence[Finding], files: int) -> str:
-    """Return one line with the numbers of errors, warnings, notes and files."""
     return f"{totals(findings)} in {files} file" + ("" if files == 1 else "s")
 
 
@@ -145,7 +140,6 @@ def _entry(finding: Finding) -> dict[str, Any]:
 
 
 def as_github(findings: Sequence[Finding]) -> str:
-    """Return a GitHub workflow command for each finding, errors first."""
     words = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
     return "\n".join(
         f"::{words[f.severity]} file={_property(f.file)},line={f.line},col={f.column},"

@@ -26,15 +26,13 @@ if TYPE_CHECKING:
 
 _MODULES = (parser, dialect, joints, bodies)
 
-#: The rules about URDF files, by the name of the module.
 TOPICS: dict[str, tuple[Rule, ...]] = {
     module.__name__.rpartition(".")[2]: tuple(x for x in vars(module).values() if isinstance(x, Rule))
     for module in _MODULES
 }
 
-#: The rules about URDF files by code, in ascending order.
 RULES = {rule.id: rule for rule in sorted(sum(TOPICS.values(), ()), key=lambda rule: rule.id)}
-#: The rules about MJCF and USD files, indexed by code.
+#: The rules about MJCF and USD files.
 OF_OTHERS = {x.id: x for x in vars(left_out).values() if isinstance(x, Rule)}
 
 #: Code of each rule. The keys of URDF601 are "urdf601", "601" and "rounded-pi".
@@ -54,7 +52,6 @@ class Page:
             that begins with a joint or a comment is completed with the links `base` and `tip`.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
-        question: The section about the problem in docs/questions.md, or None.
     """
 
     title: str
@@ -106,7 +103,6 @@ def _expand_parts(text: str, parts: dict[str, Any]) -> str:
 
 
 def find_rule(word: str) -> Rule:
-    """Return the rule with a code or short name, in upper or lower case."""
     known, name = RULES | OF_OTHERS, word.strip().lower()
     codes = CODES | {name: rule.id for rule in OF_OTHERS.values() for name in (rule.id.lower(), rule.slug)}
     if name not in codes:

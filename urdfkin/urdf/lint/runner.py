@@ -85,13 +85,7 @@ def check(
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """The result of a check; `robot` is None if the text is not a URDF.
-
-    Attributes:
-        data: The bytes of the text without a byte order mark. Positions in the findings are positions in
-            `data`.
-        silenced: The findings that a comment silences, each with the reason in the comment.
-    """
+    """The result of a check; positions in findings refer to `data`, which has no byte order mark."""
 
     text: Text
     data: bytes
@@ -109,10 +103,7 @@ def examine(
     fold: bool = False,
     wanted: Callable[[Finding], bool] | None = None,
 ) -> Examined:
-    """Check a text that `read_source` has returned, with the arguments of `check`.
-
-    `wanted` is called before findings are combined, and returns whether a finding is reported.
-    """
+    """Check a text with the arguments of `check`; `wanted` filters findings before they are combined."""
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data, limits)
@@ -126,28 +117,19 @@ def examine(
 
 
 def file_of(text: Text) -> Path | None:
-    """Return the path of the file that contains a text, or None."""
     path = Path(text.source if text.entry is None else text.label)
     return None if text.source in ("-", "<text>", "<bytes>") or not path.is_file() else path
 
 
 def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = True) -> tuple[Finding, ...]:
-    """Check the bytes of a URDF with the arguments of `check`; open no file and no network connection.
-
-    >>> [finding.code for finding in check_text(b"<robot name='r'><link name='base'/></robot>")]
-    []
-    """
+    """Check the bytes of a URDF with the arguments of `check`; open no file and no network connection."""
     report = Reporter("<text>", data, limits)
     read_urdf(report)
     return report.findings(fold=fold)
 
 
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
-    """Parse and check the file of `report`; return None if the file is not a URDF.
-
-    If `mimic` is False, all findings about mimic joints are notes. If `root_joint` is not None, the names
-    `root_joint` (joint) and `universe` (link) are errors.
-    """
+    """Parse and check the file of `report`; return None if the file is not a URDF."""
     root = read_document(report)
     read_comments(report, CODES)
     robot = None if root is None else read_robot(report, root)

@@ -55,7 +55,6 @@ class Baseline:
 
     Attributes:
         counts: For each key, the number of baseline findings that this run has not yet encountered.
-        root: The folder to which the file names in the keys are relative.
         met: Number of baseline findings that this run has encountered.
     """
 
@@ -64,7 +63,6 @@ class Baseline:
     met: int = 0
 
     def knows(self, finding: Finding) -> bool:
-        """Return whether a finding is known, and count the finding as encountered."""
         key = key_of(finding, relative(finding.file, self.root))
         if self.counts[key] <= 0:
             return False
@@ -101,7 +99,7 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return the text of a baseline with `findings`, which are about the checked `files`.
+    """Return the text of a baseline with the findings of the checked `files`.
 
     Entries of an older baseline at `path` are copied if they are about other existing files.
     """
@@ -127,7 +125,7 @@ _WORDS = {
     str: "a string",
 }
 
-#: Default patterns of robot files, without .xacro, because most .xacro files are a part of a robot.
+#: Default patterns of robot files, without .xacro, because most of them contain only a part of a robot.
 INCLUDE = ("*.urdf",)
 
 
@@ -140,7 +138,6 @@ class Settings:
 
     @property
     def root(self) -> Path:
-        """The folder to which patterns are relative."""
         return Path() if self.file is None else self.file.parent
 
     def ignored_in(self, file: str) -> frozenset[str]:
@@ -165,7 +162,6 @@ def find_settings(start: Path) -> Settings:
 
 
 def read_settings(file: Path) -> Settings:
-    """Return the settings in a file; raise InputError if there is no table [tool.urdfkin]."""
     if (found := _table(file, pipes=True)) is None:
         remedy = "add this table, or omit --config"
         raise InputError("no table [tool.urdfkin]", where=str(file), remedy=remedy)
@@ -208,7 +204,6 @@ def _is_list_of_strings(value: Any) -> bool:
 
 
 def codes(words: Iterable[str]) -> frozenset[str]:
-    """Return the codes of the rules that `words` select (see `find_rules`)."""
     return frozenset(rule.id for word in words for rule in find_rules(word))
 
 
@@ -263,10 +258,7 @@ class Choice:
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings in an older version of a file; None if no finding can be new.
-
-    The finding about a missing mesh is new if the mesh file was deleted after the older version.
-    """
+    """Return the findings in an older version of a file; None if no finding can be new."""
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
@@ -277,6 +269,7 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
     found = () if old is None else look(replace(text, data=old)).findings
+    # The finding about a mesh is new if the mesh file was deleted after the older version.
     if any(os.fsencode(name) in text.data for name in version.gone):
         found = tuple(finding for finding in found if finding.code != MESH_MISSING.id)
     elif same:
@@ -289,11 +282,7 @@ LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 
 def collected(word: str, settings: Settings, include: Sequence[str], exclude: Sequence[str]) -> list[str]:
-    """Return the sorted files that `word` names; raise SourceError if there is none.
-
-    `word` is a file, `-`, a catalogue name, a folder, or a pattern with `*`, `?`, `[` or `**`. A file that
-    the user names is never excluded.
-    """
+    """Return the sorted files that `word` names; raise SourceError if there is none."""
     path = Path(word)
     if word == "-" or word in catalogue():
         return [word]

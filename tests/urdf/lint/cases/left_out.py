@@ -41,7 +41,7 @@ def _held(*equalities: str) -> str:
     return _two(more=f"<equality>{''.join(equalities)}</equality>")
 
 
-_USELESS = "left out, since kinematics does not use them: "
+_USELESS = "kinematics does not use "
 _SPATIAL = '<tendon><spatial name="t"><site site="s"/><site site="r"/></spatial></tendon>'
 
 _MOTOR = '<actuator><motor joint="a"/></actuator>'
@@ -78,7 +78,7 @@ CASES = [
     ),
     Mjcf(
         "a-tendon", _two(inside='<site name="s"/>', world='<site name="r"/>', more=_SPATIAL),
-        "MJCF101 tendon: tendons have no effect here", f"MJCF102 {_USELESS}1 tendons",
+        "MJCF101 tendon: urdfkin ignores tendons", f"MJCF102 {_USELESS}1 tendons",
     ),
     Mjcf(
         "a-mocap-body", _two(world='<body name="hand" mocap="true"/>'),

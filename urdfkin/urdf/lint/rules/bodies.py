@@ -107,10 +107,7 @@ def _check_moments(report: Reporter, tensor: Element, moments: list[float], mass
 
 
 def principal_moments(moments: Sequence[float]) -> tuple[float, float, float]:
-    """Return the eigenvalues of an inertia tensor, smallest first, by the trigonometric cubic formula.
-
-    The moments are ixx, ixy, ixz, iyy, iyz, izz.
-    """
+    """Return the eigenvalues of the tensor (ixx, ixy, ixz, iyy, iyz, izz), smallest first."""
     scale = max(map(abs, moments))
     if scale == 0.0:
         return (0.0, 0.0, 0.0)
@@ -239,10 +236,7 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report each missing mesh file, and each missing package once.
-
-    `beside` is the file of the URDF. If `beside` is None, only `package://` meshes are searched.
-    """
+    """Report missing meshes; if the URDF's file `beside` is None, search only `package://` meshes."""
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
     for mesh in _meshes(root):
@@ -289,7 +283,6 @@ def _meshes(root: Element) -> Iterator[Element]:
 
 
 def _is_missing_file(filename: str, beside: Path | None) -> bool:
-    """Return whether a mesh address is a path, relative to the URDF, of a missing file."""
     local = filename and ("://" not in filename or filename.startswith("file://"))
     if beside is None or not local:
         return False

@@ -77,7 +77,7 @@ def _check_namespaces(report: Reporter, root: Element) -> None:
             remedy = "insert the content of the other file here; urdfkin did not open it"
             found = quoted(element.attributes.get("href", f"<{element.tag}>"))
             report.add(INCLUDE, "the file includes another file", element, found=found, remedy=remedy)
-    # Kinematics uses only macros directly inside <robot> or inside a joint.
+    # A macro changes the kinematics only if it is directly inside <robot>, or inside a joint.
     if _report_xacro(report, "xacro", macros, lambda x: x.parent in (None, root) or x.holder.tag == "joint"):
         return
     expressions: list[_Place] = [
@@ -128,7 +128,6 @@ def _more(group: Sequence[object]) -> str:
 
 
 def is_expression(value: str) -> bool:
-    """Return whether a value contains a xacro expression."""
     start = value.find("${")
     return (start >= 0 and "}" in value[start:]) or _COMMAND.search(value) is not None
 
@@ -178,7 +177,7 @@ ATTRIBUTES = {
     if colon
 }
 
-#: Tags and attributes of other formats for a pose or a part of a pose. URDF readers skip these names.
+#: Tags and attributes for poses in other formats. URDF readers skip these names.
 _FOREIGN = {"quat_wxyz", "quat", "xyzrpy", "pose", "euler", "pos", "xyz", "rpy"}
 
 #: Attributes that `--fix` does not remove, because other elements or formats define them.
@@ -198,7 +197,6 @@ _VECTORS = ("origin", "axis")
 
 
 def check_vocabulary(report: Reporter, root: Element) -> None:
-    """Report unknown, misplaced and repeated elements, unknown attributes, and text between tags."""
     stack = [root]
     while stack:
         element = stack.pop()
@@ -338,7 +336,7 @@ def check_prefixes(report: Reporter, root: Element) -> None:
 
 def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
     found: dict[str, list[_Place]] = {}
-    declared = Counter(("xml", "xmlns"))  # XML itself declares these prefixes.
+    declared = Counter(("xml", "xmlns"))  # XML itself declares `xml` and `xmlns`.
     stack = [(root, False)]
     while stack:
         element, leaving = stack.pop()
@@ -357,7 +355,7 @@ def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix with its attribute; None for the prefix of the tag."""
+    """Yield each namespace prefix and its attribute; None for the prefix of the tag."""
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

@@ -39,7 +39,6 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether the joints form a tree; report all reasons why not."""
     edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
     sound = len(edges) == len(robot.joints) and _have_one_parent(report, robot, edges)
     return _one_root(report, robot) and sound and bool(robot.links)
@@ -113,10 +112,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
 
 
 def _one_root(report: Reporter, robot: RobotRecord) -> bool:
-    """Return whether exactly one link has no parent; report all further links without a parent.
-
-    No link is reported if a joint has no valid child, because the joint may be the parent joint of any link.
-    """
+    """Return whether exactly one link has no parent; report all further links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
     if not roots and robot.links and not report.failed:
@@ -124,7 +120,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # Another finding reports the joint without a valid child.
+        return False  # A joint without a valid child may be the parent joint of these links.
     parents = {joint.parent for joint in robot.joints}
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
@@ -140,10 +136,10 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Smaller deviations of an axis length from 1 are usual for numbers with few digits, so they are notes.
+#: A smaller difference between an axis length and 1 is usual for an axis with few digits.
 LENGTH_ROUNDING = 2e-4
 
-#: Maximum difference of a unit vector's length from 1, as in `kinematics.inputs`.
+#: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
 _ONE = 1e-12
 
 #: An axis counts as the z axis if its xy part is at most this fraction of its z component.
@@ -153,7 +149,7 @@ _LEAN = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _SNAPPED = 1e-12
 
-#: Smaller tilts (rad) are not reported, because the error bounds in `verify.bounds` include these tilts.
+#: The error bounds in `verify.bounds` include smaller tilts (rad).
 _TILT = 2.0**-52
 
 
@@ -225,7 +221,7 @@ def tilts(robot: RobotRecord) -> dict[str, float]:
 
 
 def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
-    """Return the coordinate axis that replaces an axis in Pinocchio, and their angle (rad), or None."""
+    """Return the coordinate axis that Pinocchio uses instead of an axis, and the angle (rad) between them."""
     if axis is None:
         return None
     for i in range(3):
@@ -411,7 +407,6 @@ class _MimicChecker:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
-        """Report limits that do not allow the full range of the mimicked joint."""
         from urdfkin.model.configuration import allowed_range, range_words
         from urdfkin.model.tree import Limit
 
@@ -437,10 +432,7 @@ class _MimicChecker:
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a chain of mimic joints, and the joint at the end of the chain.
-
-        The joint is None if the chain is a circle or ends at a missing joint.
-        """
+        """Return the combined rule of a mimic chain, and the joint at the end of the chain or None."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
@@ -504,7 +496,7 @@ NOTICEABLE = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi, each with the least number of decimals of a rounded value that is reported.
+#: Multiples of pi. A rounded multiple is reported only if it has the given number of decimals or more.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -577,7 +569,6 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
 
 
 def _replace_words(raw: str | None, words: list[str]) -> str:
-    """Replace the words of an attribute value, but keep the white space."""
     blanks = re.split(r"[^ \t\r\n]+", raw or "")
     if len(blanks) != len(words) + 1:  # The text contains references such as `&#32;`.
         return " ".join(words)
@@ -585,7 +576,7 @@ def _replace_words(raw: str | None, words: list[str]) -> str:
 
 
 def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
-    """Return the multiple of pi, and its value, to which a decimal number is close, or None.
+    """If a decimal number is a rounded multiple of pi, return the multiple and its value (rad).
 
     >>> rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
@@ -649,7 +640,6 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
 
 
 def _check_places(report: Reporter, robot: RobotRecord) -> None:
-    """Report joints with the parent, type, origin and axis of another joint."""
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL:

@@ -45,7 +45,7 @@ _SEARCHED = 10_000_000
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
 #: Tags of MJCF elements that findings mention without a name, each with the printed tag.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: A prim in a USD text file, or a delimiter of other content.
+#: Pattern for the start of a prim in a USD text file, or for a delimiter of other content.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
 #: Beginnings and ends of comments, arrays, strings and references in a USD text file.
 _NO_PRIM = {
@@ -91,7 +91,7 @@ def _finding(
 
 
 def _positions(data: bytes, search: Callable[[bytes], Iterator[tuple[str, str | None, int, int]]]) -> _Places:
-    """Return the position of each element; for equal names, the position of the first element."""
+    """Return the position of each element, or of the first element if elements have the same name."""
     found: dict[tuple[str | None, str | None], tuple[int, int]] = {}
     for element, name, first, last in search(data[:_SEARCHED]):
         found.setdefault((element, name), (first, last))
