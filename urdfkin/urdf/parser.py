@@ -480,7 +480,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report text that is too long for a number, because the conversion takes quadratic time."""
+        """Report text that is too long, because converting text to a number takes quadratic time."""
         if len(written) <= most:
             return False
         found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"

@@ -918,6 +918,7 @@ class _StageReader:
         if (np.eye(4) == B).all():
             yield joint, here, there
             return
+        # In a URDF, the child link has the joint frame, so a different child frame needs a further link.
         between = unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield fixed_joint(unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
@@ -1104,7 +1105,7 @@ class _StageReader:
         return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
-        """Return whether a prim or an ancestor has a `unitsResolve` operation, which converts units."""
+        """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""
         while prim and not prim.IsPseudoRoot():
             if any(str(name).endswith(":unitsResolve") for name in prim.GetPropertyNames()):
                 return True
