@@ -1,4 +1,4 @@
-"""Read robot descriptions (URDF, xacro, MJCF) as a `KinematicTree`, and write a tree as URDF.
+"""Read robot descriptions (URDF, xacro, MJCF, USD) as a `KinematicTree`, and write a tree as URDF.
 
 | Step | Module | Result |
 |---|---|---|
@@ -7,5 +7,6 @@
 | Tree | `reader` | `KinematicTree` |
 | Writer | `writer` | URDF text |
 
-Two modules read robots in other formats: `mjcf` reads MJCF, and `foreign` reads objects of other libraries.
+Three modules read robots in other formats: `mjcf` reads MJCF, `usd` reads USD, and `foreign` reads objects of
+other libraries.
 """

@@ -9,8 +9,8 @@ The folder of a package `name` is the first of these folders that exists:
 1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself if the folder has the name of the
    package, then `src/name`, then `src/*/name`.
 2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
-3. For each folder above the file: the folder itself if it or its `package.xml` has the package's name,
-   then the subfolder with the package's name.
+3. For each folder above the file `beside`: the folder itself if the folder or its `package.xml` has the
+   package's name, then the subfolder with the package's name.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ class Entry:
         relative_path: Path of the URDF, relative to the robots folder of urdfkin or of example-robot-data.
         limbs: Base frame and tip frame of each arm, leg or finger. The first limb is the default.
         mimic: Whether the mimic rules of the URDF are valid. By default, urdfkin ignores invalid mimic rules.
+        reason: Why the mimic rules of the URDF are invalid, or None.
         poses: Joint values (rad or m) by joint name, for each named pose. Other joints are at 0.
         own: True for a robot in urdfkin's own files, False for a robot of example-robot-data.
     """
@@ -75,8 +76,8 @@ def robots(family: str | None = None) -> tuple[str, ...]:
     """Return the robot names that `load` accepts.
 
     Args:
-        family: The family of the robots: arm, biped, gripper, hand, humanoid, quadruped, ...; text: robots of
-            the textbook. None: all robots.
+        family: A family such as arm, biped, gripper, hand, humanoid, quadruped, or text (the robots of the
+            textbook). None selects all robots.
 
     Raises:
         UnknownNameError: there is no such family.

@@ -20,7 +20,7 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum memory of the process in bytes. Python and the imported libraries need about a tenth.
+#: Maximum memory of the process in bytes. Python and its imported libraries need about a tenth as much.
 MEMORY = 2 * 1024**3
 
 #: Audit events that are always allowed.
@@ -74,7 +74,7 @@ def _nearest_folder_with(mark: str, path: Path) -> list[Path]:
 
 
 def _lies_in(root: str, path: str) -> bool:
-    """Return whether a path is `root` or is below `root`; hidden files and folders do not count."""
+    """Return whether `path` is `root`, or is below `root` and no part below `root` is hidden."""
     if path == root:
         return True
     above = root.rstrip(os.sep) + os.sep

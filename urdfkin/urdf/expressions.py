@@ -1,7 +1,7 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
 xacro itself passes expressions to `eval`, and searches for forbidden names only in the outermost code object.
-A lambda, a comprehension or a chain of attributes can therefore run any program. This module interprets the
+A lambda in the expression can therefore read any attribute, and run any program. This module interprets the
 syntax tree of an expression. An expression may contain only values, operators, the functions of xacro and the
 methods in `_METHODS`.
 """

@@ -144,7 +144,7 @@ _ENDLESS = 1e300
 
 @dataclass(frozen=True, slots=True)
 class Modelled:
-    """The kinematic tree of a Pinocchio model, with the index of each link in the model.
+    """The kinematic tree of a Pinocchio model, with the index of each link's Pinocchio joint or frame.
 
     `joints` contains the links whose frame is a joint frame; `frames` contains all other links.
     """
@@ -190,7 +190,7 @@ class _ModelReader:
                 yield int(self.frames[i].parentJoint), i
 
     def read(self) -> Modelled:
-        """Convert all frames, then all moving joints; a parent frame has a lower index."""
+        """Convert all frames, then all moving joints. In Pinocchio, a parent frame has a lower index."""
         for i in range(len(self.frames)):
             self._frame(i)
         frames = zip(self.frames, self.kinds, strict=True)

@@ -54,7 +54,7 @@ _HEAD = 65_536
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A part that the tree does not represent or represents differently, or a probable mistake.
+    """A part of the file that the tree omits or changes, or a probable mistake in the file.
 
     Attributes:
         where: The tag and the name of the element, or the tag alone; None for the whole file.
@@ -173,7 +173,7 @@ class Mjcf:
         return np.stack(columns, axis=1)
 
     def residuals(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's residuals (n, equalities) of active equalities between joints; NaN for others."""
+        """Return MuJoCo's residuals (n, equalities) of active joint equalities; NaN for other equalities."""
         mujoco, m = library(), self.model
         off = mujoco.mjtDisableBit
         m.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_FRICTIONLOSS)
@@ -279,6 +279,7 @@ def read_mjcf(source: str | os.PathLike[str], name: str, *, whole: bool = False)
         found = str(error).strip().replace("\n", "; ")
         raise InputError("MuJoCo does not accept this MJCF", where=name, found=found) from None
     notes += [_align_note(body.name, whole=whole) for body in aligned]
+    # In a file in radians, large limits are not suspicious, because some hinges turn several times.
     notes += _angle_unit(mujoco, model) if spec.compiler.degree else ()
     return Mjcf(
         tree, model, fused, reader.frames, reader.coordinates, reader.mimic_equalities,
@@ -534,6 +535,7 @@ def fixed_joint(name: str, T: FloatArray) -> Joint:
 
 
 def leads(rules: Mapping[str, Mimic], joint: str, to: str) -> bool:
+    """Return whether the chain of mimicked joints that begins at `joint` contains `to`."""
     while joint in rules and joint != to:
         joint = rules[joint].leader
     return joint == to

@@ -1,8 +1,8 @@
 """Parse a URDF: first the bytes into XML elements, then the elements into records of links and joints.
 
 The XML parser is expat, which reports the position of every start tag, keeps namespace prefixes, parses deep
-nesting without recursion, and opens no file. If a document type declaration defines entities or
-refers to an external file, parsing stops with an error. No entity is expanded.
+nesting without recursion, and opens no file. If a document type declaration defines entities or refers to an
+external file, parsing stops with an error. No entity is expanded.
 
 A number is a finite decimal number in ASCII, as in urdfdom. The parser repairs nothing; every problem is a
 finding.
@@ -172,7 +172,7 @@ COMMON_DEPTH = 256
 #: Number of bytes that expat parses in one call.
 _PIECE = 1_000_000
 
-#: Maximum number of stored characters of an element's text.
+#: If an element's text has this many stored characters, the parser stores no further text.
 _STORED = 2 * QUOTED
 
 #: Attributes whose value is the name of a link or joint.
@@ -240,6 +240,7 @@ class _Builder:
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
             self.parser.Parse(whole[start:fed], False)
+            # If a tag or comment is incomplete, `CurrentByteIndex` is the position of its first byte.
             if fed - max(self.parser.CurrentByteIndex, 0) > self.limits.markup:
                 found = f"more than {self.limits.markup} bytes without an end"
                 self.refuse(MARKUP_TOO_LONG, "markup", "a tag, comment or instruction is too long", found)
@@ -413,7 +414,7 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers; report invalid numbers with `bad_number`, wrong counts with `bad_vector`."""
+    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`."""
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
@@ -479,7 +480,7 @@ class NumberReader:
         return None
 
     def _is_too_long(self, element: Element, attribute: str, written: str, most: int) -> bool:
-        """Report text that is too long for a number, because the conversion takes quadratic time."""
+        """Report text that is too long, because converting text to a number takes quadratic time."""
         if len(written) <= most:
             return False
         found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
@@ -492,6 +493,7 @@ class NumberReader:
 
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
         """Report tabs and line ends between or after numbers: urdfdom refuses these characters."""
+        # expat replaces tabs and line ends in attributes by spaces, so this check reads the raw text.
         raw = self.report.raw(element, attribute)
         if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
             return
@@ -674,7 +676,7 @@ class JointReader:
         return joint
 
     def required(self, element: Element, attribute: str, example: str, *, number: bool = False) -> str | None:
-        """Return a required attribute; report a missing attribute, but do not report an empty number."""
+        """Return a required attribute; report a missing value, and an empty value if `number` is False."""
         value = element.attributes.get(attribute)
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"
@@ -806,7 +808,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    # Long words are not cached, because a word may have megabytes.
+    # The cache must not store long words, because a word may have megabytes.
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 

@@ -1,7 +1,7 @@
 """Records of the XML elements and joints of a URDF, and limits on the size of a URDF.
 
-In the record of a joint, None marks a value that the parser cannot read. If a value is missing in the file,
-the record contains the default of the URDF specification.
+In the record of a joint, `kind`, `parent`, `child` and `axis` are None if the parser cannot read the value. A
+missing origin or axis has the default value of the URDF specification.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ class Limits:
 
     Attributes:
         depth: Maximum number of levels of nested elements. Pinocchio never reads more than the default.
+        attributes: Maximum number of attributes of one element.
         name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
         number: Maximum number of characters of one number.
         markup: Maximum number of bytes of one tag, comment or processing instruction. The default is that of

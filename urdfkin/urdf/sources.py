@@ -109,7 +109,7 @@ class Text:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: The path or name to read the URDF again; otherwise `<text>`, `<bytes>` or `<file>`.
+        source: The path or name for reading the URDF again; otherwise `<text>`, `<bytes>` or `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
     """
 
@@ -203,6 +203,7 @@ def _read_string(word: str, most: int) -> Text:
 
 def _in_package(name: str, path: str) -> Path:
     """Return the file of a `package://` address; raise SourceError for an unknown package."""
+    # The search for the package goes upwards from the current folder.
     folder = find_package(name, Path(path).absolute())
     if folder is None:
         raise SourceError(
@@ -239,7 +240,7 @@ def as_word(path: Path) -> str:
 
 
 def entry_of(word: str) -> Entry | None:
-    """Return the catalogue entry of a name; None for a path, which has a dot or a separator."""
+    """Return the catalogue entry of a name, or None. A word with a dot or a separator is a path."""
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

@@ -592,7 +592,10 @@ class _StageReader:
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return body path, joint frame (m), `size` and `rounded` for body i; None for a missing body."""
+        """Return the path of body i (None for the world), the joint frame (m), `size` and `rounded`.
+
+        The joint frame is relative to the body. Return None if the body does not exist.
+        """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
         xyzw = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], float)
@@ -622,11 +625,11 @@ class _StageReader:
         return body, A, length, off
 
     def _rounding_of_transforms(self, path: str, body: str | None, length: float) -> tuple[float, float]:
-        """Bound the motion (m and rad) of a prim when transforms are rounded to single precision.
+        """Bound how far rounding to single precision moves (m) and rotates (rad) a prim relative to a body.
 
-        The motion is relative to `body`; None is the world. If the rotation of a prim is rounded, the prim
-        rotates and all prims below the prim also move. `length` is the sum of the lengths (m) of the
-        translations from the body to the prim. Transforms in half precision are ignored.
+        The body None is the world. If the rotation of a prim is rounded, the prim rotates, and all prims
+        below the prim also move. `length` is the sum of the lengths (m) of the translations from the body to
+        the prim. Transforms in half precision are ignored.
         """
         moved = turned = False
         operation, prim = self.pxr.UsdGeom.XformOp, self.stage.GetPrimAtPath(path)
@@ -747,7 +750,7 @@ class _StageReader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # Without a rigid base, an articulation can have several groups of bodies attached to the world.
+        # If the base is not a rigid body, an articulation can have several groups of connected bodies.
         merged: dict[str, list[_Articulation]] = {}
         for group in groups.values():
             single = not group.path and len(group.bodies) == 1
@@ -915,6 +918,7 @@ class _StageReader:
         if (np.eye(4) == B).all():
             yield joint, here, there
             return
+        # In a URDF, the child link has the joint frame, so a different child frame needs a further link.
         between = unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield fixed_joint(unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there

@@ -40,7 +40,7 @@ _COMPUTED = re.compile(r"\$[({]|[*?\[]")
 
 
 def arguments_of(path: Path, find: Find) -> set[str] | None:
-    """Return the argument names of a xacro file and its included files; None if a file is unreadable."""
+    """Return the argument names of a xacro file and its included files; None if not all are readable."""
     names, files, seen = set[str](), [path.absolute()], set[Path]()
     try:
         while files:
