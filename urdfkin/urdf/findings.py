@@ -94,9 +94,12 @@ ROUNDING = 2.0**-50
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """The automatic fix of a finding; the edits are sorted and do not overlap.
+    """The automatic fix of a finding.
 
-    `turns` is an upper bound on the angle (rad) by which the fix rotates a joint frame.
+    Attributes:
+        edits: Edits of the text, in file order, without overlap.
+        turns: Upper bound on the angle (rad) by which the fix rotates the frame of a joint; 0 if the fix does
+            not change the robot.
     """
 
     edits: tuple[Edit, ...]

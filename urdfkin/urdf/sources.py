@@ -77,15 +77,32 @@ class Origin:
 
     @property
     def words(self) -> str:
+        """The source and the options as written on a command line.
+
+        >>> Origin("my arm.urdf", root_joint="floating").words
+        "'my arm.urdf' --root-joint floating"
+        >>> Origin("<text>").words
+        '-'
+        """
         return " ".join(filter(None, (shlex.quote(self.again), self.options)))
 
     @property
     def lock_words(self) -> str:
+        """The locked joints in words; an empty string if there are none.
+
+        >>> Origin("panda", lock=(("finger", 0.04), ("wrist", 0.0))).lock_words
+        'finger locked at 0.04, wrist at 0'
+        """
         locks = enumerate(self.lock)
         return ", ".join(f"{name}{'' if i else ' locked'} at {value:.6g}" for i, (name, value) in locks)
 
     @property
     def python(self) -> str:
+        """The call of `load` in Python.
+
+        >>> Origin("panda", mimic=False).python
+        "urdfkin.load('panda', mimic=False)"
+        """
         values = {
             "mimic": self.mimic,
             "root_joint": self.root_joint,

@@ -76,8 +76,12 @@ class VerificationError(UrdfkinError):
 class CertificateLine:
     """The line of a certificate about one quantity.
 
-    `checked` counts the results that the oracle confirmed. `worst` is the largest difference in multiples of
-    eps * scale. `share` is the largest ratio of a difference to its bound.
+    Attributes:
+        checked: Number of results that the oracle confirmed.
+        worst: Largest difference between a checked result and the oracle's result, in multiples of eps *
+            scale.
+        share: Largest ratio of a difference to its bound.
+        unchecked: Number of results that were not checked.
     """
 
     quantity: str
