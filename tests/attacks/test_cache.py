@@ -47,7 +47,7 @@ def third_number(x: Any) -> Any:
 
 
 def new_kernel() -> Kernel:
-    return Kernel(third_number, (NUMBERS,), True)
+    return Kernel(third_number, (NUMBERS,))
 
 
 def call(kernel: Kernel) -> int:

@@ -265,7 +265,7 @@ FORGED: dict[str, Any] = {
         {**d["differences"][0], "place": "joint x"}),
     "has no interval": lambda d: d["frames"].pop(),
     "a frame has two intervals": lambda d: d["frames"].append(d["frames"][-1]),
-    "rad there, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
+    "rad at `q_a`, `q_b`, not": lambda d: d["frames"][-1].update(radians_seen=0.1),
     f"`remarks`: the entry {COMPUTED}": lambda d: d["remarks"].append(d["differences"][0]),
     f"`up_to`: the entry {COMPUTED}": lambda d: d["up_to"].append("senses"),
     "`tools`: the entries differ from those computed from the models": lambda d: d["tools"].append(
