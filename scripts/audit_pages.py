@@ -271,7 +271,7 @@ def walk(browser: Browser, page: Page) -> list[str]:
     for _ in range(_PRESSES):
         ActionChains(browser.chrome).send_keys(Keys.TAB).perform()
         stop = browser.js(_FOCUS)
-        if stop is None:  # The Tab key has left the page.
+        if stop is None:  # The Tab key moved the focus out of the page.
             break
         what, shown, sized, named = stop
         seen.append(what)

@@ -33,7 +33,7 @@ PAGE, FIGURES, LISTED = (DOCS / f"libraries.{suffix}" for suffix in ("md", "json
 DATA: dict[str, Any] = tomllib.loads(LISTED.read_text("utf-8"))
 FEATURES = {name: features()[name] for name in DATA["features"]}
 CONFIGURATIONS = 3
-#: Maximum difference (m, and entries of a rotation matrix) of a correct pose.
+#: A pose is correct if no coordinate (m) and no entry of the rotation matrix differs by more than this.
 #: Rounding in double precision causes less than 1e-14; a misread element causes more than 1e-3.
 RIGHT = 1e-9
 #: Time limit (s) of the process that tests the remaining features.

@@ -161,7 +161,7 @@ def convergence(figure: Any) -> None:
     axes.set(xlabel="step [s]", ylabel="error of the orientation [rad]")
     axes.grid(color="#e6eaee", linewidth=0.8, which="both")
     axes.legend()
-    axes.set_title("7.57, integrated: half the step gives 1/16 of the error")
+    axes.set_title("Integration of equation 7.57: half the step gives 1/16 of the error")
 
 
 def acceleration_parts(figure: Any) -> None:

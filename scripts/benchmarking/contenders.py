@@ -186,7 +186,7 @@ def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
 
 
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of dynibo, which has rows [angular; linear] and joints in breadth-first order.
+    """Yield the calls of dynibo. Its Jacobians have rows [angular; linear] and breadth-first columns.
 
     dynibo returns matrices column by column.
     """

@@ -415,7 +415,7 @@ def quantile(share: float, freedom: int) -> float:
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Maximum number of repetitions that compute base and target alternately.
+#: Maximum number of repetitions; each repetition computes the pose of the base, then the target's position.
 _REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.
 _CONSTANT_TARGET = 1e-9

@@ -399,7 +399,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that cancel options for the file formats of other robots."""
+        """Return arguments of `load` that turn off the options for another robot's file format."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None

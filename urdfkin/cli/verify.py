@@ -201,7 +201,7 @@ def _functions(target: str) -> dict[str, Callable[..., object]]:
     named = {key: value for key, value in functions.items() if _quantity_in_name(key)}
     if not named:
         raise InputError(
-            "no function of the file has the name of a quantity",
+            "no function in the file is named after a quantity",
             where=path,
             found=", ".join(functions) or "no function",
             remedy=f"name a function {' or '.join(_QUANTITIES[:3])}, or pass FILE.py:FUNCTION",

@@ -199,7 +199,7 @@ class Comparator:
         return align(*self.mechanisms, {**self.spellings, **self.joint_map})
 
     def result_without_bounds(self, alignment: Alignment, variables: Variables) -> Sameness:
-        """Return the result without intervals; set the tool frames in `alignment`."""
+        """Return the result without intervals, and store the tool frames in `alignment`."""
         names = tuple([joint.name for joint in tree.joints] for tree in self.trees)
         links = self.trees[0].links, self.trees[1].links
         changes = changes_of_b(alignment, self.tolerance, tables=self.has_table)

@@ -54,7 +54,7 @@ def reversed_like(chain: FrameChain, choices: Choices, reference: DHTable) -> tu
             best, best_flip = key, flip
     if best[0] > _SAME_ROBOT:
         raise InputError(
-            "the table of `like` describes another robot",
+            "the table in the argument `like` describes a different robot",
             where=f"{chain.robot}, {chain.base} to {chain.tip}",
             found=f"cells of the table that differ by {best[0]:.0%} of the reach, or by {best[0]:.2g} rad",
             remedy="use --compare to see the differences between the table and the URDF",

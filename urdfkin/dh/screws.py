@@ -252,7 +252,7 @@ def screws_of(path: FrameChain) -> ProductOfExponentials:
 
 
 def _rigid(M: FloatArray) -> FloatArray:
-    """Return the rigid transform nearest to a handwritten zero pose; an exact pose is unchanged."""
+    """Return the rigid transform nearest to M, whose numbers may be rounded; an exact M is unchanged."""
     T = np.eye(4)
     T[:3] = M[:3]
     R = T[:3, :3]

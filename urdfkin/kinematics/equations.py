@@ -112,7 +112,7 @@ def tangential(w, d):
 
 
 def point_velocity(vel, w, d):
-    """7.59, 7.115, 7.128: velocity of a link's point P + d; the link's point P has the velocity vel."""
+    """7.59, 7.115, 7.128: velocity of the point P + d of a link whose point P has the velocity vel."""
     return plus(vel, tangential(w, d))
 
 

@@ -134,7 +134,7 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Describe how far a frame of the unchanged B is from A's frame, unless this is a rounding error."""
+    """Describe the largest distance between frames of A and the unchanged B, unless it is rounding."""
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""

@@ -389,7 +389,9 @@ class Robot(Displayable):
 
     @property
     def tip_frame(self) -> str:
-        """The default tip: the tip in the robot catalogue, or the leaf link after the most moving joints.
+        """The default tip: the tip in the robot catalogue, or a leaf link.
+
+        The leaf link is the one with the largest number of moving joints between it and the root.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").tip_frame
@@ -470,7 +472,9 @@ class Robot(Displayable):
 
     @property
     def poses(self) -> dict[str, FloatArray]:
-        """Named configurations (nq,): `neutral`, `ready` (within all limits), and those of the catalogue.
+        """Named configurations (nq,): `neutral`, `ready`, and the configurations in the robot catalogue.
+
+        `neutral` is the zero configuration. In `ready` all joints are within their limits.
 
         >>> import urdfkin
         >>> robot = urdfkin.load("panda")

@@ -656,7 +656,8 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     what = "quaternion changes its sign" if floating else "angle jumps by a whole turn"
     more = f" and {len(k) - 1} more samples" if len(k) > 1 else ""
     return (
-        f"joint {joint.name}: its {what} after sample {k[0]}{more}; this change is no motion and was removed"
+        f"joint {joint.name}: its {what} after sample {k[0]}{more};"
+        " the robot does not move there, so this change was removed"
     )
 
 

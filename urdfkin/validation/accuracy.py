@@ -47,7 +47,7 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(exact, otypes=[object])
-#: The result has one line for each group of these representations of the orientation.
+#: Groups of representations of the orientation; the result has one line for each group.
 #: Angles about fixed axes are left out: their Jacobians are those of Euler angles with reversed rows.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),

@@ -93,7 +93,7 @@ class AccuracyResult:
     def _check_same(self, other: AccuracyResult) -> None:
         if other._settings != self._settings:
             raise InputError(
-                "the stores have accuracy results with different options",
+                "the accuracy results in the two folders were computed with different options",
                 where=str(other._store.folder),
                 found=f"{other._settings.options}, and {self._settings.options} in {self._store.folder}",
                 remedy="use the same options of the accuracy study for all stores",

@@ -392,7 +392,7 @@ class Mistakes:
         for k, name in enumerate(names):
             title = name.removeprefix("link:")
             yield (
-                f"the result is that of the frame {title!r} instead of {self.frame!r}",
+                f"the function returns the result of the frame {title!r} instead of {self.frame!r}",
                 partial(np.asarray, every[:, k]),
             )
 

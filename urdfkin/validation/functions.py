@@ -523,7 +523,7 @@ class _Run:
     def _called(
         self, inputs: tuple[FloatArray, ...], shape: tuple[int, ...], first: int, total: _Total
     ) -> tuple[FloatArray, list[int]]:
-        """Return the function's results of the right shape, and the indices of their configurations."""
+        """Return the results that have the right shape, and the indices of their configurations."""
         n = len(inputs[0])
         if self.batch:
             array = _call(self.function, [x.copy() for x in inputs], (n, *shape), first, total, n)

@@ -70,7 +70,7 @@ def _largest(ours, theirs, scale, i, k):
 
 @helper()
 def _is_in_threes(scale, k):
-    """Return whether the three linear rows of a scale are equal, and also the three angular rows."""
+    """Return whether the scales of the three linear rows are equal, and those of the three angular rows."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):

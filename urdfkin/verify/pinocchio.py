@@ -89,7 +89,7 @@ def _wrong_module(module: Any) -> InstallationError:
         else "a file that belongs to no installed package"
     )
     return InstallationError(
-        "the module `pinocchio` is not Pinocchio, the library that checks results",
+        "the installed module `pinocchio` is not the robotics library Pinocchio, which checks results",
         where=str(file),
         found=found,
         remedy=f"Pinocchio's package is called pin: {cure}; pip install {_REQUIREMENT}",
@@ -185,7 +185,7 @@ def _parse(text: str, tree: KinematicTree, root_joint: str | None, mimic: bool) 
             return pin.buildModelFromXML(text, roots[root_joint](), mimic=mimic)
         return pin.buildModelFromXML(text, mimic=mimic)
     except (ValueError, RuntimeError) as error:
-        # `urdfkin check` reports every known reason, so the reason of this error is unknown.
+        # `urdfkin check` would have reported every known reason, so the reason of this error is unknown.
         raise OracleError(
             "Pinocchio does not accept this robot",
             where=tree.name,

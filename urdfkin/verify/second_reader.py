@@ -105,7 +105,7 @@ def second_reading(
 
 
 def read(text: str) -> yourdf.Robot:
-    """Return yourdfpy's robot of a URDF text without meshes; yourdfpy may raise any exception."""
+    """Read a URDF text with yourdfpy, without meshes; yourdfpy may raise any exception."""
     import yourdfpy  # yourdfpy imports trimesh, which is slow.
 
     # The text is encoded as UTF-8, so an XML declaration with another encoding must be removed.

@@ -57,7 +57,10 @@ class Ellipsoid:
 
 
 def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, angular: bool) -> Arrows:
-    """Return arrows for the Jacobian's columns, for a motion with one sample in LOCAL_WORLD_ALIGNED."""
+    """Return arrows for the columns of the Jacobian in a motion `x`.
+
+    The motion has one sample, and its reference frame is LOCAL_WORLD_ALIGNED.
+    """
     rows = slice(3, 6) if angular else slice(0, 3)
     columns = x.jacobian[0, rows].T
     keep = np.linalg.norm(columns, axis=1) > 1e-9

@@ -38,7 +38,7 @@ _MOTIONS = {
 }
 CELLS = tuple(_MOTIONS)
 _IS_ANGLE = np.array([motion.turns for motion in _MOTIONS.values()])
-#: Longest step of a fit (rad, or metres per metre of reach).
+#: Maximum change of a parameter in one step of the fit (rad, or a fraction of the reach).
 _LONGEST_STEP = 0.5
 _MAX_STEPS = 40
 _LEAST_DECREASE = 1e-9

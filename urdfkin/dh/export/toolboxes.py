@@ -1,7 +1,8 @@
 """Export a table for two toolboxes: roboticstoolbox (Python) and MATLAB's Robotics System Toolbox.
 
-For roboticstoolbox the code makes a `DHRobot`. A DHRobot cannot have a fifth parameter, and must have at
-least one joint. A table with Hayati rows, or without rows, therefore becomes a `Robot` of elementary
+For roboticstoolbox the code makes a `DHRobot`. The rows of a DHRobot have
+four parameters, and a DHRobot has at least one joint. A table with Hayati rows, which have five parameters,
+or without rows therefore becomes a `Robot` of elementary
 transforms (Haviland and Corke).
 
 For the Robotics System Toolbox the code makes a `rigidBodyTree`. The toolbox's "dh" and "mdh" transforms

@@ -295,7 +295,7 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (ours, theirs), before, after in firsts:
         lines = ours.screw, theirs.screw
-        # Without later axes, other axes of the body determine the pose, such as a drone's rotor axes.
+        # If no joint follows, other axes of the same body determine the pose, as for a drone's rotors.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
         for start in (theirs.screw, theirs.screw.reversed()):
             K = smallest_motion(start, ours.screw, turns=True)[0]

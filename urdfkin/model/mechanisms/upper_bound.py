@@ -470,7 +470,7 @@ def curvature(
         if not all(one.a.slope or one.b.slope for one in both):
             continue
         alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
-        # For a prismatic joint i, `bound` contains no difference between the values of the two joints.
+        # If joint i is prismatic, `bound` does not include the difference of the values in A and B.
         if not all(alike) and (bound or (steps[i].kind != "turns" and not alike[0])):
             return names, np.full_like(M, math.inf)
         if not bound:

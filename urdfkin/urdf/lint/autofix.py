@@ -83,7 +83,7 @@ def mend(
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # Codes with very many findings are not compared, because the reporter stores only some of these findings.
+    # The reporter stores only some findings of a code that is very frequent, so such codes are not compared.
     many = {finding.code for finding in before.findings if finding.also}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)

@@ -236,7 +236,10 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
-    """Report missing meshes and packages; without the URDF file `beside`, only `package://` meshes."""
+    """Report missing meshes and packages.
+
+    If the path `beside` of the URDF file is unknown, only `package://` meshes are checked.
+    """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
     for mesh in _meshes(root):
