@@ -124,7 +124,7 @@ def test_the_diagnosis_names_a_wrong_frame(name: str, quantity: str) -> None:
     joint = next(i for i in reversed(tree.path(tree.frame_link(frame))) if tree.joints[i].kind.nv)
     other = tree.links[tree.joints[joint].parent]  # the link before the last moving joint
     found = check(name, quantity, computed(robot, quantity, f"link:{other}"))
-    check_diagnosis(found, f"that of the frame {other!r}")
+    check_diagnosis(found, f"returns the result of the frame {other!r}")
 
 
 def flip(x: np.ndarray, at: list[int]) -> np.ndarray:
@@ -501,7 +501,7 @@ def test_a_wrong_target_is_refused_in_one_line(tmp_path: Path) -> None:
         ("none.py:jacobian", "no such file"),
         ("mine.py:jacobean", "jacobian"),
         ("mine.py:compute", "pass --quantity"),
-        ("empty.py", "no function of the file"),
+        ("empty.py", "no function in the file"),
         ("ends.py", "SystemExit"),
         ("broken.py:jacobian", "ZeroDivisionError"),
     ):
