@@ -223,7 +223,8 @@ def test_an_interrupt_keeps_finished_chunks_and_drops_waiting_chunks(
     assert (report.interrupted, report.exit_code) == (True, 130)
     first, second, third = report.robots
     assert first.verdict is ValidationVerdict.VERIFIED
-    assert (second.samples, second.verdict) == (28, ValidationVerdict.NOT_VERIFIED)
+    assert (second.samples, second.results > 0) == (28, True)
+    assert second.verdict is ValidationVerdict.NOT_VERIFIED
     assert second.reason == "interrupted: 28 of 63 samples were compared"
     assert (third.samples, third.results) == (0, 0)
     assert third.reason == "interrupted: 0 of 63 samples were compared"
