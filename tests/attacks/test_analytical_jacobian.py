@@ -80,9 +80,6 @@ def test_the_line_that_reproduces_an_error_calls_analytical_jacobian(
     np.testing.assert_array_equal(eval(line), robot.analytical_jacobian(q[k], "tool0", "XYX", base=base))
 
 
-# -- no false alarm ----------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
 def test_the_analytical_jacobian_is_verified_in_each_representation(representation: str) -> None:
@@ -143,9 +140,6 @@ def test_half_turns_with_quaternions_of_either_sign_are_verified(free: Robot) ->
     free.analytical_jacobian(np.hstack((axis, quat)), "body", "quaternion")
 
 
-# -- the line of nodes -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", SEQUENCES)
 def test_rates_from_the_line_of_nodes_equal_difference_quotients(name: str) -> None:
     rng = np.random.default_rng(1)
@@ -172,8 +166,6 @@ def test_the_line_of_nodes_is_independent_code_and_quaternion_rates_preserve_the
     assert np.abs(np.einsum("ni,nij->nj", quat, rates)).max() < 1e-15
     assert np.abs(np.linalg.norm(rates, axis=1) - np.linalg.norm(J[:, 3:], axis=1) / 2).max() < 1e-14
 
-
-# -- mutants -----------------------------------------------------------------------------------------
 
 #: Names that are easily confused, each with its replacement in a mutant.
 OTHER_NAMES = {

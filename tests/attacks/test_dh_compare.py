@@ -89,9 +89,6 @@ def test_cells_that_do_not_explain_the_difference_are_not_listed() -> None:
     assert "Omit --no-fit" in text
 
 
-# -- calibrated robots ----------------------------------------------------------------------------------
-
-
 def calibrated(tree: KinematicTree, seed: int, radians: float = 3e-4, metres: float = 2e-4) -> KinematicTree:
     rng, joints = np.random.default_rng(seed), []
     for joint in tree.joints:
@@ -135,9 +132,6 @@ def test_cells_that_differ_are_sorted_by_the_effect_on_the_tip() -> None:
     effects = [one.tip for one in compare(published("ur5")[0], table).differences]
     assert len(effects) > 5
     assert effects == sorted(effects, reverse=True)
-
-
-# -- digits ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -213,9 +213,6 @@ def test_limits_of_the_file_are_enforced_when_a_robot_is_loaded() -> None:
             urdfkin.load(text)
 
 
-# -- many robots ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.long
 def test_three_hundred_deleted_robots_leak_no_object_file_descriptor_or_memory() -> None:
     # `python -m scripts.leaks 10000` is a longer run of this test.

@@ -89,9 +89,6 @@ def test_an_undeclared_prefix_is_reported_exactly_if_a_reader_with_namespaces_re
     assert bool(undeclared(text)) == refused
 
 
-# -- unexpanded xacro ------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "text",

@@ -65,8 +65,6 @@ def test_a_decimal_number_is_accepted(text: str) -> None:
     assert done.data["q"] == [[0.0, 0.0, NUMBERS[text], 0.0, 0.0, 0.0]]
 
 
-# -- columns ---------------------------------------------------------------------------------------------
-
 NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_2_joint,wrist_3_joint"
 
 
