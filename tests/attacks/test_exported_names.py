@@ -17,34 +17,25 @@ from tests.urdfs import loaded
 from urdfkin.export import LANGUAGES, write
 from urdfkin.export.code import FrameCode
 from urdfkin.export.naming import all_safe, comment_name, safe, title
-from urdfkin.robot import Robot
 
 pytestmark = pytest.mark.slow
 _PYTHON = [to for to, (_, suffix) in LANGUAGES.items() if suffix.endswith(".py")]
 _WORDS = (
     "int", "double", "for", "end", "function", "template", "class", "lambda", "def", "out", "in", "L",
     "q", "v", "a", "sin", "cos", "sqrt", "R", "T", "real", "np", "main", "eye", "pi", "i", "None", "_",
-    "__", "t1", "R1_00", "1", "2dof", "é",
-    "\u202e", "*/", "??/", "%{", "%}", "...", "\\", "a" * 300, "x" * 41,
+    "__", "t1", "R1_00", "1", "2dof", "é", "\u202e", "*/",
+    "??/", "%{", "%}", "...", "\\", "a" * 300, "x" * 41,
 )  # fmt: skip
-
-
-_HOSTILE = ("c comment", "python", "matlab", "latex", "line")
 ROBOTS = {
     "every name at once": chain_of_all(),
-    **{kind: urdf(IN_XML[kind]) for kind in _HOSTILE},
+    **{kind: urdf(IN_XML[kind]) for kind in ("c comment", "python", "matlab", "latex", "line")},
     **{word: urdf(word) for word in ("int", "end", "class", "\u00e9", "1")},
 }
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
-def robot(request: pytest.FixtureRequest) -> Robot:
-    return loaded(ROBOTS[request.param], verify=False)
-
-
-@pytest.fixture(scope="module")
-def written(robot: Robot) -> FrameCode:
-    return code(robot, quantities=("placement",))
+def written(request: pytest.FixtureRequest) -> FrameCode:
+    return code(loaded(ROBOTS[request.param], verify=False), quantities=("placement",))
 
 
 def said(*command: str | Path) -> str:
