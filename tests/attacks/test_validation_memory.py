@@ -140,44 +140,38 @@ def test_the_needed_memory_grows_with_the_cube_of_nv_and_with_the_links() -> Non
         memory.check(trees[0], 28, needs[0] - 1)
 
 
-@pytest.fixture
-def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], None]:
-    """Return a function that writes files of a simulated system: /proc and /sys/fs/cgroup."""
+MACHINE = {"proc/meminfo": "MemTotal: 9000000 kB\nMemAvailable:  8000000 kB\n"}
+CONTAINER = MACHINE | {
+    "proc/self/cgroup": "4:memory:/docker/abc\n2:cpu:/docker/abc\n",
+    "cgroup/memory/memory.limit_in_bytes": "3000000000\n",
+    "cgroup/memory/memory.usage_in_bytes": "1000000000\n",
+}
+OUTER_GROUP = MACHINE | {
+    "proc/self/cgroup": "0::/outer/inner\n",
+    "cgroup/outer/memory.max": "6000000000\n",
+    "cgroup/outer/memory.current": "5000000000\n",
+    "cgroup/outer/memory.stat": "anon 1\ninactive_file 2000000000\n",  # these files count as free memory
+    "cgroup/outer/inner/memory.max": "max\n",
+    "cgroup/outer/inner/memory.current": "1000000000\n",
+}
+INNER_GROUP = OUTER_GROUP | {"cgroup/outer/inner/memory.max": "1500000000\n"}
+
+
+@pytest.mark.parametrize(
+    ("files", "limit"),
+    [(MACHINE, 4_096_000_000), (CONTAINER, GB), (OUTER_GROUP, 1_500_000_000), (INNER_GROUP, 250_000_000)],
+    ids=["machine", "container", "outer group", "inner group"],
+)
+def test_the_memory_limit_is_half_of_the_free_memory_of_the_machine_container_or_control_group(
+    files: dict[str, str], limit: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(memory, "_PROC", tmp_path / "proc")
     monkeypatch.setattr(memory, "_GROUPS", tmp_path / "cgroup")
     monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-
-    def write(name: str, text: str) -> None:
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-
-    write("proc/meminfo", "MemTotal: 9000000 kB\nMemAvailable:  8000000 kB\n")
-    return write
-
-
-def test_the_memory_limit_depends_on_the_free_memory_of_the_machine_and_of_a_container(
-    system: Callable[[str, str], None],
-) -> None:
-    assert memory.limit() == 8_000_000 * 1024 // 2
-    system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
-    system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
-    system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
-    assert memory.limit() == 1_000_000_000
-
-
-def test_the_memory_limit_depends_on_control_groups_and_counts_inactive_files_as_free(
-    system: Callable[[str, str], None],
-) -> None:
-    system("proc/self/cgroup", "0::/outer/inner\n")
-    system("cgroup/outer/memory.max", "6000000000\n")
-    system("cgroup/outer/memory.current", "5000000000\n")
-    system("cgroup/outer/memory.stat", "anon 1\ninactive_file 2000000000\n")
-    system("cgroup/outer/inner/memory.max", "max\n")
-    system("cgroup/outer/inner/memory.current", "1000000000\n")
-    assert memory.limit() == 1_500_000_000
-    system("cgroup/outer/inner/memory.max", "1500000000\n")
-    assert memory.limit() == 250_000_000
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    assert memory.limit() == limit
 
 
 @pytest.mark.long
