@@ -38,9 +38,9 @@ def written(request: pytest.FixtureRequest) -> FrameCode:
     return code(loaded(ROBOTS[request.param], verify=False), quantities=("placement",))
 
 
-def said(*command: str | Path) -> str:
+def said(*command: object) -> str:
     """Return the output of a program that must succeed."""
-    return subprocess.run([*command], capture_output=True, text=True, check=True).stdout
+    return subprocess.run([*map(str, command)], capture_output=True, text=True, check=True).stdout
 
 
 def test_no_name_becomes_code_in_the_export_of_any_language(written: FrameCode) -> None:

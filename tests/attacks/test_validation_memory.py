@@ -10,7 +10,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import python
-from tests.urdfs import joint, limit, robot
+from tests.urdfs import chain, joint, limit
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
@@ -23,14 +23,6 @@ from urdfkin.validation.robot_input import subject
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 GB = 10**9
-
-
-def chain(joints: int, kind: str, leaves: int = 0) -> str:
-    inside = "" if kind == "fixed" else limit()
-    parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", 'xyz="0.1 0 0"', more=inside) for i in range(joints)]
-    ends = range(joints, joints + leaves)
-    parts += [joint(f"j{i}", "fixed", f"l{joints}", f"l{i + 1}", 'xyz="0.1 0 0"', "") for i in ends]
-    return robot(*parts) if parts else '<robot name="r"><link name="l0"/></robot>'
 
 
 def test_blocks_contain_each_item_once_and_processes_share_half_of_the_free_memory(
@@ -89,7 +81,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
 def test_the_memory_of_a_compiled_tree_is_linear_in_the_number_of_links() -> None:
     peaks = []
     for links in (500, 2000):
-        tree = urdfkin.load(chain(links, "fixed")).tree
+        tree = urdfkin.load(chain([""] * links, "fixed")).tree
         tracemalloc.start()
         compile_tree(tree, range(len(tree.links)))
         peaks.append(tracemalloc.get_traced_memory()[1])
@@ -127,13 +119,15 @@ def test_a_robot_that_needs_too_much_memory_is_not_verified_and_pinocchio_builds
 
 @pytest.mark.long
 def test_the_needed_memory_grows_with_the_cube_of_nv_and_with_the_links() -> None:
-    trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
+    trees = [urdfkin.load(chain([limit()] * n, "revolute")).tree for n in (100, 200)]
     needs = [memory.needed_bytes(tree, 28) for tree in trees]
     assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
     assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
-    assert memory.needed_bytes(urdfkin.load(chain(0, "fixed")).tree, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
-    wide = urdfkin.load(chain(100, "revolute", leaves=1000)).tree
-    assert memory.needed_bytes(wide, 28) > needs[0] + 1000 * 16_000
+    one_link = urdfkin.load('<robot name="r"><link name="l0"/></robot>').tree
+    assert memory.needed_bytes(one_link, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    leaves = (f'<link name="e{i}"/>' + joint(f"e{i}", "fixed", "l100", f"e{i}") for i in range(1000))
+    wide = chain([limit()] * 100, "revolute").replace("</robot>", "".join([*leaves, "</robot>"]))
+    assert memory.needed_bytes(urdfkin.load(wide).tree, 28) > needs[0] + 1000 * 16_000
     memory.check(trees[0], 28, needs[0])
     memory.check(trees[0], 28, None)
     with pytest.raises(OracleError, match="not enough memory"):
@@ -188,12 +182,12 @@ def test_the_memory_limit_depends_on_the_limit_of_the_process() -> None:
 def test_many_fixed_links_are_checked_in_little_memory() -> None:
     done = python(
         "import resource, sys, warnings; warnings.simplefilter('ignore')\n"
-        "from tests.attacks.test_validation_memory import chain\n"
+        "from tests.urdfs import chain\n"
         "from urdfkin.validation.campaign import validate\n"
         "def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024\n"
-        "assert validate(chain(300, 'fixed'), samples=1).passed\n"
+        "assert validate(chain([''] * 300, 'fixed'), samples=1).passed\n"
         "before = peak()\n"
-        "assert validate(chain(5000, 'fixed'), samples=1).passed\n"
+        "assert validate(chain([''] * 5000, 'fixed'), samples=1).passed\n"
         "print(peak() - before)"
     )
     assert int(done.stdout) < 400  # MB; the paths to all frames took 1 GB
