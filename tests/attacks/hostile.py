@@ -1,7 +1,9 @@
 """Names that attack programs which display them, and robots with such names."""
 
 from collections.abc import Sequence
-from xml.sax.saxutils import quoteattr
+from itertools import pairwise
+
+from tests import urdfs
 
 #: Names that would be interpreted in an output format if they were not escaped.
 NAMES = {
@@ -51,36 +53,19 @@ IN_XML = {
 }
 
 
-def attribute(name: str) -> str:
-    """Write a name as the value of an attribute, in quotation marks, with escaped line ends."""
-    return quoteattr(name, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
-
-
 def chain_of_all(names: Sequence[str] = tuple(IN_XML.values()), robot: str = NAMES["line"]) -> str:
     """Write a chain whose links and joints have these names."""
-    links = "".join(f"<link name={attribute(name)}/>" for name in ["base", *names])
-    joints = "".join(
-        f'<joint name={attribute(f"{child} ")} type="continuous"><parent link={attribute(parent)}/>'
-        f'<child link={attribute(child)}/><origin xyz="0.1 0 0"/><axis xyz="0 {k % 2} {1 - k % 2}"/></joint>'
-        for k, (parent, child) in enumerate(zip(["base", *names], names, strict=False))
+    joints = (
+        urdfs.joint(f"{child} ", "continuous", parent, child, 'xyz="0.1 0 0"', f"0 {k % 2} {1 - k % 2}")
+        for k, (parent, child) in enumerate(pairwise(["base", *names]))
     )
-    return f'<?xml version="1.0"?><robot name={attribute(robot)}>{links}{joints}</robot>'
+    return urdfs.robot(*joints, name=robot)
 
 
 def urdf(name: str) -> str:
     """Write an arm whose robot, links and joints have a name, followed by a number if they must differ."""
-    link = [attribute(f"{name}{k}" if k else name) for k in range(3)]
-    joint = [attribute(f"{name} {k}") for k in (1, 2)]
-    return f"""<?xml version="1.0"?>
-<robot name={attribute(name)}>
-  <link name={link[0]}/><link name={link[1]}/><link name={link[2]}/>
-  <joint name={joint[0]} type="revolute">
-    <parent link={link[0]}/><child link={link[1]}/><origin xyz="0 0 0.4"/><axis xyz="0 0 1"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/>
-  </joint>
-  <joint name={joint[1]} type="revolute">
-    <parent link={link[1]}/><child link={link[2]}/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/>
-  </joint>
-</robot>
-"""
+    return urdfs.robot(
+        urdfs.joint(f"{name} 1", "revolute", name, f"{name}1", 'xyz="0 0 0.4"', more=urdfs.limit()),
+        urdfs.joint(f"{name} 2", "revolute", f"{name}1", f"{name}2", 'xyz="0.3 0 0"', "0 1 0", urdfs.limit()),
+        name=name,
+    )

@@ -36,6 +36,7 @@ import numpy as np
 import urdfkin
 from scripts.mutating.operators import changes_of, mutated
 from tests.reading import tree_of
+from tests.urdfs import joint, limit, mimic, robot
 from urdfkin import BaseMotion
 from urdfkin.dh import table_from_rows
 from urdfkin.errors import OracleError
@@ -66,28 +67,22 @@ _PATIENCE = 60
 
 def _joint(name: str, kind: str, parent: str, child: str, more: str = "", axis: str = "1 -2 0.5") -> str:
     number = len(name) + len(parent)
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="0.{number} -0.2 0.1" rpy="0.{number} 1 -0.4"/><axis xyz="{axis}"/>'
-        f'<limit lower="-2" upper="1.5" effort="1" velocity="1"/>{more}</joint>'
-    )
+    origin = f'xyz="0.{number} -0.2 0.1" rpy="0.{number} 1 -0.4"'
+    return joint(name, kind, parent, child, origin, axis, limit(-2, 1.5) + more)
 
 
-URDF = (
-    '<robot name="everything">'
-    + "".join(f'<link name="{n}"/>' for n in ["base", "b", "joint:b", "c", "d", "e", "f", "g", "h", "link:b"])
-    + _joint("b", "revolute", "base", "c")
-    + _joint("slide", "prismatic", "c", "b", axis="0 0 1")
-    + _joint("turn", "continuous", "b", "joint:b", axis="0 -1 0")
-    + _joint("first", "revolute", "joint:b", "d", '<mimic joint="slide" multiplier="-1.5" offset="0.3"/>')
-    + _joint("bolt", "fixed", "d", "e")
-    + _joint("second", "continuous", "e", "f", '<mimic joint="first" multiplier="0.7" offset="-0.2"/>')
-    + _joint("free", "floating", "base", "g")
-    + _joint("table", "planar", "g", "h", axis="0 0 1")
-    + _joint("link:c", "prismatic", "h", "link:b", '<mimic joint="b" offset="0.1"/>')
-    + "</robot>"
+URDF = robot(
+    _joint("b", "revolute", "base", "c"),
+    _joint("slide", "prismatic", "c", "b", axis="0 0 1"),
+    _joint("turn", "continuous", "b", "joint:b", axis="0 -1 0"),
+    _joint("first", "revolute", "joint:b", "d", mimic("slide", -1.5, 0.3)),
+    _joint("bolt", "fixed", "d", "e"),
+    _joint("second", "continuous", "e", "f", mimic("first", 0.7, -0.2)),
+    _joint("free", "floating", "base", "g"),
+    _joint("table", "planar", "g", "h", axis="0 0 1"),
+    _joint("link:c", "prismatic", "h", "link:b", '<mimic joint="b" offset="0.1"/>'),
+    name="everything",
 )
-
 
 #: Names of the robot's coordinates, in order.
 COORDINATES = (
@@ -128,9 +123,8 @@ def results() -> Iterator[tuple[str, Callable[[Robot], FloatArray]]]:
     yield "of a quaternion", lambda r: r.analytical_jacobian(one[0], "link:b", "quaternion", base=stands)
     named = dict(zip(COORDINATES, np.moveaxis(q, -1, 0), strict=True))
     yield "placement by names", lambda r: r.placement(named, "f")
-    of_joint = {
-        "table": q[..., 10:],
-        **{name: x for name, x in named.items() if not name.startswith("table.")},
+    of_joint = {name: x for name, x in named.items() if not name.startswith("table.")} | {
+        "table": q[..., 10:]
     }
     yield "placement by a joint's name", lambda r: r.placement(of_joint, "h")
     written = "neutral, turn=0.3rad, table.y=5mm, free.x = 0.25, slide=-0.5, b=30deg, table.angle=pi/5"

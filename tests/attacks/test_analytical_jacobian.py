@@ -25,7 +25,6 @@ from urdfkin.robot import Robot
 from urdfkin.verify.analytical_reference import euler_jacobian, quaternion_jacobian
 
 REPRESENTATIONS = (*SEQUENCES, "quaternion")
-FREE = '<robot name="free"><link name="body"/></robot>'
 
 
 @pytest.fixture(scope="module")
@@ -36,10 +35,7 @@ def ur5() -> Robot:
 @pytest.fixture(scope="module")
 def free() -> Robot:
     """Return a robot with a floating joint; q is its position and quaternion."""
-    return urdfkin.load(FREE, root_joint="floating")
-
-
-# -- certificate -----------------------------------------------------------------------------------
+    return urdfkin.load('<robot name="free"><link name="body"/></robot>', root_joint="floating")
 
 
 @pytest.mark.slow
@@ -57,12 +53,10 @@ def test_an_error_in_the_rate_matrix_is_caught(
 @pytest.mark.slow
 def test_the_analytical_jacobian_has_its_own_line_in_the_certificate() -> None:
     robot = urdfkin.load("ur5")
-    robot.analytical_jacobian(robot.sample(7), "tool0", "xyz")
-    (line,) = robot.certificate().lines
-    assert (line.quantity, line.checked, line.unchecked) == ("analytical jacobian", 7, 0)
-    robot.analytical_jacobian(robot.sample(7), "tool0", "xyz", verify=False)
-    (line,) = robot.certificate().lines
-    assert (line.checked, line.unchecked) == (7, 7)
+    for verify, unchecked in ((True, 0), (False, 7)):
+        robot.analytical_jacobian(robot.sample(7), "tool0", "xyz", verify=verify)
+        (line,) = robot.certificate().lines
+        assert (line.quantity, line.checked, line.unchecked) == ("analytical jacobian", 7, unchecked)
     assert not robot.certificate().verified
 
 
@@ -86,18 +80,13 @@ def test_the_line_that_reproduces_an_error_calls_analytical_jacobian(
     np.testing.assert_array_equal(eval(line), robot.analytical_jacobian(q[k], "tool0", "XYX", base=base))
 
 
-# -- no false alarm ----------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("representation", REPRESENTATIONS)
 def test_the_analytical_jacobian_is_verified_in_each_representation(representation: str) -> None:
     for name in ("ur5", "panda"):
         robot = urdfkin.load(name)
-        q = robot.sample(200, 11)
-        robot.analytical_jacobian(q, robot.tip_frame, representation)
-        base = BaseMotion(pose(rotation_from_euler("ZYZ", [0.3, 0.7, 1.1])))
-        robot.analytical_jacobian(q, robot.tip_frame, representation, base=base)
+        for base in (None, BaseMotion(pose(rotation_from_euler("ZYZ", [0.3, 0.7, 1.1])))):
+            robot.analytical_jacobian(robot.sample(200, 11), robot.tip_frame, representation, base=base)
         assert robot.certificate().verified
         assert robot.certificate().lines[0].share < 0.25
 
@@ -151,9 +140,6 @@ def test_half_turns_with_quaternions_of_either_sign_are_verified(free: Robot) ->
     free.analytical_jacobian(np.hstack((axis, quat)), "body", "quaternion")
 
 
-# -- the line of nodes -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", SEQUENCES)
 def test_rates_from_the_line_of_nodes_equal_difference_quotients(name: str) -> None:
     rng = np.random.default_rng(1)
@@ -161,10 +147,8 @@ def test_rates_from_the_line_of_nodes_equal_difference_quotients(name: str) -> N
     for _ in range(10):
         angles, rates = rng.uniform([-3, low, -3], [3, high, 3]), rng.normal(size=3)
         h, R = 1e-6, rotation_from_euler(name, angles)
-        change = (
-            rotation_from_euler(name, angles + h * rates) - rotation_from_euler(name, angles - h * rates)
-        ) / (2 * h)
-        S = change @ R.T
+        before, after = (rotation_from_euler(name, angles + step * rates) for step in (-h, h))
+        S = (after - before) / (2 * h) @ R.T
         w = np.array([S[2, 1], S[0, 2], S[1, 0]])
         found, apart = euler_jacobian(name, R, np.concatenate((np.zeros(3), w))[:, np.newaxis])
         assert np.abs(found[3:, 0] - rates).max() < 1e-8 / apart
@@ -182,8 +166,6 @@ def test_the_line_of_nodes_is_independent_code_and_quaternion_rates_preserve_the
     assert np.abs(np.einsum("ni,nij->nj", quat, rates)).max() < 1e-15
     assert np.abs(np.linalg.norm(rates, axis=1) - np.linalg.norm(J[:, 3:], axis=1) / 2).max() < 1e-14
 
-
-# -- mutants -----------------------------------------------------------------------------------------
 
 #: Names that are easily confused, each with its replacement in a mutant.
 OTHER_NAMES = {

@@ -10,6 +10,7 @@ import subprocess
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
@@ -18,6 +19,7 @@ import numpy as np
 import pytest
 
 from tests.cli.running import process
+from tests.reading import present
 from urdfkin import compiled as recursion
 from urdfkin import kinematics
 from urdfkin.compiled import kernel_cache, machine
@@ -209,9 +211,7 @@ def demand_refused(root: Path, words: str) -> None:
 
 
 def created(root: Path, *words: str, kind: str = "kernels") -> Path:
-    folder = cache_folder(kind, [], *words, root=root)
-    assert folder is not None
-    return folder
+    return present(cache_folder(kind, [], *words, root=root))
 
 
 def test_a_new_cache_is_private_and_only_a_private_group_may_write_in_it(
@@ -219,15 +219,14 @@ def test_a_new_cache_is_private_and_only_a_private_group_may_write_in_it(
 ) -> None:
     before = os.umask(0)
     try:
-        folder = cache_folder("kernels", [], root=tmp_path / "urdfkin")
+        folder = created(tmp_path / "urdfkin")
     finally:
         os.umask(before)
-    assert folder is not None
     assert [stat.S_IMODE(path.stat().st_mode) for path in (folder, folder.parent)] == [0o700, 0o700]
     folder = created(tmp_path)
     folder.chmod(0o770)
     monkeypatch.setattr(cache, "_is_private", lambda group: True)
-    assert cache_folder("kernels", [], root=tmp_path) == folder
+    assert created(tmp_path) == folder
     monkeypatch.setattr(cache, "_is_private", lambda group: False)
     demand_refused(tmp_path, "a group can write to")
 
@@ -238,18 +237,15 @@ def test_a_folder_that_every_user_can_write_to_is_refused(mode: int, tmp_path: P
     demand_refused(tmp_path, r"every user can write to .*chmod go-w.* and delete")
 
 
-def test_a_parent_folder_that_is_replaceable_or_no_folder_is_refused(
-    tmp_path: Path,
-) -> None:
+def test_a_parent_folder_that_is_replaceable_or_no_folder_is_refused(tmp_path: Path) -> None:
     shared = tmp_path / "shared"
     shared.mkdir()
     shared.chmod(0o777)
     demand_refused(shared / "urdfkin", "every user can write to")
     shared.chmod(0o1777)  # Sticky, as /tmp: only the owner can rename a file.
-    assert cache_folder("kernels", [], root=shared / "urdfkin") is not None
+    created(shared / "urdfkin")
     (tmp_path / "file").write_text("")
-    with pytest.warns(CacheWarning, match="the cache cannot be written in .*file: .*set XDG_CACHE_HOME"):
-        assert cache_folder("kernels", [], root=tmp_path / "file") is None
+    demand_refused(tmp_path / "file", "the cache cannot be written in .*file: .*set XDG_CACHE_HOME")
 
 
 @pytest.mark.parametrize("whose", ["the folder", "the one above", "the file behind a link"])
@@ -259,7 +255,7 @@ def test_a_cache_folder_of_another_user_is_refused(
     """Unpickling the files of another user could run any code. Only the superuser can change an owner."""
     root = tmp_path / "shared" / "urdfkin"
     folder = created(root)
-    stranger = {"the folder": folder, "the one above": root.parent}.get(whose, folder)
+    stranger = root.parent if whose == "the one above" else folder
     if whose == "the file behind a link":
         (tmp_path / "link").symlink_to(root)
         root = tmp_path / "link"
@@ -285,11 +281,11 @@ def test_a_kernel_of_another_user_is_not_unpickled_and_its_old_folder_is_not_del
     call(new_kernel())
     (folder,) = tmp_path.iterdir()
     (file,) = (path for path in folder.iterdir() if path.name != ".used")
-    put(file, pickle.dumps(Malicious()))
+    put(file, pickle.dumps(Malicious(tmp_path / "ran")))
     os.chown(folder, 12345, 12345)
     with pytest.warns(CacheWarning, match="belongs to another user"):
         assert call(new_kernel()) == 7
-    assert not Malicious.ran
+    assert not (tmp_path / "ran").exists()
     old = created(tmp_path / "others", "old")
     os.utime(old / ".used", (0.0, 0.0))
     os.chown(old / ".used", 12345, 12345)
@@ -297,15 +293,14 @@ def test_a_kernel_of_another_user_is_not_unpickled_and_its_old_folder_is_not_del
     assert old.exists()
 
 
+@dataclass
 class Malicious:
-    ran = False
+    """An object that creates a folder when it is unpickled."""
 
-    def __reduce__(self) -> tuple[Callable[[], None], tuple[()]]:
-        return run_malicious, ()
+    mark: Path
 
-
-def run_malicious() -> None:
-    Malicious.ran = True
+    def __reduce__(self) -> tuple[Callable[[Path], None], tuple[Path]]:
+        return os.mkdir, (self.mark,)
 
 
 def test_a_read_only_folder_is_used_without_a_warning(
@@ -315,7 +310,7 @@ def test_a_read_only_folder_is_used_without_a_warning(
     monkeypatch.setattr(Path, "touch", failing(errno.EROFS))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert cache_folder("kernels", [], root=tmp_path) == folder
+        assert created(tmp_path) == folder
 
 
 # -- one folder for each version of the sources ----------------------------------------------------
@@ -354,16 +349,15 @@ def test_a_change_in_any_source_selects_another_folder(changed: int, tmp_path: P
     sources = [tmp_path / f"{name}.py" for name in "abc"]
     for source in sources:
         source.write_text("x = 1")
-    first = cache_folder("things", sources, "1.0", root=tmp_path)
-    assert first == cache_folder("things", sources, "1.0", root=tmp_path)
-    others = [
-        cache_folder("things", sources, "1.1", root=tmp_path),
-        cache_folder("trees", sources, "1.0", root=tmp_path),
-    ]
+    first, again, *others = (
+        cache_folder(kind, sources, version, root=tmp_path)
+        for kind, version in (("things", "1.0"), ("things", "1.0"), ("things", "1.1"), ("trees", "1.0"))
+    )
+    assert first == again
     sources[changed].write_text("x = 2")
     others.append(cache_folder("things", sources, "1.0", root=tmp_path))
     assert len({first, *others}) == 4
-    assert all(folder is not None and folder.is_dir() for folder in (first, *others))
+    assert all(present(folder).is_dir() for folder in (first, *others))
 
 
 def test_only_folders_unused_for_a_month_are_deleted(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -21,8 +20,6 @@ PLANTED = [
 BEFORE_MAIN = {"urdfkin", "threading", "ast"}
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="l${1 + 1}"/></robot>'
 
-Run = Callable[..., str]
-
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -30,23 +27,18 @@ def folder(tmp_path: Path) -> Path:
     folder = tmp_path / "robot"
     folder.mkdir()
     (folder / "r.xacro").write_text(XACRO)
-    plant(folder, PLANTED)
+    for name in PLANTED:
+        (folder / f"{name}.py").write_text(f"open({str(folder / 'RUN')!r}, 'a').write({name!r} + '\\n')\n")
     return folder
 
 
-def plant(folder: Path, names: list[str]) -> None:
-    for name in names:
-        (folder / f"{name}.py").write_text(f"open({str(folder / 'RUN')!r}, 'a').write({name!r} + '\\n')\n")
-
-
-def planted_code_ran(folder: Path) -> list[str]:
-    mark = folder / "RUN"
-    return mark.read_text().split() if mark.exists() else []
+def demand_nothing_ran(folder: Path) -> None:
+    assert not (folder / "RUN").exists(), (folder / "RUN").read_text()
 
 
 def run(folder: Path, start: list[str], *words: str) -> str:
     done = subprocess.run([*start, *words], cwd=folder, capture_output=True, text=True, check=False)
-    assert planted_code_ran(folder) == []
+    demand_nothing_ran(folder)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -93,19 +85,14 @@ def test_the_compiling_process_succeeds_and_runs_no_file_of_the_current_folder(
     monkeypatch.syspath_prepend("")  # as in `python -c`
     with preload._compile_elsewhere(("placements",)) as process:
         assert process.wait() == 0
-    assert planted_code_ran(folder) == []
+    demand_nothing_ran(folder)
 
 
-def test_python_m_urdfkin_imports_nothing_from_the_current_folder_once_started(tmp_path: Path) -> None:
-    folder = tmp_path / "robot"
-    folder.mkdir()
-    (folder / "r.xacro").write_text(XACRO)
-    plant(folder, [name for name in PLANTED if name not in BEFORE_MAIN])
+def test_python_m_urdfkin_imports_nothing_from_the_current_folder_once_started(folder: Path) -> None:
+    for name in BEFORE_MAIN:
+        (folder / f"{name}.py").unlink()
     run(folder, [sys.executable, "-m", "urdfkin"], "check", "r.xacro")
     run(folder, [sys.executable, "-m", "urdfkin"], "robots")
-
-
-# -- settings ------------------------------------------------------------------------------------------
 
 
 def test_numba_reads_no_settings_from_the_current_folder(tmp_path: Path) -> None:

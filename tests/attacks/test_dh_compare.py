@@ -1,6 +1,5 @@
 """A comparison states the fitted parameters, the cells not compared, and the error of a wrong cell."""
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -52,10 +51,11 @@ def test_a_wrong_d1_is_reported_in_millimetres_with_and_without_a_fit() -> None:
     assert found.residual <= 1e-12
 
 
+CELLS = [(0, "d"), (0, "theta"), (2, "theta"), (3, "d"), (1, "a"), (5, "d")]
+
+
 @pytest.mark.parametrize("convention", CONVENTIONS)
-@pytest.mark.parametrize(
-    ("row", "cell"), [(0, "d"), (0, "theta"), (2, "theta"), (3, "d"), (1, "a"), (5, "d")]
-)
+@pytest.mark.parametrize(("row", "cell"), CELLS)
 def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cell: str) -> None:
     path, _ = published("ur5")
     table = dh_table(urdfkin.load("ur5").tree, "tool0", "base", convention, snap=1e-6)
@@ -67,8 +67,8 @@ def test_without_fitting_every_wrong_cell_differs(convention: str, row: int, cel
 
 
 def test_every_cell_agrees_only_for_a_table_that_is_the_urdf_as_written() -> None:
-    robot = urdfkin.load("panda")
-    table, path = robot.dh("panda_link8", "panda_link0"), robot.chain("panda_link8", "panda_link0")
+    robot, ends = urdfkin.load("panda"), ("panda_link8", "panda_link0")
+    table, path = robot.dh(*ends), robot.chain(*ends)
     found = compare(path, table)
     assert found.as_written
     assert "Every cell agrees with the URDF." in document(found, units_of()).text()
@@ -89,9 +89,6 @@ def test_cells_that_do_not_explain_the_difference_are_not_listed() -> None:
     assert "Omit --no-fit" in text
 
 
-# -- calibrated robots ----------------------------------------------------------------------------------
-
-
 def calibrated(tree: KinematicTree, seed: int, radians: float = 3e-4, metres: float = 2e-4) -> KinematicTree:
     rng, joints = np.random.default_rng(seed), []
     for joint in tree.joints:
@@ -110,12 +107,10 @@ CALIBRATED = [(name, seed) for name in ("ur5", "kinova") for seed in range(3)]
 def test_a_calibrated_table_differs_about_equally_in_strict_and_hayati_form(name: str, seed: int) -> None:
     robot, base, tip = with_ends(name)
     tree, path = calibrated(robot.tree, seed), robot.chain(tip, base)
-    off = {
-        form: compare(path, dh_table(tree, tip, base, near_parallel=form)).metres
-        for form in ("hayati", "strict")
-    }
-    assert 1e-4 < off["hayati"] < 3e-3
-    assert off["strict"] <= 1.5 * off["hayati"]
+    forms = (dh_table(tree, tip, base, near_parallel=form) for form in ("hayati", "strict"))
+    hayati, strict = (compare(path, table).metres for table in forms)
+    assert 1e-4 < hayati < 3e-3
+    assert strict <= 1.5 * hayati
 
 
 @pytest.mark.parametrize(("name", "seed"), CALIBRATED)
@@ -135,9 +130,6 @@ def test_cells_that_differ_are_sorted_by_the_effect_on_the_tip() -> None:
     effects = [one.tip for one in compare(published("ur5")[0], table).differences]
     assert len(effects) > 5
     assert effects == sorted(effects, reverse=True)
-
-
-# -- digits ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -170,7 +162,7 @@ def test_a_difference_within_the_last_digit_is_distinguished_from_a_larger_one(
 def test_the_dh_command_marks_rounded_cells_and_has_the_option_no_fit(tmp_path: Path) -> None:
     done = command("dh kinova --compare kinova")
     assert "All differences are within the last digit of the table (*)." in done.text
-    data = json.loads(command("dh kinova --compare kinova --format json").text)
+    data = command("dh kinova --compare kinova --format json").data
     assert [one["within_last_digit"] for one in data["differences"]] == [True]
     file = tmp_path / "wrong.toml"
     file.write_text(reference_path("ur5").read_text().replace("0.089159", "0.099159"))

@@ -11,7 +11,7 @@ import pytest
 import urdfkin
 from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as command
-from tests.dh.arms import arm
+from tests.dh.arms import arm, with_cells
 from tests.random_chains import rotation, shift
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic, robot
@@ -23,7 +23,7 @@ from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.chain import chain
-from urdfkin.model.tree import JointKind, KinematicTree, Mimic
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.urdf.xacro import arguments_of
 from urdfkin.verify.tables import TableCheck, TableError
@@ -54,9 +54,7 @@ def robot_of(tree: KinematicTree) -> urdfkin.Robot:
 
 
 def checked(robot: urdfkin.Robot, table: DHTable) -> TableCheck:
-    check = robot.verifier.table(table)
-    assert check is not None
-    return check
+    return present(robot.verifier.table(table))
 
 
 def test_a_strict_table_with_a_large_rounding_error_reports_the_error_in_millimetres() -> None:
@@ -75,23 +73,20 @@ def test_a_strict_table_with_a_large_rounding_error_reports_the_error_in_millime
 
 
 def test_an_inexact_strict_table_exits_with_3_and_the_hayati_or_snapped_table_with_0() -> None:
-    text = text_of(leaning(TWELVE_DIGITS))
-    ends = ("--base", "l0", "--tip", "tip")
-    lossy = command("dh -", *ends, "--near-parallel", "strict", stdin=text)
+    text, line = text_of(leaning(TWELVE_DIGITS)), "dh - --base l0 --tip tip"
+    lossy = command(f"{line} --near-parallel strict", stdin=text)
     assert lossy.code == 3
     assert "agrees" not in lossy.text
     assert "LOSES" in lossy.text
-    assert command("dh -", *ends, stdin=text).code == 0
-    assert command("dh -", *ends, "--near-parallel", "strict", "--snap", "1e-12", stdin=text).code == 0
+    good(line, stdin=text)
+    good(f"{line} --near-parallel strict --snap 1e-12", stdin=text)
 
 
 def test_a_wrong_strict_table_with_very_long_rows_is_a_disagreement() -> None:
     robot = robot_of(leaning(TWELVE_DIGITS))
     table = dh_table(robot.tree, "tip", "l0", near_parallel="strict")
-    rows = list(table.rows)
-    rows[0] = replace(rows[0], alpha=rows[0].alpha + 1e-3)
     with pytest.raises(TableError, match="DISAGREES"):
-        robot.verifier.table(replace(table, rows=tuple(rows)))
+        robot.verifier.table(with_cells(table, 0, alpha=table.rows[0].alpha + 1e-3))
 
 
 def rack(multiplier: float) -> str:
@@ -121,17 +116,17 @@ def test_a_wrong_multiplier_in_a_table_is_detected(multiplier: float) -> None:
     found = urdfkin.load(rack(multiplier))
     table = found.dh("d", "a")
     wrong = Mimic("rack", multiplier * (1.0 + 1e-9), 0.0)
-    rows = (table.rows[0], replace(table.rows[1], mimic=wrong), table.rows[2])
     with pytest.raises(TableError, match="DISAGREES"):
-        found.verifier.table(replace(table, rows=rows))
+        found.verifier.table(with_cells(table, 1, mimic=wrong))
 
 
 # -- noise ----------------------------------------------------------------------------------------------
 
 
-def demand_a_plain_table(tree: KinematicTree, near_parallel: str) -> DHTable:
+def plain_table(near_parallel: str, *steps: FloatArray) -> DHTable:
     """Demand a table without beta and without kilometres that has the robot's poses up to rounding."""
-    robot = robot_of(tree)
+    last = shift(0.1, 0.3, 0.2) @ rotation("x", math.pi / 2)
+    robot = robot_of(arm(shift(0, 0, 0.3), *steps, last, tip=shift(0.1, 0, 0.08)))
     table = robot.dh("tip", "l0", near_parallel=near_parallel)
     assert not table.has_hayati_rows
     assert max(max(abs(row.a), abs(row.d)) for row in table.rows) < 2.0
@@ -144,28 +139,17 @@ def demand_a_plain_table(tree: KinematicTree, near_parallel: str) -> DHTable:
 def test_an_angle_with_fourteen_digits_causes_neither_beta_nor_long_rows(
     angle: float, near_parallel: str
 ) -> None:
-    back, forth = rotation("y", angle), rotation("y", -math.pi / 2)
-    tree = arm(
-        shift(0, 0, 0.3),
-        shift(0.4, 0.1, 0.1) @ back @ forth,
-        shift(0.4, 0.1, 0.1) @ forth @ back,
-        shift(0.1, 0.3, 0.2) @ rotation("x", math.pi / 2),
-        tip=shift(0.1, 0, 0.08),
-    )
-    assert "roboticstoolbox" in export(demand_a_plain_table(tree, near_parallel), "roboticstoolbox")
+    step, back, forth = shift(0.4, 0.1, 0.1), rotation("y", angle), rotation("y", -math.pi / 2)
+    table = plain_table(near_parallel, step @ back @ forth, step @ forth @ back)
+    assert "roboticstoolbox" in export(table, "roboticstoolbox")
 
 
 @pytest.mark.parametrize("near_parallel", ["hayati", "strict"])
 def test_a_tilt_by_two_angles_of_fifteen_digits_is_treated_as_rounding(near_parallel: str) -> None:
     half = 3.14159265358979
-    tree = arm(
-        shift(0, 0, 0.3),
-        shift(0.4, 0.1, 0.1) @ rotation("x", half) @ rotation("y", half),
-        shift(0.1, 0.3, 0.2) @ rotation("x", math.pi / 2),
-        tip=shift(0.1, 0, 0.08),
-    )
-    assert chain(tree, "tip").constants[1][0, 2] != 0.0
-    demand_a_plain_table(tree, near_parallel)
+    tilted = shift(0.4, 0.1, 0.1) @ rotation("x", half) @ rotation("y", half)
+    assert tilted[0, 2] != 0.0
+    plain_table(near_parallel, tilted)
 
 
 @pytest.mark.parametrize("tilt", [1e-13, 1e-12, 1e-9])
@@ -220,19 +204,20 @@ def test_an_option_without_effect_is_an_error(line: str) -> None:
 
 
 def test_an_option_with_the_default_value_is_accepted_and_a_seed_without_effect_is_refused() -> None:
-    assert command("dh ur5 --compare ur5 --tolerance 0.2").code == 0
-    assert command("dh ur5 --tree --digits 10").code == 0
+    for line in ("dh ur5 --compare ur5 --tolerance 0.2", "dh ur5 --tree --digits 10"):
+        good(line)
     assert "--seed does nothing without a random --q, --v or --a" in refused("placement panda --seed 3")
-    assert command("placement panda --seed 3 --q random").code == 0
+    good("placement panda --seed 3 --q random")
 
 
 # -- xacro ----------------------------------------------------------------------------------------------
 
 XMLNS = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
-XACRO = f"""<robot name="r" {XMLNS}><xacro:include filename="part.xacro"/>
-<xacro:arg name="length" default="1"/><link name="a"/><link name="b"/>
-<joint name="j" type="continuous"><parent link="a"/><child link="b"/>
-<origin xyz="$(arg length) $(arg width) 0"/><axis xyz="0 0 1"/></joint></robot>"""
+XACRO = robot(
+    '<xacro:include filename="part.xacro"/><xacro:arg name="length" default="1"/>',
+    joint("j", "continuous", "a", "b", 'xyz="$(arg length) $(arg width) 0"'),
+    attributes=XMLNS,
+)
 PART = f'<robot {XMLNS}><xacro:arg name="colour" default="red"/></robot>'
 
 
@@ -244,16 +229,14 @@ def xacro(tmp_path: Path) -> Path:
     return file
 
 
-def _nowhere(package: str) -> str:
-    raise LookupError(package)
-
-
 def test_all_xacro_arguments_are_found_unless_an_include_is_computed_or_missing(xacro: Path) -> None:
-    assert arguments_of(xacro, _nowhere) == {"length", "width", "colour"}
-    xacro.write_text(XACRO.replace("part.xacro", "$(arg width).xacro"))
-    assert arguments_of(xacro, _nowhere) is None
-    xacro.write_text(XACRO.replace("part.xacro", "missing.xacro"))
-    assert arguments_of(xacro, _nowhere) is None
+    def nowhere(package: str) -> str:
+        raise LookupError(package)
+
+    assert arguments_of(xacro, nowhere) == {"length", "width", "colour"}
+    for file in ("$(arg width).xacro", "missing.xacro"):
+        xacro.write_text(XACRO.replace("part.xacro", file))
+        assert arguments_of(xacro, nowhere) is None
 
 
 @pytest.mark.slow
@@ -272,29 +255,29 @@ def test_an_unknown_xacro_argument_is_an_error_that_names_the_similar_one(xacro:
 
 def lost(text: str) -> tuple[float, ...]:
     """Return the measured and, except for a tree, the guaranteed error (m) of a printed line."""
-    (line,) = (line for line in text.splitlines() if line.startswith("printed with"))
+    (line,) = (line for line in text.splitlines() if line.startswith("printed with 3 digits"))
     of_a_table = re.search(r"within (\S+) m of its exact .* the proven bound is (\S+) m", line)
     return tuple(map(float, present(of_a_table or re.search(r"within (\S+) m", line)).groups()))
 
 
+THREE_DIGITS = "dh ur10 --base base --tip tool0 --digits 3"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["terminal", "markdown"])
-@pytest.mark.parametrize("units", [(), ("--degrees", "--millimetres")])
+@pytest.mark.parametrize("units", ["", " --degrees --millimetres"])
 def test_a_table_with_three_digits_states_a_rounding_error_of_nearly_a_millimetre(
-    form: str, units: tuple[str, ...]
+    form: str, units: str
 ) -> None:
-    done = command("dh ur10 --base base --tip tool0 --digits 3 --format", form, *units)
+    done = command(f"{THREE_DIGITS} --format {form}{units}")
     measured, guaranteed = lost(done.text)
     assert 5e-4 < measured <= guaranteed < 2e-3
     assert "Pinocchio" in done.text
 
 
 def test_the_rounding_error_is_printed_on_stderr_for_latex_and_for_the_whole_tree() -> None:
-    measured, _ = lost(command("dh ur10 --base base --tip tool0 --digits 3 --format latex").err)
-    assert measured > 5e-4
-    text = command("dh ur10 --tree --digits 3").text
-    assert "printed with 3 digits" in text
-    assert lost(text)[0] > 5e-4
+    assert lost(command(f"{THREE_DIGITS} --format latex").err)[0] > 5e-4
+    assert lost(command("dh ur10 --tree --digits 3").text)[0] > 5e-4
 
 
 @pytest.mark.slow

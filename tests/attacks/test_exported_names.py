@@ -15,34 +15,35 @@ from tests.attacks.hostile import IN_XML, NAMES, chain_of_all, urdf
 from tests.export.writing import code, file, need
 from tests.urdfs import loaded
 from urdfkin.export import LANGUAGES, write
+from urdfkin.export.code import FrameCode
 from urdfkin.export.naming import all_safe, comment_name, safe, title
-from urdfkin.robot import Robot
 
 pytestmark = pytest.mark.slow
 _PYTHON = [to for to, (_, suffix) in LANGUAGES.items() if suffix.endswith(".py")]
 _WORDS = (
     "int", "double", "for", "end", "function", "template", "class", "lambda", "def", "out", "in", "L",
     "q", "v", "a", "sin", "cos", "sqrt", "R", "T", "real", "np", "main", "eye", "pi", "i", "None", "_",
-    "__", "t1", "R1_00", "1", "2dof", "é",
-    "\u202e", "*/", "??/", "%{", "%}", "...", "\\", "a" * 300, "x" * 41,
+    "__", "t1", "R1_00", "1", "2dof", "é", "\u202e", "*/",
+    "??/", "%{", "%}", "...", "\\", "a" * 300, "x" * 41,
 )  # fmt: skip
-
-
-_HOSTILE = ("c comment", "python", "matlab", "latex", "line")
 ROBOTS = {
     "every name at once": chain_of_all(),
-    **{kind: urdf(IN_XML[kind]) for kind in _HOSTILE},
+    **{kind: urdf(IN_XML[kind]) for kind in ("c comment", "python", "matlab", "latex", "line")},
     **{word: urdf(word) for word in ("int", "end", "class", "\u00e9", "1")},
 }
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
-def robot(request: pytest.FixtureRequest) -> Robot:
-    return loaded(ROBOTS[request.param], verify=False)
+def written(request: pytest.FixtureRequest) -> FrameCode:
+    return code(loaded(ROBOTS[request.param], verify=False), quantities=("placement",))
 
 
-def test_no_name_becomes_code_in_the_export_of_any_language(robot: Robot) -> None:
-    written = code(robot, quantities=("placement",))
+def said(*command: object) -> str:
+    """Return the output of a program that must succeed."""
+    return subprocess.run([*map(str, command)], capture_output=True, text=True, check=True).stdout
+
+
+def test_no_name_becomes_code_in_the_export_of_any_language(written: FrameCode) -> None:
     words = set(re.findall(r"\w+", written.name)) | {x for row in written.identifiers.values() for x in row}
     assert all(re.fullmatch(r"[A-Za-z0-9_]+", word) for word in words)
     for to in LANGUAGES:
@@ -62,8 +63,8 @@ def code_alone(text: str, to: str) -> str:
 
 
 @pytest.mark.parametrize("to", _PYTHON)
-def test_exported_python_code_contains_only_functions_and_tables(robot: Robot, to: str) -> None:
-    module = ast.parse(write(code(robot, quantities=("placement",)), to))
+def test_exported_python_code_contains_only_functions_and_tables(written: FrameCode, to: str) -> None:
+    module = ast.parse(write(written, to))
     kinds = [type(node) for node in module.body]
     allowed = {ast.Expr, ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign, ast.If}
     classes = [node for node in module.body if isinstance(node, ast.ClassDef)]
@@ -79,49 +80,37 @@ def test_exported_python_code_contains_only_functions_and_tables(robot: Robot, t
 
 
 @pytest.mark.parametrize("to", ["numpy", "array", "torch", "sympy-exact"])
-def test_the_self_check_of_an_exported_file_passes_with_any_names(robot: Robot, to: str) -> None:
+def test_the_self_check_of_an_exported_file_passes_with_any_names(written: FrameCode, to: str) -> None:
     need(to)
     scope: dict[str, Any] = {"__name__": "checked"}
-    exec(write(code(robot, quantities=("placement",)), to), scope)
+    exec(write(written, to), scope)
     assert max(scope["check"]().values()) <= 1.0
     assert "hacked" not in scope
 
 
+STRICT = ["-trigraphs", "-O0", "-Wall", "-Wextra", "-Werror"]
+
+
 @pytest.mark.long  # compiling each header takes seconds
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
-def test_the_cuda_header_declares_only_the_exported_functions(robot: Robot, tmp_path: Path) -> None:
-    written = code(robot, quantities=("placement",))
-    path = file(written, "cuda", tmp_path)
-    shim = Path(__file__).parents[1] / "export"
-    macros = ["-D__CUDACC__", f"-D{written.name.upper()}_ENTRY_POINTS", f"-I{shim}"]
-    strict = ["-std=c++20", "-trigraphs", "-O0", "-Wall", "-Wextra", "-Werror", "-Wno-unknown-pragmas"]
-    built = str(tmp_path / "x.o")
-    subprocess.run(["g++", *strict, *macros, "-x", "c++", "-c", str(path), "-o", built], check=True)
-    symbols = subprocess.run(
-        ["nm", "-g", "--defined-only", built], capture_output=True, text=True, check=True
-    )
-    plain = {line.split()[-1] for line in symbols.stdout.splitlines() if " T " in line}
-    assert plain == {f"{written.name}_placement_{real}" for real in ("double", "float")}
-    program = tmp_path / "check"
-    main = [f"-D{written.name.upper()}_MAIN", f"-I{shim}", "-x", "c++", str(path), "-o", str(program)]
-    subprocess.run(["g++", *strict, *main], check=True)
-    said = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
-    assert said.startswith("good placement: 4 test vectors")
+def test_the_cuda_header_declares_only_the_exported_functions(written: FrameCode, tmp_path: Path) -> None:
+    path, name = file(written, "cuda", tmp_path), written.name
+    shim = f"-I{Path(__file__).parents[1] / 'export'}"
+    build = ["g++", *STRICT, "-std=c++20", "-Wno-unknown-pragmas", shim, "-x", "c++", path, "-o"]
+    said(*build, tmp_path / "x.o", "-c", "-D__CUDACC__", f"-D{name.upper()}_ENTRY_POINTS")
+    symbols = said("nm", "-g", "--defined-only", tmp_path / "x.o").splitlines()
+    plain = {line.split()[-1] for line in symbols if " T " in line}
+    assert plain == {f"{name}_placement_{real}" for real in ("double", "float")}
+    said(*build, tmp_path / "check", f"-D{name.upper()}_MAIN")
+    assert said(tmp_path / "check").startswith("good placement: 4 test vectors")
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
-def test_exported_c_code_defines_only_the_exported_functions(robot: Robot, tmp_path: Path) -> None:
-    written = code(robot, quantities=("placement",))
-    path = file(written, "c", tmp_path)
-    strict = ["-std=c99", "-trigraphs", "-O0", "-Wall", "-Wextra", "-pedantic", "-Werror"]
-    subprocess.run(["gcc", *strict, "-c", str(path), "-o", str(tmp_path / "x.o")], check=True)
-    symbols = subprocess.run(
-        ["nm", "-g", "--defined-only", str(tmp_path / "x.o")], capture_output=True, text=True, check=True
-    )
-    assert {line.split()[-1] for line in symbols.stdout.splitlines()} == {
-        f"{written.name}_placement",
-        f"{written.name}_placement_batch",
-    }
+def test_exported_c_code_defines_only_the_exported_functions(written: FrameCode, tmp_path: Path) -> None:
+    path, name = file(written, "c", tmp_path), written.name
+    said("gcc", *STRICT, "-std=c99", "-pedantic", "-c", path, "-o", tmp_path / "x.o")
+    symbols = said("nm", "-g", "--defined-only", tmp_path / "x.o").splitlines()
+    assert {line.split()[-1] for line in symbols} == {f"{name}_placement", f"{name}_placement_batch"}
 
 
 @given(st.lists(st.one_of(st.text(max_size=60), st.sampled_from([*_WORDS, *NAMES.values()])), max_size=20))

@@ -52,12 +52,8 @@ def methods() -> list[str]:
 
 
 def cases() -> list[tuple[str, str]]:
-    return [
-        (method, parameter)
-        for method in methods()
-        for parameter in inspect.signature(getattr(Robot, method)).parameters
-        if parameter != "self"
-    ]
+    parameters = {method: [*inspect.signature(getattr(Robot, method)).parameters][1:] for method in methods()}
+    return [(method, parameter) for method, names in parameters.items() for parameter in names]
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +74,14 @@ def failure(function: Callable[..., Any], arguments: dict[str, Any]) -> str | No
     return None
 
 
+def failures(
+    function: Callable[..., Any], good: dict[str, Any], parameter: str, odd: Any = None
+) -> dict[str, str]:
+    """Return the unusual values of a parameter that cause a wrong exception, with its description."""
+    found = {label: failure(function, good | {parameter: x}) for label, x in (odd or ODD).items()}
+    return {label: words for label, words in found.items() if words}
+
+
 def good_for(function: Callable[..., Any]) -> dict[str, Any]:
     return {
         name: GOOD[name]
@@ -91,15 +95,12 @@ def test_an_unusual_argument_of_a_method_gives_a_result_or_an_error_of_urdfkin(
     method: str, parameter: str, robot: Robot
 ) -> None:
     function = getattr(robot, method)
-    failures = {}
     for verify in (True, False):
         good = good_for(function)
         if "verify" in inspect.signature(function).parameters and parameter != "verify":
             good["verify"] = verify
         assert failure(function, good) is None
-        for label, odd in ODD.items():
-            failures[label, verify] = failure(function, good | {parameter: odd})
-    assert {label: words for label, words in failures.items() if words} == {}
+        assert failures(function, good, parameter) == {}, f"{verify=}"
 
 
 @pytest.mark.parametrize("method", ["placement", "velocity", "jacobian", "acceleration"])
@@ -108,12 +109,8 @@ def test_an_unusual_argument_of_a_prepared_frame_gives_a_result_or_an_error_of_u
 ) -> None:
     function = getattr(robot.prepare("c"), method)
     good = good_for(function)
-    failures = {
-        (name, label): failure(function, good | {name: odd})
-        for name in [*good, "out"]
-        for label, odd in ODD.items()
-    }
-    assert {label: words for label, words in failures.items() if words} == {}
+    for name in (*good, "out"):
+        assert failures(function, good, name) == {}, name
 
 
 FUNCTIONS: dict[str, dict[str, Any]] = {
@@ -130,11 +127,9 @@ def test_an_unusual_argument_of_a_function_gives_a_result_or_an_error_of_urdfkin
     name: str, parameter: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)  # a text may be the path of a store
-    function, good = getattr(urdfkin, name), FUNCTIONS[name]
     # A very large number of processes or samples is valid, but takes too long.
     odd = {key: x for key, x in ODD.items() if key != "too large" or parameter not in ("jobs", "samples")}
-    failures = {label: failure(function, good | {parameter: x}) for label, x in odd.items()}
-    assert {label: words for label, words in failures.items() if words} == {}
+    assert failures(getattr(urdfkin, name), FUNCTIONS[name], parameter, odd) == {}
 
 
 @pytest.mark.parametrize("odd", [key for key in ODD if key != "a half"])

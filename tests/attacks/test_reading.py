@@ -74,12 +74,8 @@ def _opens(source: str) -> bool:
 
 @pytest.mark.slow
 def test_no_other_module_opens_files_that_another_user_may_have_created() -> None:
-    found = {
-        path.relative_to(PACKAGE).as_posix()
-        for path in PACKAGE.rglob("*.py")
-        if _opens(path.read_text("utf-8"))
-    }
-    assert found == set(OTHERS)
+    opening = (path for path in PACKAGE.rglob("*.py") if _opens(path.read_text("utf-8")))
+    assert {path.relative_to(PACKAGE).as_posix() for path in opening} == set(OTHERS)
 
 
 def odd_file(kind: str, path: Path) -> Path:
@@ -134,45 +130,43 @@ def test_a_manifest_or_a_cached_file_that_is_a_device_and_an_mjcf_file_that_is_a
     assert not mjcf.is_mjcf(tmp_path / "arm.xml")
 
 
-@pytest.mark.parametrize("name", ["manifest.json", "accuracy.json", "chunk"])
-def test_a_file_of_a_store_that_is_a_link_to_a_device_is_not_read(name: str, tmp_path: Path) -> None:
+def test_files_of_a_store_that_are_links_to_a_device_are_not_read(tmp_path: Path) -> None:
     validate("planar_two_link", samples=10, store=tmp_path)
-    (place,) = tmp_path.glob("chunks/*/*.chunk") if name == "chunk" else (tmp_path / name,)
-    place.unlink(missing_ok=True)
-    place.symlink_to("/dev/zero")
     messages: list[str] = []
-    if name == "manifest.json":
-        with pytest.raises(SourceError, match="not a regular file"):
-            Store.reading(tmp_path, messages.append)
-    elif name == "chunk":
-        assert Store.reading(tmp_path, messages.append).answer(0, 0) is None
-        assert "computed again" in messages[0]
-        words = "is damaged and is computed again: not a regular file: a character device"
-        with pytest.warns(StoreWarning, match=words):
-            assert validate("planar_two_link", samples=10, store=tmp_path).passed
-        assert not place.is_symlink()
-    else:
-        assert AccuracyResult.of(Store.reading(tmp_path, messages.append)) is None
-        assert "no accuracy results" in messages[0]
+    (tmp_path / "accuracy.json").symlink_to("/dev/zero")
+    assert AccuracyResult.of(Store.reading(tmp_path, messages.append)) is None
+    assert "no accuracy results" in messages[0]
+    (chunk,) = tmp_path.glob("chunks/*/*.chunk")
+    chunk.unlink()
+    chunk.symlink_to("/dev/zero")
+    assert Store.reading(tmp_path, messages.append).answer(0, 0) is None
+    assert "computed again" in messages[-1]
+    words = "is damaged and is computed again: not a regular file: a character device"
+    with pytest.warns(StoreWarning, match=words):
+        assert validate("planar_two_link", samples=10, store=tmp_path).passed
+    assert not chunk.is_symlink()
+    (tmp_path / "manifest.json").unlink()
+    (tmp_path / "manifest.json").symlink_to("/dev/zero")
+    with pytest.raises(SourceError, match="not a regular file"):
+        Store.reading(tmp_path, messages.append)
 
 
+@pytest.mark.parametrize(
+    ("link", "words"),
+    [
+        ("lock", "the store's lock is not a regular file: found a link; delete the lock"),
+        (".writing", "a symbolic link replaces a folder of the store"),
+    ],
+)
 def test_the_target_of_a_link_that_replaces_a_lock_or_folder_of_a_store_is_not_changed(
-    tmp_path: Path,
+    link: str, words: str, tmp_path: Path
 ) -> None:
     mine, store = tmp_path / "mine", tmp_path / "store"
-    mine.write_text("precious")
-    store.mkdir()
-    (store / "lock").symlink_to(mine)
-    words = "the store's lock is not a regular file: found a link; delete the lock"
-    with pytest.raises(SourceError, match=words):
-        validate("planar_two_link", samples=10, store=store)
-    assert mine.read_text() == "precious"
-    mine, store = tmp_path / "my folder", tmp_path / "other store"
-    (mine / "all").mkdir(parents=True)
+    for folder in (mine / "all", store):
+        folder.mkdir(parents=True)
     (mine / "all" / "file").write_text("precious")
-    store.mkdir()
-    (store / ".writing").symlink_to(mine)
-    with pytest.raises(SourceError, match="a symbolic link replaces a folder of the store"):
+    (store / link).symlink_to(mine / "all" / "file" if link == "lock" else mine)
+    with pytest.raises(SourceError, match=words):
         validate("planar_two_link", samples=10, store=store)
     assert (mine / "all" / "file").read_text() == "precious"
 
@@ -274,9 +268,7 @@ def test_files_that_a_mesh_names_are_read_only_if_they_are_regular_files_in_its_
     (folder / "device.mtl").symlink_to("/dev/zero")
     (folder / "leading_out.mtl").symlink_to(tmp_path / "outside.mtl")
     os.mkfifo(folder / "pipe.mtl")
-    (folder / "a.obj").write_text(OBJ.format(name))
     (folder / "own.mtl").write_text("newmtl m\nKd 1 0 0\n")
-    (folder / "own.obj").write_text(OBJ.format("own.mtl"))
     read: list[str] = []
 
     def read_and_note(path: Path, most: int) -> bytes:
@@ -284,7 +276,8 @@ def test_files_that_a_mesh_names_are_read_only_if_they_are_regular_files_in_its_
         return files.read_bytes(path, most)
 
     monkeypatch.setattr(scene, "read_bytes", read_and_note)
-    for mesh in ("a.obj", "own.obj"):
+    for mesh, material in (("a.obj", name), ("own.obj", "own.mtl")):
+        (folder / mesh).write_text(OBJ.format(material))
         visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
         (folder / "r.urdf").write_text(f'<robot name="r"><link name="l">{visual}</link></robot>')
         (shape,) = shapes(urdfkin.load(folder / "r.urdf", verify=False))

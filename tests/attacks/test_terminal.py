@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -229,14 +230,9 @@ def on_a_terminal(words: list[str]) -> str:
         os.environ["TERM"] = "xterm"
         os.execv(sys.executable, [sys.executable, "-m", "urdfkin", *words])
     shown = b""
-    while True:
-        try:
-            piece = os.read(screen, 65536)
-        except OSError:
-            break
-        if not piece:
-            break
-        shown += piece
+    with suppress(OSError):  # the other end is closed
+        while piece := os.read(screen, 65536):
+            shown += piece
     os.close(screen)
     os.waitpid(pid, 0)
     return shown.decode()

@@ -10,6 +10,7 @@ from tests.cli.running import refused, urdfkin
 from tests.urdfs import joint, robot
 from urdfkin.robot.trajectory import read_trajectory
 
+NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_2_joint,wrist_3_joint"
 #: Words that are no numbers; Python's `float` accepts some of them.
 NO_NUMBERS = [
     "1_0", "\u0661", "\u0967.\u0966", "\uff11", "nan", "inf", "-Infinity", "1e999", "0x10", "1,5", "1\u22122",
@@ -26,12 +27,10 @@ def test_an_invalid_number_is_refused_with_joint_and_line(text: str, tmp_path: P
     path = tmp_path / "q.csv"
     path.write_text(f'0,0,0,0,0,0\n# a remark\n0,0,0,"{text}",0,0\n', encoding="utf-8")
     assert "q.csv:3, wrist_1_joint: not a finite number: found" in refused("placement ur5 --q", f"@{path}")
-    robot, path = library.load("ur5"), tmp_path / "t.csv"
-    rows = [f"{t},0,0,0,0,0,0" for t in range(5)]
-    rows[3] = f'3,0,0,0,0,0,"{text}"'
-    path.write_text("\n".join([",".join(["t", *robot.coordinate_names]), *rows]), encoding="utf-8")
+    rows = [f"t,{NAMES}", *(f"{t},0,0,0,0,0,0" for t in range(3)), f'3,0,0,0,0,0,"{text}"', "4,0,0,0,0,0,0"]
+    (tmp_path / "t.csv").write_text("\n".join(rows), encoding="utf-8")
     with pytest.raises(library.InputError, match=r"t.csv:5, wrist_3_joint: not a finite number"):
-        read_trajectory(robot, path)
+        read_trajectory(library.load("ur5"), tmp_path / "t.csv")
 
 
 OPTIONS = [
@@ -65,11 +64,6 @@ def test_a_decimal_number_is_accepted(text: str) -> None:
     assert done.data["q"] == [[0.0, 0.0, NUMBERS[text], 0.0, 0.0, 0.0]]
 
 
-# -- columns ---------------------------------------------------------------------------------------------
-
-NAMES = "shoulder_pan_joint,shoulder_lift_joint,elbow_joint,wrist_1_joint,wrist_2_joint,wrist_3_joint"
-
-
 #: Wrong contents of a file for --q, and a part of the message.
 FILES = [
     ("1,2\n", "q.csv:1: 6 numbers are expected"),
@@ -97,13 +91,12 @@ def test_wrong_columns_are_refused_with_file_line_and_name(
 
 
 def test_columns_in_any_order_are_read_by_name(tmp_path: Path) -> None:
-    names = NAMES.split(",")[::-1]
-    path = tmp_path / "q.csv"
-    path.write_text(",".join(names) + "\n6,5,4,3,2,1\n")
+    names, path = ",".join(NAMES.split(",")[::-1]), tmp_path / "q.csv"
+    path.write_text(f"{names}\n6,5,4,3,2,1\n")
     done = urdfkin("placement ur5 --no-verify --format json --q", f"@{path}")
     assert done.data["q"] == [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]
-    path.write_text(",".join(names) + "\n6,5,4,3,2,x\n")
-    assert "q.csv:2, shoulder_pan_joint: not a finite number" in urdfkin("placement ur5 --q", f"@{path}").err
+    path.write_text(f"{names}\n6,5,4,3,2,x\n")
+    assert "q.csv:2, shoulder_pan_joint: not a finite number" in refused("placement ur5 --q", f"@{path}")
 
 
 def test_the_names_of_columns_may_be_numbers(tmp_path: Path) -> None:

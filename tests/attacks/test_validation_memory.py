@@ -10,7 +10,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import python
-from tests.urdfs import joint, limit, robot
+from tests.urdfs import chain, joint, limit
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
@@ -23,14 +23,6 @@ from urdfkin.validation.robot_input import subject
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 GB = 10**9
-
-
-def chain(joints: int, kind: str, leaves: int = 0) -> str:
-    inside = "" if kind == "fixed" else limit()
-    parts = [joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", 'xyz="0.1 0 0"', more=inside) for i in range(joints)]
-    ends = range(joints, joints + leaves)
-    parts += [joint(f"j{i}", "fixed", f"l{joints}", f"l{i + 1}", 'xyz="0.1 0 0"', "") for i in ends]
-    return robot(*parts) if parts else '<robot name="r"><link name="l0"/></robot>'
 
 
 def test_blocks_contain_each_item_once_and_processes_share_half_of_the_free_memory(
@@ -89,7 +81,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
 def test_the_memory_of_a_compiled_tree_is_linear_in_the_number_of_links() -> None:
     peaks = []
     for links in (500, 2000):
-        tree = urdfkin.load(chain(links, "fixed")).tree
+        tree = urdfkin.load(chain([""] * links, "fixed")).tree
         tracemalloc.start()
         compile_tree(tree, range(len(tree.links)))
         peaks.append(tracemalloc.get_traced_memory()[1])
@@ -127,57 +119,53 @@ def test_a_robot_that_needs_too_much_memory_is_not_verified_and_pinocchio_builds
 
 @pytest.mark.long
 def test_the_needed_memory_grows_with_the_cube_of_nv_and_with_the_links() -> None:
-    trees = [urdfkin.load(chain(n, "revolute")).tree for n in (100, 200)]
+    trees = [urdfkin.load(chain([limit()] * n, "revolute")).tree for n in (100, 200)]
     needs = [memory.needed_bytes(tree, 28) for tree in trees]
     assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
     assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
-    assert memory.needed_bytes(urdfkin.load(chain(0, "fixed")).tree, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
-    wide = urdfkin.load(chain(100, "revolute", leaves=1000)).tree
-    assert memory.needed_bytes(wide, 28) > needs[0] + 1000 * 16_000
+    one_link = urdfkin.load('<robot name="r"><link name="l0"/></robot>').tree
+    assert memory.needed_bytes(one_link, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    leaves = (f'<link name="e{i}"/>' + joint(f"e{i}", "fixed", "l100", f"e{i}") for i in range(1000))
+    wide = chain([limit()] * 100, "revolute").replace("</robot>", "".join([*leaves, "</robot>"]))
+    assert memory.needed_bytes(urdfkin.load(wide).tree, 28) > needs[0] + 1000 * 16_000
     memory.check(trees[0], 28, needs[0])
     memory.check(trees[0], 28, None)
     with pytest.raises(OracleError, match="not enough memory"):
         memory.check(trees[0], 28, needs[0] - 1)
 
 
-@pytest.fixture
-def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str, str], None]:
-    """Return a function that writes files of a simulated system: /proc and /sys/fs/cgroup."""
+MACHINE = {"proc/meminfo": "MemTotal: 9000000 kB\nMemAvailable:  8000000 kB\n"}
+CONTAINER = MACHINE | {
+    "proc/self/cgroup": "4:memory:/docker/abc\n2:cpu:/docker/abc\n",
+    "cgroup/memory/memory.limit_in_bytes": "3000000000\n",
+    "cgroup/memory/memory.usage_in_bytes": "1000000000\n",
+}
+OUTER_GROUP = MACHINE | {
+    "proc/self/cgroup": "0::/outer/inner\n",
+    "cgroup/outer/memory.max": "6000000000\n",
+    "cgroup/outer/memory.current": "5000000000\n",
+    "cgroup/outer/memory.stat": "anon 1\ninactive_file 2000000000\n",  # these files count as free memory
+    "cgroup/outer/inner/memory.max": "max\n",
+    "cgroup/outer/inner/memory.current": "1000000000\n",
+}
+INNER_GROUP = OUTER_GROUP | {"cgroup/outer/inner/memory.max": "1500000000\n"}
+
+
+@pytest.mark.parametrize(
+    ("files", "limit"),
+    [(MACHINE, 4_096_000_000), (CONTAINER, GB), (OUTER_GROUP, 1_500_000_000), (INNER_GROUP, 250_000_000)],
+    ids=["machine", "container", "outer group", "inner group"],
+)
+def test_the_memory_limit_is_half_of_the_free_memory_of_the_machine_container_or_control_group(
+    files: dict[str, str], limit: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(memory, "_PROC", tmp_path / "proc")
     monkeypatch.setattr(memory, "_GROUPS", tmp_path / "cgroup")
     monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-
-    def write(name: str, text: str) -> None:
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-
-    write("proc/meminfo", "MemTotal: 9000000 kB\nMemAvailable:  8000000 kB\n")
-    return write
-
-
-def test_the_memory_limit_depends_on_the_free_memory_of_the_machine_and_of_a_container(
-    system: Callable[[str, str], None],
-) -> None:
-    assert memory.limit() == 8_000_000 * 1024 // 2
-    system("proc/self/cgroup", "4:memory:/docker/abc\n2:cpu:/docker/abc\n")
-    system("cgroup/memory/memory.limit_in_bytes", "3000000000\n")
-    system("cgroup/memory/memory.usage_in_bytes", "1000000000\n")
-    assert memory.limit() == 1_000_000_000
-
-
-def test_the_memory_limit_depends_on_control_groups_and_counts_inactive_files_as_free(
-    system: Callable[[str, str], None],
-) -> None:
-    system("proc/self/cgroup", "0::/outer/inner\n")
-    system("cgroup/outer/memory.max", "6000000000\n")
-    system("cgroup/outer/memory.current", "5000000000\n")
-    system("cgroup/outer/memory.stat", "anon 1\ninactive_file 2000000000\n")
-    system("cgroup/outer/inner/memory.max", "max\n")
-    system("cgroup/outer/inner/memory.current", "1000000000\n")
-    assert memory.limit() == 1_500_000_000
-    system("cgroup/outer/inner/memory.max", "1500000000\n")
-    assert memory.limit() == 250_000_000
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    assert memory.limit() == limit
 
 
 @pytest.mark.long
@@ -194,12 +182,12 @@ def test_the_memory_limit_depends_on_the_limit_of_the_process() -> None:
 def test_many_fixed_links_are_checked_in_little_memory() -> None:
     done = python(
         "import resource, sys, warnings; warnings.simplefilter('ignore')\n"
-        "from tests.attacks.test_validation_memory import chain\n"
+        "from tests.urdfs import chain\n"
         "from urdfkin.validation.campaign import validate\n"
         "def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024\n"
-        "assert validate(chain(300, 'fixed'), samples=1).passed\n"
+        "assert validate(chain([''] * 300, 'fixed'), samples=1).passed\n"
         "before = peak()\n"
-        "assert validate(chain(5000, 'fixed'), samples=1).passed\n"
+        "assert validate(chain([''] * 5000, 'fixed'), samples=1).passed\n"
         "print(peak() - before)"
     )
     assert int(done.stdout) < 400  # MB; the paths to all frames took 1 GB

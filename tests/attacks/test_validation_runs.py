@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,11 @@ from urdfkin.validation.robot_input import subject
 
 ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]
+run = partial(subprocess.run, capture_output=True, text=True, check=False)
+
+
+def verdicts(report: ValidationReport) -> list[str]:
+    return [str(robot.verdict) for robot in report.robots]
 
 
 ENGINES: dict[str, Callable[[], Any]] = {
@@ -46,7 +52,7 @@ def test_an_error_of_a_robot_is_its_result_and_the_other_robots_are_verified(
     monkeypatch.setattr(worker_processes, "WORKER", faulty_worker.MODULE)
     monkeypatch.setattr(answer, "run_chunk", faulty_worker.run_faulty)
     report = validate(ROBOTS, samples=60, **ENGINES[engine]())
-    assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
+    assert verdicts(report) == ["verified", "not verified", "verified"]
     robot = report.robots[1]
     assert str(robot.reason).startswith("unexpected error in urdfkin, please report it: ")
     assert faulty_worker.ERRORS[error][1] in str(robot.reason)
@@ -76,7 +82,7 @@ class Refusing(Executor):
 @pytest.mark.parametrize("when_asked", [True, False])
 def test_robots_after_the_breakdown_of_an_executor_are_not_verified(when_asked: bool) -> None:
     report = validate(ROBOTS, samples=30, executor=Refusing(2, when_asked=when_asked))
-    assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "not verified"]
+    assert verdicts(report) == ["verified", "not verified", "not verified"]
     for robot in report.robots[1:]:
         assert "BrokenExecutor: a worker died" in str(robot.reason)
     assert report.asked == 3
@@ -86,7 +92,7 @@ def test_robots_after_the_breakdown_of_an_executor_are_not_verified(when_asked: 
 def test_a_process_pool_can_run_the_chunks() -> None:
     with ProcessPoolExecutor(1, get_context("spawn")) as pool:
         report = validate(["ur5", "no such robot"], samples=30, executor=pool)
-    assert [robot.verdict for robot in report.robots] == ["verified", "bad input"]
+    assert verdicts(report) == ["verified", "bad input"]
 
 
 @pytest.mark.long
@@ -164,20 +170,21 @@ def test_an_error_of_the_engine_is_the_result_of_each_unfinished_robot(
 
     monkeypatch.setattr(SerialEngine, "run", breaks)
     report = validate(ROBOTS, samples=1)
-    assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "not verified"]
+    assert verdicts(report) == ["verified", "not verified", "not verified"]
     assert "OSError: no more of anything" in str(report.robots[2].reason)
     assert "Traceback" in str(report.robots[2].error)
 
 
 def test_a_run_with_missing_robots_or_without_robots_has_not_passed() -> None:
     whole = validate(["planar_two_link", "double_pendulum"], samples=0)
-    part = ValidationReport(whole.robots[:1], 2, 0, 0, whole.started, 1.0)
     assert whole.passed
-    assert (part.passed, part.exit_code) == (False, 3)
-    assert part.outcome.reason == "1 of 2 robots without a report"
-    report = validate([])
-    assert (report.passed, report.exit_code) == (False, 3)
-    assert report.as_dict()["reason"] == "no robot was validated"
+    part = ValidationReport(whole.robots[:1], 2, 0, 0, whole.started, 1.0)
+    for report, reason in (
+        (part, "1 of 2 robots without a report"),
+        (validate([]), "no robot was validated"),
+    ):
+        assert (report.passed, report.exit_code) == (False, 3)
+        assert report.outcome.reason == report.as_dict()["reason"] == reason
 
 
 def test_an_interrupted_run_has_not_passed_even_where_every_robot_is_verified() -> None:
@@ -223,7 +230,8 @@ def test_an_interrupt_keeps_finished_chunks_and_drops_waiting_chunks(
     assert (report.interrupted, report.exit_code) == (True, 130)
     first, second, third = report.robots
     assert first.verdict is ValidationVerdict.VERIFIED
-    assert (second.samples, second.verdict) == (28, ValidationVerdict.NOT_VERIFIED)
+    assert (second.samples, second.results > 0) == (28, True)
+    assert second.verdict is ValidationVerdict.NOT_VERIFIED
     assert second.reason == "interrupted: 28 of 63 samples were compared"
     assert (third.samples, third.results) == (0, 0)
     assert third.reason == "interrupted: 0 of 63 samples were compared"
@@ -249,8 +257,7 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
 @pytest.mark.parametrize("descriptors", [6, 7, 8, 9, 12])
 def test_with_too_few_file_descriptors_each_robot_is_reported(descriptors: int) -> None:
     arguments = "validate double_pendulum ur5 --isolate --jobs 2 --samples 2"
-    line = f"ulimit -n {descriptors}; exec {sys.executable} -m urdfkin {arguments}"
-    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
+    done = run(["bash", "-c", f"ulimit -n {descriptors}; exec {sys.executable} -m urdfkin {arguments}"])
     verified = sum(line.endswith("verified") and "not" not in line for line in done.stdout.splitlines())
     assert (done.returncode == 0) == (verified == 2), done.stdout + done.stderr
     assert done.returncode in (0, 2, 3, 70)
@@ -261,8 +268,8 @@ def test_robots_are_checked_from_a_deleted_folder(tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     gone.mkdir()
     command = f"exec {sys.executable} -m urdfkin validate ur5 --isolate --samples 2"
-    script, env = f"cd {gone} && rmdir {gone} && {command}", os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(["sh", "-c", script], capture_output=True, text=True, check=False, env=env)
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = run(["sh", "-c", f"cd {gone} && rmdir {gone} && {command}"], env=env)
     assert done.returncode == 0, done.stderr
     assert "1 robot, " in done.stdout
 
@@ -274,15 +281,12 @@ def test_a_script_needs_no_main_guard_and_modules_of_the_current_folder_are_not_
 ) -> None:
     for planted in ("urdfkin", "multiprocessing", "json", "pickle", "queue"):
         (tmp_path / f"{planted}.py").write_text("print('planted')\nraise SystemExit(9)\n")
-    scripts = tmp_path / "scripts"
-    scripts.mkdir()
-    script = scripts / "script.py"
+    script = tmp_path / "scripts" / "script.py"
+    script.parent.mkdir()
     script.write_text(
         "print('once')\nfrom urdfkin.validation.campaign import validate\n"
         f"report = validate(['double_pendulum', 'planar_two_link'], samples=30, {how})\n"
         "print(report.passed, len(report.robots))\n"
     )
-    done = subprocess.run(
-        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = run([sys.executable, str(script)], cwd=tmp_path)
     assert done.stdout.splitlines() == ["once", "True 2"], done.stderr

@@ -71,15 +71,15 @@ def _is_alive(process: int) -> bool:
     return state not in "ZX"
 
 
-ENDED = [
-    (signal.SIGTERM, "--jobs 2"),
-    (signal.SIGTERM, ""),
-    (signal.SIGHUP, "--isolate"),
-    (signal.SIGINT, "--jobs 2"),
-]
-
-
-@pytest.mark.parametrize(("number", "how"), ENDED)
+@pytest.mark.parametrize(
+    ("how", "number"),
+    [
+        ("--jobs 2", signal.SIGTERM),
+        ("", signal.SIGTERM),
+        ("--isolate", signal.SIGHUP),
+        ("--jobs 2", signal.SIGINT),
+    ],
+)
 def test_a_signal_keeps_finished_results_in_every_report(
     number: signal.Signals, how: str, tmp_path: Path
 ) -> None:

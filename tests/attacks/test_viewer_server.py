@@ -132,15 +132,9 @@ def test_the_server_accepts_no_request_to_publish_the_viewer(
 @pytest.mark.slow
 def test_a_viser_version_that_starts_a_server_differently_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     # A future version of viser could call another function than the one that urdfkin replaces.
-    plain = SimpleNamespace(serve=websockets.asyncio.server.serve)
-    monkeypatch.setattr(
-        "viser.infra._infra.websockets",
-        SimpleNamespace(
-            asyncio=SimpleNamespace(server=plain),
-            datastructures=websockets.datastructures,
-            exceptions=websockets.exceptions,
-        ),
-    )
+    plain = SimpleNamespace(server=SimpleNamespace(serve=websockets.asyncio.server.serve))
+    future = SimpleNamespace(**vars(websockets) | {"asyncio": plain})
+    monkeypatch.setattr("viser.infra._infra.websockets", future)
     port = free_port()
     with pytest.raises(UnguardedError, match=r"viser \d.*cannot be secured: .*; pip install 'viser=="):
         new_server(port=port)

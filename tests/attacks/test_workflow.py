@@ -1,4 +1,4 @@
-"""The example workflow for CI runs the steps that its page states, and names existing files."""
+"""The example workflow for CI runs the steps that its page states; pages name existing files and tests."""
 
 import os
 import re
@@ -89,3 +89,18 @@ def test_the_site_is_built_by_make_and_the_output_folder_is_published() -> None:
     assert "permissions" not in jobs["build"]  # a pull request's code runs there
     assert jobs["publish"]["needs"] == "build"
     assert "pull_request" in jobs["publish"]["if"]
+
+
+def test_every_row_of_the_threats_page_names_an_existing_test() -> None:
+    page = (ROOT / "docs" / "threats.md").read_text(encoding="utf-8")
+    tests = re.findall(r"`(tests/[^`]+\.py)`", page)
+    scripts = [f"{name.replace('.', '/')}.py" for name in re.findall(r"`python -m (scripts\.\w+)", page)]
+    assert len(tests) >= 10
+    assert scripts
+    assert [name for name in tests + scripts if not (ROOT / name).is_file()] == []
+    for row in [row.split(" | ") for row in page.splitlines() if row.startswith("| ")][1:]:
+        assert len(row) == 4, row
+        assert row[2].strip(), row[0]
+        assert "tests/" in row[3], row[0]
+    assert "(docs/threats.md)" in (ROOT / "SECURITY.md").read_text(encoding="utf-8")
+    assert "SECURITY.md" in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -32,10 +32,8 @@ def wrapped(angle: NDArray[Any]) -> NDArray[Any]:
 
 
 def read(robot: Robot, path: Path, q: NDArray[Any], t: NDArray[Any] = T) -> Trajectory:
-    rows = np.column_stack([t, q])
     names = ",".join(["t", *robot.coordinate_names])
-    lines = [",".join(repr(float(x)) for x in row) for row in rows]
-    path.write_text("\n".join([names, *lines]))
+    np.savetxt(path, np.column_stack([t, q]), "%.17g", ",", header=names, comments="")
     return read_trajectory(robot, path)
 
 
@@ -65,9 +63,7 @@ def test_a_wheel_may_reverse_and_unwrapped_angles_do_not_change(tmp_path: Path) 
     assert motion.rates == "by central differences"
 
 
-def test_revolute_joints_and_fast_unwrapped_wheels_do_not_change(
-    tmp_path: Path,
-) -> None:
+def test_revolute_joints_and_fast_unwrapped_wheels_do_not_change(tmp_path: Path) -> None:
     angle = np.where(T < 2.0, 3.0, -3.0)
     motion = read(arm_of("revolute", limit(-6, 6)), tmp_path / "r.csv", angle)
     np.testing.assert_array_equal(motion.q[:, 0], angle)
@@ -137,8 +133,7 @@ def test_plot_prints_a_note_about_unwrapped_angles_on_stderr(tmp_path: Path) -> 
     robot = wheel()
     read(robot, tmp_path / "w.csv", wrapped(2.0 * T))
     (tmp_path / "w.urdf").write_text(robot.urdf)
-    words = ["plot", tmp_path / "w.urdf", "--trajectory", tmp_path / "w.csv", "-o", tmp_path / "w.svg"]
-    done = running.good(*map(str, words))
+    done = running.good(f"plot {tmp_path}/w.urdf --trajectory {tmp_path}/w.csv -o {tmp_path}/w.svg")
     assert "warning: joint wheel: its angle jumps by a whole turn after sample" in done.err
     assert "after unwrapping wheel" in done.text
     assert "not whether v and a" in " ".join((tmp_path / "w.svg").read_text().split())

@@ -169,31 +169,28 @@ def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path
     hidden.parent.mkdir(parents=True)
     hidden.write_text(f"token: {SECRET}")
     refused(expanded, link("${xacro.load_yaml('.git/config')['token']}"))
-    path = tmp_path / "e.xacro"
-    path.write_text(
-        f'<!DOCTYPE r [<!ENTITY e SYSTEM "{secret}">]><robot name="r"><link name="a">&e;</link></robot>'
-    )
+    path, entity = tmp_path / "e.xacro", f'<!DOCTYPE r [<!ENTITY e SYSTEM "{secret}">]>'
+    path.write_text(f'{entity}<robot name="r"><link name="a">&e;</link></robot>')
     assert SECRET not in expand(path, {}).decode()
 
 
 def test_files_in_the_repository_may_be_read_unless_the_repository_is_the_home_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file = tmp_path / "home" / "robots" / "urdf" / "r.xacro"
+    home = tmp_path / "home"
+    file, other = home / "robots" / "urdf" / "r.xacro", str(home / "robots" / "other" / "o.xacro")
     file.parent.mkdir(parents=True)
     file.touch()
-    other = str(tmp_path / "home" / "robots" / "other" / "o.xacro")
     assert not Ground.around(file, [], []).holds(other)
-    (tmp_path / "home" / "robots" / ".git").mkdir()
+    (home / "robots" / ".git").mkdir()
     ground = Ground.around(file, [], [])
     assert ground.holds(other)
-    assert not ground.holds(str(tmp_path / "home" / "robots" / ".git" / "config"))
-    assert not ground.holds(str(tmp_path / "home" / "robots2" / "o.xacro"))
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    (tmp_path / "home" / "robots" / ".git").rmdir()
-    (tmp_path / "home" / ".git").mkdir()
-    assert not Ground.around(file, [], []).holds(other)
-    assert not Ground.around(file, [], ["/", str(tmp_path / "home")]).holds(other)
+    for hidden_or_outside in ("robots/.git/config", "robots2/o.xacro"):
+        assert not ground.holds(str(home / hidden_or_outside))
+    monkeypatch.setenv("HOME", str(home))
+    (home / "robots" / ".git").rename(home / ".git")
+    for arguments in ([], ["/", str(home)]):
+        assert not Ground.around(file, [], arguments).holds(other)
 
 
 def test_links_in_an_installed_package_may_only_lead_to_its_sources(tmp_path: Path) -> None:
@@ -233,8 +230,8 @@ def test_a_xacro_file_reads_no_environment_variables(
     monkeypatch.setenv("TOKEN", SECRET)
     assert "'TOKEN' is not set" in refused(expanded, link("$(env TOKEN)"))
     assert 'name="none"' in expanded(link("$(optenv TOKEN none)"))
-    refused(expanded, link("${xacro.load_yaml('/proc/self/environ')}"))
-    refused(expanded, link(f"${{xacro.load_yaml('/proc/{os.getpid()}/environ')}}"))
+    for process in ("self", os.getpid()):
+        refused(expanded, link(f"${{xacro.load_yaml('/proc/{process}/environ')}}"))
 
 
 WORST = """

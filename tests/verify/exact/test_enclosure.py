@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import urdfkin
 from tests import urdfs
-from tests.attacks.test_exact_quaternions import quaternions, text
+from tests.attacks.test_extreme_numbers import quaternions, turned_chain
 from tests.high_precision import mp, true_motion
 from tests.laws.everything import by_the_robot
 from tests.laws.subjects import robot_of, state
@@ -85,7 +85,7 @@ def test_every_result_at_fifty_digits_lies_in_the_interval_at_any_precision(name
 @pytest.mark.slow
 def test_robots_with_quaternions_or_a_root_joint_are_enclosed() -> None:
     for robot in (
-        urdfkin.load(text(quaternions(1.7), 'version="1.1"'), verify=False),
+        urdfkin.load(turned_chain(quaternions(1.7), 'version="1.1"'), verify=False),
         robot_of("tree_1", root_joint="floating"),
         robot_of("one_joint", root_joint="planar"),
     ):
