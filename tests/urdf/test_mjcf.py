@@ -475,7 +475,7 @@ def test_the_memory_that_a_file_reserves_for_dynamics_is_not_allocated() -> None
     assert "does not compile" not in robot.verifier.reading
 
 
-def test_a_process_that_dies_is_an_error_or_the_file_is_read_without_shapes(
+def test_if_a_process_dies_the_file_is_refused_or_read_without_shapes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     right = ask_python

@@ -32,6 +32,7 @@ from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.sources import Source, read_source
 from urdfkin.verify import model_check
 
+Write = Callable[..., Path]
 MOST_HERE = 1000
 
 
@@ -54,15 +55,11 @@ def test_standard_input_is_read_completely_without_a_limit(monkeypatch: pytest.M
     assert read_standard_input() == b"0.1,0.2\n0.3,0.4\n"
 
 
-def test_a_package_address_is_the_file_in_the_package_or_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    package = tmp_path / "arm_description"
-    (package / "urdf").mkdir(parents=True)
-    (package / "urdf" / "arm.urdf").write_text("<robot/>")
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+def test_a_package_address_is_a_file_or_an_error(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write("<robot/>", "arm_description/urdf/arm.urdf")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(path.parents[2]))
     read = read_source("package://arm_description/urdf/arm.urdf")
-    assert (read.data, read.source) == (b"<robot/>", str(package / "urdf" / "arm.urdf"))
+    assert (read.data, read.source) == (b"<robot/>", str(path))
     with pytest.raises(SourceError, match=r"^package://nowhere/arm.urdf: the package 'nowhere' is"):
         read_source("package://nowhere/arm.urdf")
 
@@ -160,9 +157,7 @@ def test_a_yourdfpy_robot_that_is_no_urdf_is_an_error_of_urdfkin(name: str, valu
     ("joints", "words"),
     [(0, "1 links agree"), (2, "3 links agree"), (320, "not compared with the model itself: nv is 320")],
 )
-def test_a_model_without_bodies_is_compared_by_its_joints_if_its_data_fit_into_memory(
-    joints: int, words: str
-) -> None:
+def test_a_model_without_bodies_is_compared_by_its_joints_if_memory_allows(joints: int, words: str) -> None:
     model = pin.Model()
     for k in range(joints):
         model.addJoint(k, pin.JointModelRX(), pin.SE3.Random(), f"turn_{k}")
@@ -180,11 +175,11 @@ def test_an_axis_of_a_yourdfpy_robot_that_is_no_unit_vector_is_a_warning() -> No
 
 
 def test_a_finding_and_the_certificate_name_a_quaternion_that_yourdfpy_may_have_ignored(
-    tmp_path: Path,
+    write: Write,
 ) -> None:
-    path, texts = tmp_path / "r.urdf", {}
+    texts = {}
     for rotation in ('quat_xyzw="0 0 1 0"', 'rpy="0 0 1"', 'xyz="1 2 3"'):
-        path.write_text(urdf(joint("j", "continuous", "a", "b", rotation), attributes='version="1.1"'))
+        path = write(urdf(joint("j", "continuous", "a", "b", rotation), attributes='version="1.1"'), "r.urdf")
         robot = urdfkin.load(yourdfpys(str(path)))
         robot.placement([0.0], "b")
         texts[rotation] = [str(f) for f in robot.findings], robot.certificate().reading
@@ -306,9 +301,7 @@ def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
 @pytest.mark.parametrize(
     ("name", "root_joint"), [("ur5", None), ("kinova", None), ("a1", "floating"), ("a1", "planar")]
 )
-def test_pinocchio_model_returns_a_new_model_for_the_robots_configurations(
-    name: str, root_joint: str | None
-) -> None:
+def test_pinocchio_model_returns_a_new_model_of_the_robot(name: str, root_joint: str | None) -> None:
     robot = loaded(file(name), root_joint=root_joint)
     model, again = robot.pinocchio_model(), robot.pinocchio_model()
     assert model is not again
@@ -337,23 +330,24 @@ def test_a_robot_that_pinocchio_refuses_has_no_model() -> None:
 
 
 @pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def package(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     """Create a package robot_descriptions with a robot, and with descriptions that cannot be loaded."""
-    folder = tmp_path / "robot_descriptions"
-    folder.mkdir()
     names = ["toy_description", "far_description", "empty_description"]
-    (folder / "__init__.py").write_text(f"DESCRIPTIONS = dict.fromkeys({names!r})")
-    (folder / "toy_description.py").write_text(f"URDF_PATH = {file('polar')!r}")
-    (folder / "far_description.py").write_text("raise RuntimeError('clone failed\\nfatal: no route to host')")
-    (folder / "empty_description.py").write_text("")
-    (folder / "other_description.py").write_text("raise AssertionError('imported')")
-    monkeypatch.syspath_prepend(tmp_path)
+    texts = {
+        "toy_description": f"URDF_PATH = {file('polar')!r}",
+        "far_description": "raise RuntimeError('clone failed\\nfatal: no route to host')",
+        "empty_description": "",
+        "other_description": "raise AssertionError('imported')",
+        "__init__": f"DESCRIPTIONS = dict.fromkeys({names!r})",
+    }
+    path, *_ = (write(text, f"robot_descriptions/{name}.py") for name, text in texts.items())
+    monkeypatch.syspath_prepend(path.parents[1])
     for name in [name for name in sys.modules if name.startswith("robot_descriptions")]:
         monkeypatch.delitem(sys.modules, name)
-    return folder
 
 
-def test_a_description_is_loaded_by_its_name_and_by_its_module(package: Path) -> None:
+@pytest.mark.usefixtures("package")
+def test_a_description_is_loaded_by_its_name_and_by_its_module() -> None:
     assert urdfkin.load("toy_description").name == "polar"
     assert urdfkin.load(importlib.import_module("robot_descriptions.toy_description")).name == "polar"
     for name in ("toy_description", "far_description", "empty_description"):
@@ -361,9 +355,8 @@ def test_a_description_is_loaded_by_its_name_and_by_its_module(package: Path) ->
     sys.modules.pop("robot_descriptions")
 
 
-def test_a_description_that_cannot_be_loaded_is_an_error_and_no_unlisted_module_is_imported(
-    package: Path,
-) -> None:
+@pytest.mark.usefixtures("package")
+def test_an_invalid_description_is_an_error_and_no_unlisted_module_is_imported() -> None:
     for name, error, words in (
         ("toys", UnknownNameError, "unknown robot description 'toys_description'; did you mean toy_desc"),
         ("other", UnknownNameError, "unknown"),  # a module that is not in DESCRIPTIONS
@@ -376,15 +369,11 @@ def test_a_description_that_cannot_be_loaded_is_an_error_and_no_unlisted_module_
 
 
 @pytest.mark.slow
-def test_a_description_module_with_a_xacro_file_has_default_arguments(tmp_path: Path) -> None:
-    path = tmp_path / "arm.urdf.xacro"
-    path.write_text(
-        '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-        '<xacro:arg name="tool" default="none"/>'
-        '<link name="base_$(arg tool)"/></robot>'
-    )
+def test_a_description_module_with_a_xacro_file_has_default_arguments(write: Write) -> None:
+    inside = '<xacro:arg name="tool" default="none"/><link name="base_$(arg tool)"/>'
+    text = f'<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">{inside}</robot>'
     module = ModuleType("arm_description")
-    module.__dict__.update(XACRO_PATH=str(path), XACRO_ARGS={"tool": "gripper"})
+    module.__dict__.update(XACRO_PATH=str(write(text, "arm.xacro")), XACRO_ARGS={"tool": "gripper"})
     assert urdfkin.load(module).link_names == ("base_gripper",)
     assert urdfkin.load(module, xacro_args={"tool": "saw"}).link_names == ("base_saw",)
 
@@ -399,9 +388,6 @@ def test_without_robot_descriptions_the_error_names_the_package_to_install() -> 
     assert done.stdout.startswith("panda_description: robot_descriptions is not installed; pip install")
 
 
-def test_a_file_whose_name_looks_like_a_description_is_loaded(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("my_description").write_text(urdfkin.load("polar", verify=False).urdf)
+def test_a_file_named_like_a_description_is_loaded(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(write(urdfkin.load("polar", verify=False).urdf, "my_description").parent)
     assert urdfkin.load("my_description").name == "polar"

@@ -245,9 +245,7 @@ MIMICS = {
 
 
 @pytest.mark.parametrize(("schema", "words", "expected"), MIMICS.values(), ids=MIMICS)
-def test_mimic_joints_follow_their_rule(
-    read: Read, schema: str, words: str, expected: tuple[float, float]
-) -> None:
+def test_mimic_joints_follow_their_rule(read: Read, schema: str, words: str, expected: object) -> None:
     follower = joint("wrist", "Revolute", "upper", "hand", words, schema, axis="Z")
     links = body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + body("hand", "(0, 0, 1)")
     robot = read(links + SHOULDER + follower)
@@ -536,7 +534,7 @@ LISTED: dict[str, tuple[str, list[str]]] = {
 
 
 @pytest.mark.parametrize(("content", "expected"), LISTED.values(), ids=LISTED)
-def test_parts_that_a_tree_cannot_represent_are_reported_with_their_path(
+def test_unsupported_parts_are_reported_with_their_path(
     read: Read, content: str, expected: list[str]
 ) -> None:
     robot = read(content)
@@ -645,7 +643,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("text", "why"), REFUSED.values(), ids=REFUSED)
-def test_a_file_without_a_robot_and_a_robot_that_a_tree_cannot_represent_are_refused(
+def test_a_file_that_is_no_stage_of_a_tree_is_refused_with_the_reason(
     write: Write, text: str, why: str
 ) -> None:
     with pytest.raises(InputError, match=why):
@@ -745,9 +743,7 @@ def test_the_total_size_of_all_layers_is_limited(write: Write, monkeypatch: pyte
     assert len(usd.files_of(usd.library(), str(path))) == 6
 
 
-def test_a_stage_of_hundreds_of_layers_is_read_and_one_of_thousands_is_refused(
-    write: Write, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hundreds_of_layers_are_read_but_not_thousands(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     refs = "".join(f'def "x{k}" (references = @./part{k}.usdc@</a>) {{ }}\n' for k in range(200))
     path = write(stage(ARM + refs))
     part = usd.library().Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
@@ -769,9 +765,7 @@ def test_textures_and_other_assets_are_never_opened(write: Write, tmp_path: Path
 
 
 @pytest.mark.parametrize("suffix", [".usdc", ".usdz"])
-def test_binary_files_are_read_but_truncated_ones_are_errors_unless_a_package_still_has_the_whole_robot(
-    write: Write, suffix: str
-) -> None:
+def test_a_truncated_binary_file_is_an_error_or_has_the_whole_robot(write: Write, suffix: str) -> None:
     file = binary(write, suffix)
     data, whole = file.read_bytes(), loaded(file)
     assert reach(whole) == pytest.approx(2.0)
@@ -793,9 +787,7 @@ DEEDS = {
 
 
 @pytest.mark.parametrize("deed", DEEDS)
-def test_a_program_in_the_confined_process_cannot_write_files_or_start_processes(
-    tmp_path: Path, deed: str
-) -> None:
+def test_the_confined_process_cannot_write_files_or_start_processes(tmp_path: Path, deed: str) -> None:
     file = tmp_path / "made"
     words = f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit(5)\n{DEEDS[deed]}"
     if os.geteuid() == 0 and deed != "write":
@@ -804,9 +796,7 @@ def test_a_program_in_the_confined_process_cannot_write_files_or_start_processes
     assert not file.exists() or file.stat().st_size == 0
 
 
-def test_a_reference_that_openusd_would_find_in_the_current_folder_is_refused(
-    write: Write, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reference_to_the_current_folder_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(write(stage(ARM), "elsewhere/configuration/arm.usda").parents[1])
     path = write(stage('def "x" (references = @configuration/arm.usda@) { }'), "robot/robot.usda")
     with pytest.raises(InputError, match="outside the folder"):
@@ -963,9 +953,7 @@ ROBOTS = [
 
 
 @pytest.mark.parametrize("name", ROBOTS[:3])
-def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(
-    converted: Read, name: str
-) -> None:
+def test_single_precision_explains_the_difference_from_the_urdf(converted: Read, name: str) -> None:
     robot = loaded(name)
     found = urdfkin.same(robot, converted(robot), boxes=0)
     assert found.single is not None
@@ -1051,9 +1039,7 @@ def test_an_error_smaller_than_the_rounding_of_a_long_slide_is_found_at_its_join
 
 @pytest.mark.parametrize("kind", ["a micrometre", "a microradian", "another zero"])
 @pytest.mark.parametrize("name", ["slide", "elbow", "wrist"])
-def test_rounding_never_explains_an_error_above_the_rounding_of_the_joint(
-    converted: Read, kind: str, name: str
-) -> None:
+def test_rounding_does_not_explain_a_larger_error_of_a_joint(converted: Read, kind: str, name: str) -> None:
     if (kind, name) == ("another zero", "slide"):
         kind = "a microradian"
     robot = urdfkin.load(LONG_SLIDE)
@@ -1351,9 +1337,7 @@ def test_only_the_rounding_of_a_number_explains_a_difference_in_either_order_of_
 
 
 @pytest.mark.parametrize("lock", [{"slide": 0.3}, {"elbow": 0.7}, {"slide": -0.2, "wrist": 1.1}])
-def test_locked_joints_may_differ_only_by_the_rounding_of_their_numbers(
-    converted: Read, lock: dict[str, float]
-) -> None:
+def test_locked_joints_may_differ_only_by_rounding(converted: Read, lock: dict[str, float]) -> None:
     text = LONG_SLIDE.replace("1000", "1")
     robot, free = urdfkin.load(text, lock=lock), urdfkin.load(text)
     rounded = converted(free, lock=lock)
@@ -1379,9 +1363,7 @@ def free_base(kind: str, height: float) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize(("kind", "height"), [("floating", 0.0), ("planar", 0.5)])
-def test_a_free_base_must_have_the_same_frame_and_the_joints_after_it_may_be_rounded(
-    write: Write, kind: str, height: float
-) -> None:
+def test_only_the_joints_after_a_free_base_may_be_rounded(write: Write, kind: str, height: float) -> None:
     urdf, text = free_base(kind, height)
     for found in in_both_orders(loaded(urdf), loaded(write(text))):
         assert found.up_to_single, found.unexplained
@@ -1396,9 +1378,7 @@ def test_a_free_base_must_have_the_same_frame_and_the_joints_after_it_may_be_rou
 
 
 @pytest.mark.parametrize("name", ["panda", "so101", "allegro_left_hand"])
-def test_two_rounded_stages_of_a_robot_are_the_same_up_to_the_roundings_of_both(
-    converted: Read, name: str
-) -> None:
+def test_two_rounded_stages_are_the_same_up_to_the_roundings_of_both(converted: Read, name: str) -> None:
     first = converted(loaded(name))
     moving = [one.name for one in first.tree.joints if one.kind.nq == 1]
     where = moving[len(moving) // 2]

@@ -56,9 +56,7 @@ def test_a_xacro_file_is_loaded_with_its_arguments(arm: Path) -> None:
         assert robot.certificate().verified
 
 
-def test_the_expansion_does_not_change_the_working_directory(
-    arm: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_expansion_stays_in_the_working_directory(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(arm.parents[1])
     assert b'name="tool"' in expand(Path("urdf/arm.urdf.xacro"), {})
     assert Path.cwd() == arm.parents[1]
@@ -89,9 +87,7 @@ def test_findings_refer_to_the_expanded_text(arm: Path) -> None:
         ("<link", "not well-formed|unclosed|invalid"),
     ],
 )
-def test_a_file_that_cannot_be_expanded_is_an_error_with_the_reason(
-    write: Write, text: str, reason: str
-) -> None:
+def test_a_failed_expansion_is_an_error_with_the_reason(write: Write, text: str, reason: str) -> None:
     path = write(f'<robot name="r" {NAMESPACE}>{text}</robot>', "r.xacro")
     with pytest.raises(XacroError, match=f"(?s)cannot expand the file: found .*({reason})"):
         urdfkin.load(path)

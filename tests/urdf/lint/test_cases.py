@@ -150,9 +150,7 @@ def test_a_limit_has_an_error_or_a_mark_exactly_if_pinocchio_refuses_it(kind: st
 @pytest.mark.parametrize("name", FURTHER_LIMITS)
 @pytest.mark.parametrize("value", ["-1", "inf", "nan", "", "fast"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_limits_of_urdf_1_2_are_checked_on_every_joint_and_only_in_version_1_2(
-    kind: str, value: str, name: str
-) -> None:
+def test_limits_of_urdf_1_2_are_checked_only_in_version_1_2(kind: str, value: str, name: str) -> None:
     codes = {
         version: {f.code for f in check(joint_with({**USUAL, name: value}, kind, version).encode())}
         for version in VERSIONS
@@ -182,17 +180,13 @@ TOKENS = [
 
 
 @given(st.binary(max_size=400), st.lists(st.sampled_from(TOKENS), max_size=40))
-def test_the_check_of_random_bytes_and_random_tokens_raises_no_exception(
-    data: bytes, tokens: list[bytes]
-) -> None:
+def test_the_check_of_any_bytes_and_tokens_raises_no_exception(data: bytes, tokens: list[bytes]) -> None:
     check_text(data)
     check_text(b"<robot name='r'>" + b" ".join(tokens))
 
 
 @given(st.sampled_from(DOCUMENTS), st.data())
-def test_a_document_with_a_replaced_piece_always_has_the_same_findings_in_order(
-    document: bytes, data: st.DataObject
-) -> None:
+def test_a_changed_document_always_has_the_same_findings(document: bytes, data: st.DataObject) -> None:
     start = data.draw(st.integers(0, len(document)))
     length = data.draw(st.integers(0, 40))
     mutant = document[:start] + data.draw(st.sampled_from([*TOKENS, b""])) + document[start + length :]
@@ -207,9 +201,9 @@ MANY = 50_000
 
 
 def chain(back: str = "", mimic: bool = False) -> bytes:
-    """Write a chain of many joints, each on its own line."""
+    """Write a chain of many joints, with each link and each joint on its own line."""
     follow = ["", *(urdfs.mimic(f"j{i}") * mimic for i in range(MANY - 1))]
-    text = urdfs.chain(follow, origin="", axis="").replace("<joint", "\n<joint")
+    text = urdfs.chain(follow, origin="", axis="").replace("<joint", "\n<joint").replace("<link", "\n<link")
     return text.replace("</robot>", f"{back}</robot>").encode()
 
 
@@ -225,7 +219,7 @@ def test_a_chain_of_50000_links_has_no_finding_and_a_loop_has_one_error_on_its_l
     assert timed(chain()) == ()
     back = urdfs.joint("back", "fixed", f"l{MANY}", "l0", axis="")
     (finding,) = timed(chain("\n" + back))
-    assert (finding.code, finding.line) == ("URDF412", MANY + 2)
+    assert (finding.code, finding.line) == ("URDF412", 2 * MANY + 3)
     codes = {finding.code for finding in timed(chain(mimic=True))}
     assert codes == {"URDF524", "URDF525"}
 
@@ -260,13 +254,6 @@ def test_a_number_that_is_too_long_is_an_error_only_if_kinematics_uses_the_numbe
     for inside, origin, severity in (("", "1" * 9, "error"), (mass.format("1" * 9), "1", "warning")):
         findings = check_text(text.format(inside, origin).encode(), limits=Limits(number=8))
         assert ("URDF305", severity) in [(f.code, f.severity.value) for f in findings]
-
-
-@pytest.mark.long
-def test_line_numbers_above_65535_are_correct() -> None:
-    data = b'<robot name="r">' + b"\n" * 100_000 + b'<link name="a"/><link name="a"/></robot>'
-    (finding,) = check_text(data)
-    assert finding.line == 100_001
 
 
 if __name__ == "__main__":
