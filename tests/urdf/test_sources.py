@@ -174,9 +174,7 @@ def test_an_axis_of_a_yourdfpy_robot_that_is_no_unit_vector_is_a_warning() -> No
         urdfkin.load(robot)
 
 
-def test_a_finding_and_the_certificate_name_a_quaternion_that_yourdfpy_may_have_ignored(
-    write: Write,
-) -> None:
+def test_a_finding_and_the_certificate_name_a_quaternion_that_yourdfpy_may_have_ignored(write: Write) -> None:
     texts = {}
     for rotation in ('quat_xyzw="0 0 1 0"', 'rpy="0 0 1"', 'xyz="1 2 3"'):
         path = write(urdf(joint("j", "continuous", "a", "b", rotation), attributes='version="1.1"'), "r.urdf")

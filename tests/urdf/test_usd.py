@@ -39,15 +39,18 @@ pytestmark = pytest.mark.slow
 HEAD = '#usda 1.0\n(\n    defaultPrim = "arm"\n    metersPerUnit = {unit}\n    upAxis = "{up}"\n)\n'
 
 
-def moved(op: str, value: object, name: str = "translate") -> str:
-    """Write the transform of a prim with one operation: `double3 xformOp:translate = (0, 0, 1)`."""
-    return f'{op} xformOp:{name} = {value}\nuniform token[] xformOpOrder = ["xformOp:{name}"]'
+def moved(*operations: tuple[str, str, object]) -> str:
+    """Write the transform of a prim, with operations such as ("double3", "translate", (0, 0, 1))."""
+    words = [f"{kind} xformOp:{name} = {value}\n" for kind, name, value in operations]
+    order = ", ".join(f'"xformOp:{name}"' for _, name, _ in operations)
+    return "".join([*words, f"uniform token[] xformOpOrder = [{order}]\n"])
 
 
 def body(name: str, place: str = "", inside: str = "", schemas: str = "") -> str:
     """Write a rigid body at `place`, (x, y, z) in the unit of the stage."""
     head = f'def Xform "{name}" (prepend apiSchemas = ["PhysicsRigidBodyAPI"{schemas}])'
-    return f"{head} {{\n{moved('double3', place) if place else ''}\n{inside}\n}}\n"
+    placed = moved(("double3", "translate", place)) if place else ""
+    return f"{head} {{\n{placed}{inside}\n}}\n"
 
 
 def joint(
@@ -65,8 +68,11 @@ def joint(
 
 _TYPES = {"localPos": "point3f", "localRot": "quatf"}
 ROOT = ', "PhysicsArticulationRootAPI"'
+BASE = body("base", schemas=ROOT)
+#: The transform of the link `upper`.
+UP = ("double3", "translate", "(0, 0, 1)")
 #: An arm of two links: a revolute joint about z at (0, 0, 1), then a prismatic joint along y at (2, 0, 0).
-LINKS = body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + body("lower", "(2, 0, 1)")
+LINKS = BASE + body("upper", "(0, 0, 1)") + body("lower", "(2, 0, 1)")
 SHOULDER = joint("shoulder", "Revolute", "base", "upper", axis="Z", limits=(-90, 180), localPos0=(0, 0, 1))
 RAIL = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, 3), localPos0=(2, 0, 0))
 JOINTS = SHOULDER + RAIL
@@ -146,7 +152,7 @@ def test_the_joint_frames_in_both_bodies_determine_the_joint(read: Read) -> None
         "j", "Revolute", "base", "tip", axis="X",
         localPos0=(1, 0, 0), localRot0=turn, localPos1=(0, 3, 0), localRot1=turn,
     )  # fmt: skip
-    robot = read(body("base", schemas=ROOT) + body("tip", "(1, -3, 0)") + offset)
+    robot = read(BASE + body("tip", "(1, -3, 0)") + offset)
     assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([1.0, -3.0, 0.0])
     # The axis is parallel to the y axis of the base, through (1, 0, 0).
     turned = robot.placement([math.pi / 2], "tip")
@@ -157,7 +163,7 @@ def test_the_joint_frames_in_both_bodies_determine_the_joint(read: Read) -> None
 
 def test_a_joint_from_the_child_to_the_parent_has_the_opposite_axis(read: Read) -> None:
     reverse = joint("j", "Revolute", "tip", "base", axis="Z", localPos1=(1, 0, 0))
-    robot = read(body("base", schemas=ROOT) + body("tip", "(1, 0, 0)") + reverse)
+    robot = read(BASE + body("tip", "(1, 0, 0)") + reverse)
     assert robot.link_names[0] == "base"
     assert robot.tree.joints[0].kind.value == "continuous"
     T = robot.placement([math.pi / 2], "tip")
@@ -166,7 +172,7 @@ def test_a_joint_from_the_child_to_the_parent_has_the_opposite_axis(read: Read) 
 
 
 def test_nested_bodies_and_scaled_bodies_have_rigid_frames(read: Read) -> None:
-    scaled = moved("float3", (2, 2, 2), "scale") + "\n" + body("tip", "(1, 0, 0)")
+    scaled = moved(("float3", "scale", (2, 2, 2))) + body("tip", "(1, 0, 0)")
     own = joint("j", "Revolute", "base", "base/tip", axis="Z", localPos0=(1, 0, 0))
     robot = read(body("base", inside=scaled, schemas=ROOT) + own)
     assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([2.0, 0.0, 0.0])
@@ -174,7 +180,7 @@ def test_nested_bodies_and_scaled_bodies_have_rigid_frames(read: Read) -> None:
 
 
 def test_a_joint_to_a_prim_below_a_body_moves_the_body(read: Read) -> None:
-    flange = f'def Xform "flange" {{\n{moved("double3", (0, 0, 2))}\n}}'
+    flange = f'def Xform "flange" {{\n{moved(("double3", "translate", (0, 0, 2)))}}}'
     own = joint("j", "Revolute", "base/flange", "tip", axis="Z")
     robot = read(body("base", inside=flange, schemas=ROOT) + body("tip", "(0, 0, 2)") + own)
     for name in ("tip", "flange"):
@@ -195,7 +201,7 @@ def d6(free: str, more: str = "", applied: Sequence[str] = ()) -> str:
     """Write two bodies and a joint with these degrees of freedom between them."""
     shut = [name for name in ALL if name not in free.split()]
     own = joint("j", "", "base", "tip", locks(shut) + more, limit_schemas(applied or shut))
-    return body("base", schemas=ROOT) + body("tip") + own
+    return BASE + body("tip") + own
 
 
 ALL = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -247,7 +253,7 @@ MIMICS = {
 @pytest.mark.parametrize(("schema", "words", "expected"), MIMICS.values(), ids=MIMICS)
 def test_mimic_joints_follow_their_rule(read: Read, schema: str, words: str, expected: object) -> None:
     follower = joint("wrist", "Revolute", "upper", "hand", words, schema, axis="Z")
-    links = body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + body("hand", "(0, 0, 1)")
+    links = BASE + body("upper", "(0, 0, 1)") + body("hand", "(0, 0, 1)")
     robot = read(links + SHOULDER + follower)
     rule = present(robot.tree.joints[1].mimic)
     assert (robot.nq, rule.leader) == (1, "shoulder")
@@ -528,7 +534,7 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     ),
     "time samples with a default value": (ARM.replace(PLACE, f"{PLACE}\ndouble3 xformOp:{SAMPLES}"), []),
     "time samples above the robot": (
-        moved("double3", (0, 0, 1)).replace(PLACE, SAMPLES) + "\n" + ARM, ["USD104 /arm"],
+        moved(UP).replace(PLACE, SAMPLES) + ARM, ["USD104 /arm"],
     ),
 }  # fmt: skip
 
@@ -551,7 +557,7 @@ def test_a_blocked_value_is_treated_as_missing(read: Read) -> None:
         "bool physics:excludeFromArticulation = None",
         localPos0=(0, 0, 1), localPos1=None, localRot1=None, limits=("None", "None"),
     )  # fmt: skip
-    robot = read(body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + blocked)
+    robot = read(BASE + body("upper", "(0, 0, 1)") + blocked)
     (made,) = robot.tree.joints
     assert made.kind.value == "continuous"
     assert made.axis == pytest.approx([1.0, 0.0, 0.0])
@@ -576,10 +582,9 @@ def test_other_layers_are_read_and_another_unit_or_up_axis_is_reported(write: Wr
     assert codes(robot) == {"USD301": "/mine", "USD302": "/mine"}
     words = "USD301 /mine: the layer parts/arm.usda has metersPerUnit 0.01, but the stage 1"
     assert any(one.startswith(words) for one in findings(robot))
-    resolved = (
-        "double3 xformOp:rotateXYZ:unitsResolve = (90, 0, 0)\n"
-        "double3 xformOp:scale:unitsResolve = (0.01, 0.01, 0.01)\n"
-        'uniform token[] xformOpOrder = ["xformOp:rotateXYZ:unitsResolve", "xformOp:scale:unitsResolve"]'
+    resolved = moved(
+        ("double3", "rotateXYZ:unitsResolve", (90, 0, 0)),
+        ("double3", "scale:unitsResolve", (0.01, 0.01, 0.01)),
     )
     robot = loaded(write(text % resolved))
     assert robot.link_names == ("base", "upper", "lower")
@@ -603,14 +608,11 @@ def test_a_sublayer_with_another_unit_is_reported(write: Write) -> None:
     assert codes(loaded(write(sublayered(stage(LINKS), "joints.usda")))) == {"USD301": "/arm"}
 
 
-SHEAR = (
-    "float xformOp:rotateZ = 45\nfloat3 xformOp:scale = (1, 2, 1)\n"
-    'uniform token[] xformOpOrder = ["xformOp:scale", "xformOp:rotateZ"]\n'
-)
+SCALED, TURNED = ("float3", "scale", (1, 2, 1)), ("float", "rotateZ", 45)
 
 
 def test_a_sheared_frame_is_no_link(read: Read) -> None:
-    frame = f'def Xform "skew" {{\n{SHEAR}}}\n'
+    frame = f'def Xform "skew" {{\n{moved(SCALED, TURNED)}}}\n'
     robot = read(body("base", inside=frame, schemas=ROOT) + LINKS.partition("}\n")[2] + JOINTS)
     assert robot.link_names == ("base", "upper", "lower")
     assert codes(robot) == {"USD102": "/arm/base/skew"}
@@ -619,10 +621,7 @@ def test_a_sheared_frame_is_no_link(read: Read) -> None:
 # -- hostile files ---------------------------------------------------------------------------------------
 
 
-SHEARED = moved("float3", (1, 2, 1), "scale") + "\n" + ARM.replace(
-    moved("double3", "(0, 0, 1)"), 'double3 xformOp:translate = (0, 0, 1)\nfloat xformOp:rotateZ = 45\n'
-    'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateZ"]',
-)  # fmt: skip
+SHEARED = moved(SCALED) + ARM.replace(moved(UP), moved(UP, TURNED))
 BLOCKED = "float limit:rotY:physics:low = None\nfloat limit:rotY:physics:high = 90"
 
 UNREADABLE = "OpenUSD does not accept this file"
@@ -878,14 +877,10 @@ def as_usd(robot: urdfkin.Robot, mistake: str = "", where: str = "") -> str:
     The converter makes a mistake in one joint, `where`.
     """
     tree = robot.tree
-    placements = robot.placement(np.zeros(robot.nq), list(tree.links))
-    prims = [
-        body(transcoded(link), inside=f"double3 xformOp:translate = {_point(T)}\n"
-             f"quatd xformOp:orient = {_quaternion(T)}\n"
-             'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]',
-             schemas=ROOT * (link == tree.links[0]))
-        for link, T in zip(tree.links, placements, strict=True)
-    ]  # fmt: skip
+    placements, prims = robot.placement(np.zeros(robot.nq), list(tree.links)), list[str]()
+    for link, T in zip(tree.links, placements, strict=True):
+        placed = moved(("double3", "translate", _point(T)), ("quatd", "orient", _quaternion(T)))
+        prims.append(body(transcoded(link), "", placed, ROOT * (link == tree.links[0])))
     joints = (_joint_in_usd(tree, k, mistake * (one.name == where)) for k, one in enumerate(tree.joints))
     return stage("".join([*prims, 'def Scope "joints" {\n', *joints, "}\n"]))
 
@@ -1192,9 +1187,8 @@ def test_check_prints_the_position_of_a_finding_in_all_formats(write: Write) -> 
     path = write(stage(IN_RADIANS))
     done = command("check", str(path))
     assert done.code == 0
-    number, line = next(
-        (i, line) for i, line in enumerate(path.read_text().splitlines(), 1) if '"shoulder"' in line
-    )
+    lines = path.read_text().splitlines()
+    number, line = next((i, line) for i, line in enumerate(lines, 1) if '"shoulder"' in line)
     assert f"robot.usda:{number}:1: USD303 warning: prim '/arm/shoulder'" in done.text
     assert f"{number} | {line}" in done.text
     [found] = json.loads(command("check", "--format", "json", str(path)).text)["findings"]
@@ -1279,7 +1273,7 @@ def beside_a_far_link(error: float) -> tuple[str, str]:
     """Write a URDF whose elbow follows a link 1 km away, and a stage whose elbow does not."""
     mount = urdfs.joint("mount", "fixed", "b", "far", 'xyz="1000 0 0"')
     elbow = urdfs.joint("elbow", "continuous", "far", "tip", 'xyz="-999.7 0.1 0.2"')
-    links = body("base", schemas=ROOT) + body("b") + body("far") + body("tip")
+    links = BASE + body("b") + body("far") + body("tip")
     joints = turn("turn", "base", "b", (0, 0, 0.1)) + turn("elbow", "b", "tip", (0.3 + error, 0.1, 0.2))
     far = joint("mount", "Fixed", "b", "far", localPos0=(1000, 0, 0))
     return urdfs.robot(TURN, mount, elbow), links + joints + far
@@ -1294,22 +1288,20 @@ def after_a_far_joint(error: float) -> tuple[str, str]:
     )
     joints = turn("first", "base", "b", (1000, 0, 0), tuple(FAR_TURN.tolist()))
     joints += turn("second", "b", "tip", (0.3 + error, 0.1, 0.2))
-    return urdf, body("base", schemas=ROOT) + body("b") + body("tip") + joints
+    return urdf, BASE + body("b") + body("tip") + joints
 
 
 def unit_quaternion(noise: float) -> tuple[str, str]:
     """Write a URDF with a rotation by 1e-7 rad, and a stage with the identity instead."""
     urdf = urdfs.robot(urdfs.joint("turn", "continuous", "base", "tip", 'xyz="0 0 0.1" rpy="0 1e-7 0"'))
     joints = turn("turn", "base", "tip", (0, 0, 0.1), (1, 0, 0, noise))
-    return urdf, body("base", schemas=ROOT) + body("tip") + joints
+    return urdf, BASE + body("tip") + joints
 
 
 def far_tool(written: str) -> tuple[str, str]:
     """Write a URDF and a stage whose tool, 1 km away, is displaced by 20 micrometres."""
-    place = (
-        f'{written} xformOp:translate = (1000, 2e-5, 0)\nuniform token[] xformOpOrder = ["xformOp:translate"]'
-    )
-    links = body("base", schemas=ROOT) + body("b", inside=f'def Xform "tool" {{ {place}\n}}')
+    place = moved((written, "translate", (1000, 2e-5, 0)))
+    links = BASE + body("b", inside=f'def Xform "tool" {{ {place}}}')
     mount = urdfs.joint("mount", "fixed", "b", "tool", 'xyz="1000 0 0"')
     return urdfs.robot(TURN, mount), links + turn("turn", "base", "b", (0, 0, 0.1))
 
@@ -1359,7 +1351,7 @@ def free_base(kind: str, height: float) -> tuple[str, str]:
     shut = ("transZ", "rotX", "rotY") if kind == "planar" else ()
     free = joint("free", "", "", "base", locks(shut), limit_schemas(shut), localPos0=(0, 0, height))
     hinge = turn("j", "base", "tip", (0.1, 0.2, 0.3))
-    return urdf, stage(body("base", schemas=ROOT) + body("tip") + hinge + free)
+    return urdf, stage(BASE + body("tip") + hinge + free)
 
 
 @pytest.mark.parametrize(("kind", "height"), [("floating", 0.0), ("planar", 0.5)])
