@@ -61,8 +61,6 @@ TWO = """
   <actuator><motor joint="f"/><position tendon="t"/></actuator>
 </mujoco>
 """
-
-
 Write = Callable[..., Path]
 
 
