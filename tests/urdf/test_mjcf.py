@@ -473,9 +473,7 @@ def test_the_memory_that_a_file_reserves_for_dynamics_is_not_allocated() -> None
     assert "does not compile" not in robot.verifier.reading
 
 
-def test_if_a_process_dies_the_file_is_refused_or_read_without_shapes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_if_a_process_dies_a_file_is_refused_or_read_without_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
     right = ask_python
 
     def first_only(*arguments: Any) -> tuple[bytes, None]:
