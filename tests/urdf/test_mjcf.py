@@ -61,15 +61,18 @@ TWO = """
   <actuator><motor joint="f"/><position tendon="t"/></actuator>
 </mujoco>
 """
+Write = Callable[..., Path]
 
 
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def patch(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Read MJCF in this process, so that a test can replace functions."""
 
     def ask(request: Mapping[str, Any], patience: float) -> tuple[list[dict[str, Any]], str]:
         return json.loads(json.dumps(list(mjcf_process.answers(request)))), "ended"
 
     monkeypatch.setattr(mjcf_check, "_ask", ask)
+    return monkeypatch
 
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
@@ -80,16 +83,6 @@ def one_joint(joint: str) -> str:
         f'<mujoco><compiler angle="radian"/><worldbody><body name="b" pos="1 0 0">{MASS}{joint}'
         '<site name="s" pos="0 0 0.5"/></body></worldbody></mujoco>'
     )
-
-
-def test_the_motions_of_joints_of_one_body_are_applied_in_order() -> None:
-    robot = loaded(
-        one_joint('<joint name="x" type="slide" axis="1 0 0" range="-9 9"/><joint name="turn" axis="0 0 1"/>')
-    )
-    T = robot.placement([3.0, math.pi / 2], "link:s")
-    assert T[:3, 3] == pytest.approx([4.0, 0.0, 0.5])
-    assert T[:3, 0] == pytest.approx([0.0, 1.0, 0.0])
-    assert robot.coordinate_names == ("x", "turn")
 
 
 def test_the_limits_of_a_hinge_determine_its_kind() -> None:
@@ -149,9 +142,8 @@ def test_the_placements_of_any_tree_of_hinges_and_slides_are_those_of_mujoco(see
             assert robot.placement(q, f"link:{link}") == pytest.approx(theirs, abs=1e-12)
 
 
-def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(tmp_path: Path) -> None:
-    path = tmp_path / "two.xml"
-    path.write_text(TWO, "utf-8")
+def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(write: Write) -> None:
+    path = write(TWO, "two.xml")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         robot = urdfkin.load(path)
@@ -160,17 +152,6 @@ def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(tmp
     assert {w.filename for w in caught} == {__file__}
     assert (robot.nq, robot.nv) == (11, 10)
     assert {"world", "base", "imu", "tool"} <= set(robot.link_names)
-    sentences = " ".join(finding.sentence for finding in robot.findings)
-    for words in (
-        "equality 'curve': a constraint (g and f) that is not a linear relation of two joints",
-        "equality 'glue': a constraint (weld of tip and base) that a tree cannot represent",
-        "urdfkin ignores tendons",
-        "joint 'root': qpos0 places this body at (0, 0, 1)",
-        "joint 'out': a slide joint without limits",
-        "2 actuators, 1 tendons",
-        "1 geoms",
-    ):
-        assert words in sentences
     robot.placement(robot.sample(3), robot.link_frames)
     certificate = robot.certificate()
     assert certificate.verified
@@ -190,11 +171,8 @@ def test_a_file_with_many_features_is_verified_and_its_findings_are_warnings(tmp
     ],
     ids=["moved by nothing", "turned by nothing"],
 )
-def test_load_finds_an_error_of_the_reader(
-    broken: tuple[str, object], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    in_this_process(monkeypatch)
-    monkeypatch.setattr(mjcf, *broken)
+def test_load_finds_an_error_of_the_reader(broken: tuple[str, object], patch: pytest.MonkeyPatch) -> None:
+    patch.setattr(mjcf, *broken)
     with pytest.raises(OracleError, match="differs from the file"):
         loaded(TWO)
 
@@ -220,17 +198,15 @@ def test_the_search_for_the_root_element_takes_linear_time(root: str) -> None:
     assert time.process_time() - began < 1.0
 
 
-def test_a_file_with_the_root_element_mujoco_is_mjcf(tmp_path: Path) -> None:
+def test_a_file_with_the_root_element_mujoco_is_mjcf(write: Write) -> None:
     commented = f"<?xml version='1.0'?><!-- robot -->{TWO}"
     texts = {"a.xml": TWO, "b.xml": arm(), "c.mjcf": commented, "d.urdf": TWO}
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text, "utf-8")
-    assert [is_mjcf(tmp_path / name) for name in texts] == [True, False, True, False]
-    assert loaded(tmp_path / "b.xml").nq == 2
-    assert not is_mjcf(tmp_path / "nothing.xml")
-    words = "this is an MJCF file; `load` and all other commands read files"
-    with pytest.raises(urdfkin.UrdfError, match=words):
-        urdfkin.load(tmp_path / "d.urdf")
+    a, b, c, d = (write(text, name) for name, text in texts.items())
+    assert [is_mjcf(path) for path in (a, b, c, d)] == [True, False, True, False]
+    assert loaded(b).nq == 2
+    assert not is_mjcf(a.with_name("nothing.xml"))
+    with pytest.raises(urdfkin.UrdfError, match="this is an MJCF file; `load` and all other commands read"):
+        urdfkin.load(d)
 
 
 def test_mjcf_is_loaded_from_text_bytes_streams_and_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -246,9 +222,10 @@ def test_mjcf_is_loaded_from_text_bytes_streams_and_standard_input(monkeypatch: 
         loaded(b"<mujoco>\xff</mujoco>")
 
 
-def test_all_commands_accept_an_mjcf_file(tmp_path: Path) -> None:
-    path, report = tmp_path / "arm.xml", tmp_path / "report.json"
-    path.write_text(one_joint('<joint name="a" range="-1 2"/><joint name="b" axis="0 1 0" pos="1 1 1"/>'))
+def test_all_commands_accept_an_mjcf_file(write: Write) -> None:
+    text = one_joint('<joint name="a" range="-1 2"/><joint name="b" axis="0 1 0" pos="1 1 1"/>')
+    path = write(text, "arm.xml")
+    report = path.with_name("report.json")
     good("info", str(path))
     good("jacobian", str(path), "--q", "random")
     good("dh", str(path))
@@ -273,11 +250,9 @@ _ARM = '<body name="arm" pos="0 0 2">{}<geom size="0.3"/></body>'
 _BOX = '<geom type="box" size=".1 .2 .3" pos="0.5 0 0" euler="0 0 40"/>'
 
 
-def free_body(
-    compiler: str = "", joint: str = "", inside: str = _BOX, more: str = "", outside: str = ""
-) -> str:
+def free_body(compiler: str = "", joint: str = "", inside: str = _BOX, more: str = "") -> str:
     return (
-        f'<mujoco><compiler {compiler}/>{more}<worldbody>{outside}<body name="drone">'
+        f'<mujoco><compiler {compiler}/>{more}<worldbody><body name="drone">'
         f'<freejoint name="free" {joint}/>{inside}<site name="camera" pos="0.6 0 0"/></body>'
         "</worldbody></mujoco>"
     )
@@ -289,14 +264,12 @@ FUSED = _BOX + _ARM.format("")
 @pytest.mark.parametrize(
     "text",
     [
-        free_body(joint='align="true"'),
-        free_body('alignfree="true"'),
+        free_body(joint='align="true"'), free_body('alignfree="true"'),
         free_body('alignfree="true"', 'align="false"'),
         free_body(joint='align="true"', inside='<inertial pos="1 2 3" mass="1" diaginertia="1 2 3"/>'),
         free_body('alignfree="true" fusestatic="true"'),
         free_body('alignfree="true"', inside=_BOX + _ARM.format('<joint name="j"/>')),
-        free_body('alignfree="true"', inside=FUSED),
-        free_body('fusestatic="true"', inside=FUSED),
+        free_body('alignfree="true"', inside=FUSED), free_body('fusestatic="true"', inside=FUSED),
     ],
 )  # fmt: skip
 def test_a_free_body_that_mujoco_aligns_has_mujocos_placements_and_velocities(text: str) -> None:
@@ -321,7 +294,7 @@ def test_a_free_body_that_mujoco_aligns_has_mujocos_placements_and_velocities(te
 def test_a_body_that_cannot_be_aligned_is_reported_and_the_certificate_states_the_missing_check() -> None:
     mesh = '<asset><mesh name="m" file="nowhere.stl"/></asset>'
     text = free_body('alignfree="true"', inside='<geom type="mesh" mesh="m"/>', more=mesh)
-    words = r"MJCF101.*'drone': MuJoCo aligns the frame of this free body"
+    words = "MJCF101.*'drone': MuJoCo aligns the frame of this free body"
     with pytest.warns(urdfkin.UrdfWarning, match=words):
         robot = urdfkin.load(text)
     robot.placement(robot.neutral(), "camera")
@@ -399,10 +372,9 @@ def wrong_multiplier(right: Callable[..., Any]) -> Callable[..., Any]:
     ids=["an offset", "the multiplier of a mimic of a mimic"],
 )
 def test_the_residual_of_mujocos_equality_finds_an_error_of_a_mimic_rule(
-    where: Any, name: str, mistake: Any, monkeypatch: pytest.MonkeyPatch
+    where: Any, name: str, mistake: Any, patch: pytest.MonkeyPatch
 ) -> None:
-    in_this_process(monkeypatch)
-    monkeypatch.setattr(where, name, mistake(getattr(where, name)))
+    patch.setattr(where, name, mistake(getattr(where, name)))
     with pytest.raises(OracleError, match=r"mimic joint [bc]: .* from the file: found MuJoCo \S+ differs by"):
         loaded(coupled(*_CHAIN))
 
@@ -415,7 +387,7 @@ def test_the_residual_of_mujocos_equality_finds_an_error_of_a_mimic_rule(
     ],
 )
 def test_an_additional_mimic_rule_and_a_missing_mimic_rule_are_found(
-    active: str, said: str, monkeypatch: pytest.MonkeyPatch
+    active: str, said: str, patch: pytest.MonkeyPatch
 ) -> None:
     # The model is that of one file, and the rules are those of another file.
     rule = '<joint name="x" joint1="b" joint2="a" polycoef="0 1 0 0 0" active="{}"/>'
@@ -424,8 +396,7 @@ def test_an_additional_mimic_rule_and_a_missing_mimic_rule_are_found(
     def mixed(source: str, name: str, *, whole: bool = False) -> Mjcf:
         return replace(other, model=mjcf.read_mjcf(source, name, whole=whole).model)
 
-    in_this_process(monkeypatch)
-    monkeypatch.setattr(mjcf_process, "read_mjcf", mixed)
+    patch.setattr(mjcf_process, "read_mjcf", mixed)
     with pytest.raises(OracleError, match=said):
         loaded(coupled(rule.format(active)))
 
@@ -455,7 +426,7 @@ def test_lengths_of_a_million_metres_that_cancel_in_the_tree_are_no_disagreement
 @pytest.mark.parametrize("ref", [0.0, 1e3])
 @pytest.mark.parametrize("number", [(0, 1), (1, 3)], ids=["turned", "moved"])
 def test_an_error_of_the_reader_slightly_above_the_rounding_bound_is_found(
-    number: tuple[int, int], ref: float, monkeypatch: pytest.MonkeyPatch
+    number: tuple[int, int], ref: float, patch: pytest.MonkeyPatch
 ) -> None:
     right = Mjcf.placements
 
@@ -465,10 +436,9 @@ def test_an_error_of_the_reader_slightly_above_the_rounding_bound_is_found(
         T[:, list(self.frames).index("s"), *number] += 3e-12 if ref else 1e-12
         return T
 
-    in_this_process(monkeypatch)
     text = one_joint(f'<joint name="j" axis="0 0 1" ref="{ref!r}"/>')
     loaded(text)
-    monkeypatch.setattr(Mjcf, "placements", moved)
+    patch.setattr(Mjcf, "placements", moved)
     with pytest.raises(OracleError, match="times the bound of rounding"):
         loaded(text)
 
@@ -503,9 +473,7 @@ def test_the_memory_that_a_file_reserves_for_dynamics_is_not_allocated() -> None
     assert "does not compile" not in robot.verifier.reading
 
 
-def test_a_process_that_dies_is_an_error_or_the_file_is_read_without_shapes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_if_a_process_dies_a_file_is_refused_or_read_without_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
     right = ask_python
 
     def first_only(*arguments: Any) -> tuple[bytes, None]:
@@ -529,9 +497,8 @@ def test_a_name_that_is_not_utf_8_is_an_error_that_says_so(tmp_path: Path) -> No
             loaded(path)
 
 
-def test_the_digest_of_a_robot_is_the_digest_of_its_file(tmp_path: Path) -> None:
-    path = tmp_path / "two.xml"
-    path.write_text(TWO, "utf-8")
+def test_the_digest_of_a_robot_is_the_digest_of_its_file(write: Write) -> None:
+    path = write(TWO, "two.xml")
     robot = loaded(path)
     digest = sha256(path.read_bytes()).hexdigest()
     assert (robot.sha256, robot.source) == (digest, str(path))
@@ -559,9 +526,8 @@ PLACES = """<mujoco>
 """
 
 
-def test_a_finding_has_the_name_and_the_position_of_its_element(tmp_path: Path) -> None:
-    path = tmp_path / "places.xml"
-    path.write_text(PLACES)
+def test_a_finding_has_the_name_and_the_position_of_its_element(write: Write) -> None:
+    path = write(PLACES, "places.xml")
     done = command("check", "--format", "json", str(path))
     found = {(one["element"], one["name"]): one for one in done.data["findings"]}
     lines = PLACES.splitlines()
@@ -582,10 +548,9 @@ def test_a_finding_has_the_name_and_the_position_of_its_element(tmp_path: Path) 
     assert [{"name": "glue", "kind": "equality"}] in names
 
 
-def test_an_element_of_an_included_file_has_no_line(tmp_path: Path) -> None:
-    (tmp_path / "part.xml").write_text('<mujoco><equality><weld body1="b" body2="two"/></equality></mujoco>')
-    path = tmp_path / "top.xml"
-    path.write_text(PLACES.replace("  <sensor>", '  <include file="part.xml"/><sensor>'))
+def test_an_element_of_an_included_file_has_no_line(write: Write) -> None:
+    write('<mujoco><equality><weld body1="b" body2="two"/></equality></mujoco>', "part.xml")
+    path = write(PLACES.replace("  <sensor>", '  <include file="part.xml"/><sensor>'), "top.xml")
     done = command("check", "--format", "json", str(path))
     lines = {one["name"]: one["line"] for one in done.data["findings"] if one["element"] == "equality"}
     assert lines == {"0": 1, "2": 1, "glue": 14}  # the index of an equality depends on the included file

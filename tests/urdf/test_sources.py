@@ -1,22 +1,38 @@
-"""A robot is read from any source only up to a limit, and only once."""
+"""A robot is loaded from any text, file, stream or object of another library, or the error has a reason."""
 
 from __future__ import annotations
 
+import importlib
 import io
+import math
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
+from typing import Any
+from xml.etree import ElementTree
 from xml.parsers import expat
 
+import numpy as np
+import pinocchio as pin
 import pytest
+import yourdfpy
+from lxml import etree
 
 import urdfkin
+from tests.cli.running import python
 from tests.urdf.lint.cases.arm import arm, axis
-from urdfkin.errors import SourceError
+from tests.urdfs import joint, limit, loaded
+from tests.urdfs import robot as urdf
+from urdfkin import InputError, SourceError, UnknownNameError, UrdfError
+from urdfkin.errors import OracleError
 from urdfkin.system.files import MOST, read_standard_input
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.sources import Source, read_source
+from urdfkin.verify import model_check
 
+Write = Callable[..., Path]
 MOST_HERE = 1000
 
 
@@ -39,15 +55,11 @@ def test_standard_input_is_read_completely_without_a_limit(monkeypatch: pytest.M
     assert read_standard_input() == b"0.1,0.2\n0.3,0.4\n"
 
 
-def test_a_package_address_is_the_file_in_the_package_or_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    package = tmp_path / "arm_description"
-    (package / "urdf").mkdir(parents=True)
-    (package / "urdf" / "arm.urdf").write_text("<robot/>")
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+def test_a_package_address_is_a_file_or_an_error(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write("<robot/>", "arm_description/urdf/arm.urdf")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(path.parents[2]))
     read = read_source("package://arm_description/urdf/arm.urdf")
-    assert (read.data, read.source) == (b"<robot/>", str(package / "urdf" / "arm.urdf"))
+    assert (read.data, read.source) == (b"<robot/>", str(path))
     with pytest.raises(SourceError, match=r"^package://nowhere/arm.urdf: the package 'nowhere' is"):
         read_source("package://nowhere/arm.urdf")
 
@@ -56,32 +68,324 @@ def test_no_name_of_the_catalogue_contains_a_dot_or_a_separator() -> None:
     assert not [name for name in catalogue() if set(name) & {".", "/", os.sep}]
 
 
-# -- parsers -------------------------------------------------------------------------------------------------
+# -- parsers -----------------------------------------------------------------------------------------------
 
 FOLLOWS = arm(follow='<mimic joint="j1" multiplier="-0.5"/>')
 
 
-@pytest.fixture
-def parsers(monkeypatch: pytest.MonkeyPatch) -> list[expat.XMLParserType]:
-    """List of all XML parsers that the test creates."""
-    made: list[expat.XMLParserType] = []
+@pytest.mark.parametrize("text", [arm(), FOLLOWS, axis("1e-13 0 1")], ids=["plain", "follows", "tilted"])
+def test_load_parses_the_text_once_and_the_oracle_parses_mimic_rules_again(
+    text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parsers = list[expat.XMLParserType]()
     create = expat.ParserCreate
 
     def noted(encoding: str) -> expat.XMLParserType:
-        made.append(create(encoding))
-        return made[-1]
+        parsers.append(create(encoding))
+        return parsers[-1]
 
     monkeypatch.setattr(expat, "ParserCreate", noted)
-    return made
-
-
-@pytest.mark.parametrize("text", [arm(), FOLLOWS, axis("1e-13 0 1")], ids=["plain", "follows", "tilted"])
-def test_load_parses_the_text_once_and_the_oracle_parses_mimic_rules_again(
-    text: str, parsers: list[expat.XMLParserType]
-) -> None:
     robot = urdfkin.load(text)
     assert len(parsers) == 1
     if text == FOLLOWS:
         robot.placement([0.3], "tool")
         assert robot.certificate().verified
         assert len(parsers) == 2
+
+
+# -- other libraries ---------------------------------------------------------------------------------------
+
+ROBOTS = ("panda", "talos", "ur5", "polar", "kinova")
+
+
+def file(name: str) -> str:
+    return str(catalogue()[name].path)
+
+
+def yourdfpys(path: str) -> yourdfpy.URDF:
+    return yourdfpy.URDF.load(path, build_scene_graph=False, load_meshes=False)
+
+
+HOLDERS: dict[str, Callable[[str], Any]] = {
+    "yourdfpy": yourdfpys,
+    "yourdfpy's robot": lambda path: yourdfpys(path).robot,
+    "ElementTree": ElementTree.parse,
+    "an element": lambda path: ElementTree.parse(path).getroot(),
+    "lxml": etree.parse,
+    "lxml's element": lambda path: etree.parse(path).getroot(),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("holder", HOLDERS)
+def test_an_object_of_another_library_is_the_robot_of_its_file(holder: str, name: str) -> None:
+    one, other = loaded(file(name)), loaded(HOLDERS[holder](file(name)))
+    assert other.coordinate_names == one.coordinate_names
+    q, frames = one.sample(3, seed=1), one.link_frames
+    np.testing.assert_allclose(other.placement(q, frames), one.placement(q, frames), atol=3e-14)
+    joints = [[(x.name, x.kind, x.mimic, x.limit) for x in robot.tree.joints] for robot in (one, other)]
+    assert joints[0] == joints[1]
+    assert other.certificate().verified
+
+
+def test_comments_and_instructions_of_an_element_tree_are_ignored_and_findings_are_reported() -> None:
+    text = '<?x y?><robot name="r"><!-- arm --><link name="a"/><link name="b"/></robot>'
+    for tree in (etree.fromstring(text), ElementTree.fromstring(text)):
+        with pytest.raises(UrdfError, match=r"<ElementTree>.*URDF411"):
+            urdfkin.load(tree)
+
+
+@pytest.mark.parametrize("value", [1.5, "a\0b"])
+def test_an_element_tree_that_is_no_xml_is_an_error_of_urdfkin(value: Any) -> None:
+    with pytest.raises(urdfkin.UrdfkinError):
+        urdfkin.load(ElementTree.Element("robot", {"name": value}))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("type", "ball"), ("name", None), ("axis", np.ones(2)), ("limit", None), ("origin", 1)],
+)
+def test_a_yourdfpy_robot_that_is_no_urdf_is_an_error_of_urdfkin(name: str, value: Any) -> None:
+    robot = yourdfpys(file("polar"))
+    setattr(robot.robot.joints[0], name, value)
+    with pytest.raises(urdfkin.UrdfkinError):
+        urdfkin.load(robot)
+
+
+@pytest.mark.parametrize(
+    ("joints", "words"),
+    [(0, "1 links agree"), (2, "3 links agree"), (320, "not compared with the model itself: nv is 320")],
+)
+def test_a_model_without_bodies_is_compared_by_its_joints_if_memory_allows(joints: int, words: str) -> None:
+    model = pin.Model()
+    for k in range(joints):
+        model.addJoint(k, pin.JointModelRX(), pin.SE3.Random(), f"turn_{k}")
+    made = loaded(model)
+    assert made.link_names == ("universe", *(f"turn_{k}_link" for k in range(joints)))
+    assert words in made.verifier.reading
+
+
+def test_an_axis_of_a_yourdfpy_robot_that_is_no_unit_vector_is_a_warning() -> None:
+    robot = yourdfpys(file("polar"))
+    slide = next(joint for joint in robot.robot.joints if joint.type == "prismatic")
+    slide.axis = 2.0 * np.asarray(slide.axis)
+    with pytest.warns(urdfkin.UrdfWarning, match="URDF50"):
+        urdfkin.load(robot)
+
+
+def test_a_finding_and_the_certificate_name_a_quaternion_that_yourdfpy_may_have_ignored(write: Write) -> None:
+    texts = {}
+    for rotation in ('quat_xyzw="0 0 1 0"', 'rpy="0 0 1"', 'xyz="1 2 3"'):
+        path = write(urdf(joint("j", "continuous", "a", "b", rotation), attributes='version="1.1"'), "r.urdf")
+        robot = urdfkin.load(yourdfpys(str(path)))
+        robot.placement([0.0], "b")
+        texts[rotation] = [str(f) for f in robot.findings], robot.certificate().reading
+    assert texts['rpy="0 0 1"'] == ([], "")
+    assert texts['xyz="1 2 3"'] == texts['quat_xyzw="0 0 1 0"']
+    (finding,), reading = texts['quat_xyzw="0 0 1 0"']
+    assert "<yourdfpy>:1:1: URDF512 note: yourdfpy ignores quat_xyzw, so the rotation of joint j " in finding
+    assert "drops quat_xyzw; the file was not read" in reading
+
+
+def test_a_yourdfpy_robot_that_is_not_connected_is_refused() -> None:
+    robot = yourdfpys(file("polar"))
+    robot.robot.joints.pop()
+    with pytest.raises(InputError, match="a robot must have one root link"):
+        urdfkin.load(robot)
+
+
+# -- Pinocchio's models --------------------------------------------------------------------------------
+
+
+def placement(model: Any, q: Any, frame: int) -> Any:
+    """Return the placement of a frame by Pinocchio."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[frame].homogeneous
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*ROBOTS, "tiago_dual", "anymal"])
+def test_a_pinocchio_model_is_the_robot_of_its_urdf(name: str) -> None:
+    robot = loaded(file(name), mimic=False)
+    made = loaded(pin.buildModelFromUrdf(file(name)))
+    assert made.frame_names == robot.frame_names
+    assert made.tree.links == robot.tree.links
+    assert [joint.parent for joint in made.tree.joints] == [joint.parent for joint in robot.tree.joints]
+    for ours, theirs in zip(robot.tree.joints, made.tree.joints, strict=True):
+        np.testing.assert_allclose(theirs.T_parent_joint, ours.T_parent_joint, atol=1e-15)
+        assert (theirs.kind, theirs.limit) == (ours.kind, ours.limit)
+    q, v, a = robot.sample(3, seed=2), *np.random.default_rng(1).standard_normal((2, 3, robot.nv))
+    found = made.acceleration(q, v, a, made.tip_frame)
+    np.testing.assert_allclose(found, robot.acceleration(q, v, a, made.tip_frame), rtol=1e-10, atol=1e-10)
+    assert "compared with the model itself" in str(made.certificate())
+
+
+def test_a_pinocchio_model_may_have_joints_and_frames_in_any_order() -> None:
+    model = pin.Model()
+    model.name = "by hand"
+    generator = np.random.default_rng(3)
+    pin.seed(3)
+    axes = generator.standard_normal((2, 3))
+    tilted, along = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    last = model.addJoint(0, pin.JointModelPlanar(), pin.SE3.Random(), "z")
+    model.addJoint(last, pin.JointModelRevoluteUnaligned(*tilted), pin.SE3.Random(), "b")
+    last = model.addJoint(last, pin.JointModelRUBY(), pin.SE3.Random(), "a")
+    model.addJoint(last, pin.JointModelPrismaticUnaligned(*along), pin.SE3.Random(), "slide")
+    model.addFrame(pin.Frame("tool", last, 0, pin.SE3.Random(), pin.FrameType.OP_FRAME))
+    model.addFrame(pin.Frame("tool", last, model.nframes - 1, pin.SE3.Random(), pin.FrameType.SENSOR))
+    made = loaded(model)
+    assert made.joint_names == ("z", "a", "slide", "b")  # Pinocchio's order for a URDF
+    q = made.sample(1, seed=4)[0]
+    full = np.zeros(model.nq)
+    value = dict(zip(made.coordinate_names, q, strict=True))
+    for j in range(1, model.njoints):
+        joint, name = model.joints[j], model.names[j]
+        own = [value[f"z.{x}"] for x in ("x", "y")] if name == "z" else [] if joint.nq == 2 else [value[name]]
+        angle = value["z.angle"] if name == "z" else value.get(name, 0.0)
+        own += [math.cos(angle), math.sin(angle)] if joint.nq > 1 else []
+        full[joint.idx_q : joint.idx_q + joint.nq] = own
+    for frame, link in ((model.nframes - 2, "tool"), (model.nframes - 1, "tool_")):
+        np.testing.assert_allclose(made.placement(q, link), placement(model, full, frame), atol=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic"])
+def test_a_joint_of_a_pinocchio_model_may_have_any_axis(kind: str) -> None:
+    tilted = joint("j", kind, "b", "c", 'xyz="1 2 3"', "0 0.6 -0.8", limit())
+    text = urdf(joint("i", "continuous", "a", "b", axis="1 0 0"), tilted)
+    robot, made = loaded(text), loaded(pin.buildModelFromXML(text))
+    assert made.tree.joints[1].kind == robot.tree.joints[1].kind
+    assert made.tree.joints[1].axis.tolist() == [0.0, 0.6, -0.8]
+    q = [0.5, 0.3]
+    np.testing.assert_allclose(made.placement(q, "c"), robot.placement(q, "c"), atol=1e-15)
+    assert made.certificate().verified
+
+
+def test_a_floating_base_of_a_pinocchio_model_is_a_floating_joint() -> None:
+    model = pin.buildModelFromUrdf(file("a1"), pin.JointModelFreeFlyer())
+    made = loaded(pin.RobotWrapper(model))
+    assert (made.nq, made.nv) == (model.nq, model.nv)
+    assert made.coordinate_names == loaded(file("a1"), root_joint="floating").coordinate_names
+
+
+def test_joints_of_a_pinocchio_model_without_an_equivalent_are_refused() -> None:
+    for kind in (pin.JointModelSpherical, pin.JointModelTranslation):
+        model = pin.Model()
+        model.addJoint(0, kind(), pin.SE3.Identity(), "wrist")
+        with pytest.raises(InputError, match="joint wrist: URDF has no equivalent of this joint"):
+            urdfkin.load(model)
+    with pytest.raises(InputError, match=r"mimic joint.*build the model with mimic=False"):
+        urdfkin.load(pin.buildModelFromUrdf(file("panda"), mimic=True))
+
+
+@pytest.mark.parametrize("number", [(0, 1), (0, 3)], ids=["turned", "moved"])
+def test_an_error_of_the_conversion_slightly_above_the_rounding_bound_is_found(
+    number: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right = model_check._placements
+
+    def moved(*arguments: Any) -> Any:
+        T = right(*arguments)
+        assert np.linalg.norm(T[0, -1, :3, 3]) > 0.1  # at the root, the bound is zero
+        T[:, -1, *number] += 3e-13
+        return T
+
+    monkeypatch.setattr(model_check, "_placements", moved)
+    with pytest.raises(OracleError, match=r"made from a pinocchio.Model differs from the model"):
+        urdfkin.load(pin.buildModelFromUrdf(file("ur5")))
+
+
+@pytest.mark.parametrize(
+    ("name", "root_joint"), [("ur5", None), ("kinova", None), ("a1", "floating"), ("a1", "planar")]
+)
+def test_pinocchio_model_returns_a_new_model_of_the_robot(name: str, root_joint: str | None) -> None:
+    robot = loaded(file(name), root_joint=root_joint)
+    model, again = robot.pinocchio_model(), robot.pinocchio_model()
+    assert model is not again
+    q, tip = robot.sample(1, seed=5)[0], robot.tip_frame
+    T = placement(model, robot.to_pinocchio(q), model.getFrameId(tip))
+    np.testing.assert_allclose(T, robot.placement(q, tip), atol=1e-13)
+
+
+def test_pinocchio_model_has_mimic_joints_on_request() -> None:
+    robot = urdfkin.load("panda")
+    model = robot.pinocchio_model(mimic=True)
+    assert model.nq == robot.nq == robot.pinocchio_model().nq - 1
+    q = robot.sample(1)[0]
+    T = placement(model, robot.to_pinocchio(q, mimic=True), model.getFrameId("panda_rightfinger"))
+    np.testing.assert_allclose(T, robot.placement(q, "panda_rightfinger"), atol=1e-14)
+
+
+def test_a_robot_that_pinocchio_refuses_has_no_model() -> None:
+    with pytest.warns(urdfkin.UrdfWarning):
+        robot = urdfkin.load('<robot name="r"><?x y?><link name="a"/></robot>')
+    with pytest.raises(OracleError, match="Pinocchio refuses the file"):
+        robot.pinocchio_model()
+
+
+# -- robot_descriptions --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def package(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Create a package robot_descriptions with a robot, and with descriptions that cannot be loaded."""
+    names = ["toy_description", "far_description", "empty_description"]
+    texts = {
+        "toy_description": f"URDF_PATH = {file('polar')!r}",
+        "far_description": "raise RuntimeError('clone failed\\nfatal: no route to host')",
+        "empty_description": "",
+        "other_description": "raise AssertionError('imported')",
+        "__init__": f"DESCRIPTIONS = dict.fromkeys({names!r})",
+    }
+    path, *_ = (write(text, f"robot_descriptions/{name}.py") for name, text in texts.items())
+    monkeypatch.syspath_prepend(path.parents[1])
+    for name in [name for name in sys.modules if name.startswith("robot_descriptions")]:
+        monkeypatch.delitem(sys.modules, name)
+
+
+@pytest.mark.usefixtures("package")
+def test_a_description_is_loaded_by_its_name_and_by_its_module() -> None:
+    assert urdfkin.load("toy_description").name == "polar"
+    assert urdfkin.load(importlib.import_module("robot_descriptions.toy_description")).name == "polar"
+    for name in ("toy_description", "far_description", "empty_description"):
+        sys.modules.pop(f"robot_descriptions.{name}", None)
+    sys.modules.pop("robot_descriptions")
+
+
+@pytest.mark.usefixtures("package")
+def test_an_invalid_description_is_an_error_and_no_unlisted_module_is_imported() -> None:
+    for name, error, words in (
+        ("toys", UnknownNameError, "unknown robot description 'toys_description'; did you mean toy_desc"),
+        ("other", UnknownNameError, "unknown"),  # a module that is not in DESCRIPTIONS
+        ("far", SourceError, r"cannot be downloaded: found fatal: no route to host; .*the network"),
+        ("empty", InputError, "neither URDF_PATH nor XACRO_PATH nor MJCF_PATH"),
+    ):
+        with pytest.raises(error, match=words):
+            urdfkin.load(f"{name}_description")
+    sys.modules.pop("robot_descriptions")
+
+
+@pytest.mark.slow
+def test_a_description_module_with_a_xacro_file_has_default_arguments(write: Write) -> None:
+    inside = '<xacro:arg name="tool" default="none"/><link name="base_$(arg tool)"/>'
+    text = f'<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">{inside}</robot>'
+    module = ModuleType("arm_description")
+    module.__dict__.update(XACRO_PATH=str(write(text, "arm.xacro")), XACRO_ARGS={"tool": "gripper"})
+    assert urdfkin.load(module).link_names == ("base_gripper",)
+    assert urdfkin.load(module, xacro_args={"tool": "saw"}).link_names == ("base_saw",)
+
+
+@pytest.mark.slow
+def test_without_robot_descriptions_the_error_names_the_package_to_install() -> None:
+    done = python(
+        "import sys\nsys.modules['robot_descriptions'] = None\nimport importlib.util as u\n"
+        "find = u.find_spec\nu.find_spec = lambda name: None if name.startswith('robot_d') else find(name)\n"
+        "import urdfkin\ntry: urdfkin.load('panda_description')\nexcept urdfkin.InputError as e: print(e)"
+    )
+    assert done.stdout.startswith("panda_description: robot_descriptions is not installed; pip install")
+
+
+def test_a_file_named_like_a_description_is_loaded(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(write(urdfkin.load("polar", verify=False).urdf, "my_description").parent)
+    assert urdfkin.load("my_description").name == "polar"

@@ -7,7 +7,6 @@ import os
 import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from tests.cli.running import urdfkin as command
 from tests.reading import present
 from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
-from urdfkin.comparison.result import SameQuestion
+from urdfkin.comparison.result import Sameness, SameQuestion
 from urdfkin.errors import InputError, OracleError, SourceError
 from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
 from urdfkin.kinematics.roundings import SINGLE
@@ -40,15 +39,18 @@ pytestmark = pytest.mark.slow
 HEAD = '#usda 1.0\n(\n    defaultPrim = "arm"\n    metersPerUnit = {unit}\n    upAxis = "{up}"\n)\n'
 
 
-def moved(op: str, value: object, name: str = "translate") -> str:
-    """Write the transform of a prim with one operation: `double3 xformOp:translate = (0, 0, 1)`."""
-    return f'{op} xformOp:{name} = {value}\nuniform token[] xformOpOrder = ["xformOp:{name}"]'
+def moved(*operations: tuple[str, str, object]) -> str:
+    """Write the transform of a prim, with operations such as ("double3", "translate", (0, 0, 1))."""
+    words = [f"{kind} xformOp:{name} = {value}\n" for kind, name, value in operations]
+    order = ", ".join(f'"xformOp:{name}"' for _, name, _ in operations)
+    return "".join([*words, f"uniform token[] xformOpOrder = [{order}]\n"])
 
 
 def body(name: str, place: str = "", inside: str = "", schemas: str = "") -> str:
     """Write a rigid body at `place`, (x, y, z) in the unit of the stage."""
     head = f'def Xform "{name}" (prepend apiSchemas = ["PhysicsRigidBodyAPI"{schemas}])'
-    return f"{head} {{\n{moved('double3', place) if place else ''}\n{inside}\n}}\n"
+    placed = moved(("double3", "translate", place)) if place else ""
+    return f"{head} {{\n{placed}{inside}\n}}\n"
 
 
 def joint(
@@ -66,12 +68,15 @@ def joint(
 
 _TYPES = {"localPos": "point3f", "localRot": "quatf"}
 ROOT = ', "PhysicsArticulationRootAPI"'
+BASE = body("base", schemas=ROOT)
+#: The transform of the link `upper`.
+UP = ("double3", "translate", "(0, 0, 1)")
 #: An arm of two links: a revolute joint about z at (0, 0, 1), then a prismatic joint along y at (2, 0, 0).
-LINKS = body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + body("lower", "(2, 0, 1)")
+LINKS = BASE + body("upper", "(0, 0, 1)") + body("lower", "(2, 0, 1)")
 SHOULDER = joint("shoulder", "Revolute", "base", "upper", axis="Z", limits=(-90, 180), localPos0=(0, 0, 1))
-JOINTS = SHOULDER + joint(
-    "rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, 3), localPos0=(2, 0, 0)
-)
+RAIL = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, 3), localPos0=(2, 0, 0))
+JOINTS = SHOULDER + RAIL
+ARM = LINKS + JOINTS
 
 
 def stage(content: str, unit: float = 1.0, up: str = "Z") -> str:
@@ -83,28 +88,25 @@ Read = Callable[..., urdfkin.Robot]
 
 
 @pytest.fixture
-def write(tmp_path: Path) -> Write:
-    def of(text: str, name: str = "robot.usda") -> Path:
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-        return path
-
-    return of
-
-
-@pytest.fixture
 def read(write: Write) -> Read:
     """Load the robot of a stage whose prim /arm has this content."""
     return lambda content, **options: loaded(write(stage(content, **options)))
+
+
+@pytest.fixture
+def converted(write: Write) -> Read:
+    """Load the stage of a robot, in which one joint has a mistake."""
+    return lambda robot, *mistake, **options: loaded(write(as_usd(robot, *mistake)), **options)
 
 
 def codes(robot: urdfkin.Robot) -> dict[str, str | None]:
     return {finding.code: finding.name for finding in robot.findings if finding.code.startswith("USD")}
 
 
-def findings(robot: urdfkin.Robot) -> list[tuple[str, str | None, str]]:
-    return [(one.code, one.name, one.message) for one in robot.findings if one.code.startswith("USD")]
+def findings(robot: urdfkin.Robot) -> list[str]:
+    """Return the findings about a stage: `USD304 /arm/upper: the message`."""
+    found = [one for one in robot.findings if one.code.startswith("USD")]
+    return [f"{' '.join(filter(None, (one.code, one.name)))}: {one.message}" for one in found]
 
 
 def reach(robot: urdfkin.Robot) -> float:
@@ -113,7 +115,7 @@ def reach(robot: urdfkin.Robot) -> float:
 
 
 def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks(read: Read) -> None:
-    robot = read(LINKS + JOINTS)
+    robot = read(ARM)
     assert (robot.name, robot.link_names) == ("arm", ("base", "upper", "lower"))
     T = robot.placement([math.pi / 2, 0.5], "lower")
     assert T[:3, 3] == pytest.approx([-0.5, 2.0, 1.0])
@@ -132,13 +134,13 @@ def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks
 
 @pytest.mark.parametrize("unit", [0.01, 0.0254])
 def test_lengths_are_in_the_unit_of_the_stage(read: Read, unit: float) -> None:
-    robot = read(LINKS + JOINTS, unit=unit)
+    robot = read(ARM, unit=unit)
     assert reach(robot) == pytest.approx(2.0 * unit)
     assert present(robot.tree.joints[1].limit).upper == pytest.approx(3.0 * unit)
 
 
 def test_a_stage_with_y_up_is_turned_so_that_z_is_up(read: Read) -> None:
-    robot = read(LINKS + JOINTS + joint("mount", "Fixed", "", "base"), up="Y")
+    robot = read(ARM + joint("mount", "Fixed", "", "base"), up="Y")
     # The link `upper` is at z = 1 in the stage, which is y = -1 in a world with z up.
     assert robot.placement([0.0, 0.0], "upper")[:3, 3] == pytest.approx([0.0, -1.0, 0.0])
     assert robot.link_names[0] == "world"
@@ -150,7 +152,7 @@ def test_the_joint_frames_in_both_bodies_determine_the_joint(read: Read) -> None
         "j", "Revolute", "base", "tip", axis="X",
         localPos0=(1, 0, 0), localRot0=turn, localPos1=(0, 3, 0), localRot1=turn,
     )  # fmt: skip
-    robot = read(body("base", schemas=ROOT) + body("tip", "(1, -3, 0)") + offset)
+    robot = read(BASE + body("tip", "(1, -3, 0)") + offset)
     assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([1.0, -3.0, 0.0])
     # The axis is parallel to the y axis of the base, through (1, 0, 0).
     turned = robot.placement([math.pi / 2], "tip")
@@ -161,7 +163,7 @@ def test_the_joint_frames_in_both_bodies_determine_the_joint(read: Read) -> None
 
 def test_a_joint_from_the_child_to_the_parent_has_the_opposite_axis(read: Read) -> None:
     reverse = joint("j", "Revolute", "tip", "base", axis="Z", localPos1=(1, 0, 0))
-    robot = read(body("base", schemas=ROOT) + body("tip", "(1, 0, 0)") + reverse)
+    robot = read(BASE + body("tip", "(1, 0, 0)") + reverse)
     assert robot.link_names[0] == "base"
     assert robot.tree.joints[0].kind.value == "continuous"
     T = robot.placement([math.pi / 2], "tip")
@@ -170,7 +172,7 @@ def test_a_joint_from_the_child_to_the_parent_has_the_opposite_axis(read: Read) 
 
 
 def test_nested_bodies_and_scaled_bodies_have_rigid_frames(read: Read) -> None:
-    scaled = moved("float3", (2, 2, 2), "scale") + "\n" + body("tip", "(1, 0, 0)")
+    scaled = moved(("float3", "scale", (2, 2, 2))) + body("tip", "(1, 0, 0)")
     own = joint("j", "Revolute", "base", "base/tip", axis="Z", localPos0=(1, 0, 0))
     robot = read(body("base", inside=scaled, schemas=ROOT) + own)
     assert robot.placement([0.0], "tip")[:3, 3] == pytest.approx([2.0, 0.0, 0.0])
@@ -178,20 +180,28 @@ def test_nested_bodies_and_scaled_bodies_have_rigid_frames(read: Read) -> None:
 
 
 def test_a_joint_to_a_prim_below_a_body_moves_the_body(read: Read) -> None:
-    flange = f'def Xform "flange" {{\n{moved("double3", (0, 0, 2))}\n}}'
+    flange = f'def Xform "flange" {{\n{moved(("double3", "translate", (0, 0, 2)))}}}'
     own = joint("j", "Revolute", "base/flange", "tip", axis="Z")
     robot = read(body("base", inside=flange, schemas=ROOT) + body("tip", "(0, 0, 2)") + own)
     for name in ("tip", "flange"):
         assert robot.placement([0.0], name)[:3, 3] == pytest.approx([0.0, 0.0, 2.0])
 
 
-def d6(free: Sequence[str], more: str = "", applied: Sequence[str] = ()) -> str:
+def locks(directions: Sequence[str]) -> str:
+    """Write limits that lock these directions of a D6 joint."""
+    low, high = "float limit:{0}:physics:low = 1\n", "float limit:{0}:physics:high = -1\n"
+    return "".join((low + high).format(name) for name in directions)
+
+
+def limit_schemas(directions: Sequence[str]) -> str:
+    return ", ".join(f'"PhysicsLimitAPI:{name}"' for name in directions)
+
+
+def d6(free: str, more: str = "", applied: Sequence[str] = ()) -> str:
     """Write two bodies and a joint with these degrees of freedom between them."""
-    shut = [name for name in ALL if name not in free]
-    words = [f"float limit:{name}:physics:low = 1\nfloat limit:{name}:physics:high = -1\n" for name in shut]
-    schemas = ", ".join(f'"PhysicsLimitAPI:{name}"' for name in applied or shut)
-    own = joint("j", "", "base", "tip", "".join(words) + more, schemas)
-    return body("base", schemas=ROOT) + body("tip") + own
+    shut = [name for name in ALL if name not in free.split()]
+    own = joint("j", "", "base", "tip", locks(shut) + more, limit_schemas(applied or shut))
+    return BASE + body("tip") + own
 
 
 ALL = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
@@ -199,26 +209,19 @@ ALL = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
 
 @pytest.mark.parametrize(
     ("free", "kind"),
-    [
-        ((), "fixed"),
-        (("rotY",), "continuous"),
-        (("transZ",), "prismatic"),
-        (("transX", "transY", "rotZ"), "planar"),
-    ],
+    [("", "fixed"), ("rotY", "continuous"), ("transZ", "prismatic"), ("transX transY rotZ", "planar")],
 )
-def test_the_free_directions_of_a_d6_joint_determine_its_kind(
-    read: Read, free: tuple[str, ...], kind: str
-) -> None:
+def test_the_free_directions_of_a_d6_joint_determine_its_kind(read: Read, free: str, kind: str) -> None:
     robot = read(d6(free))
     assert robot.tree.joints[0].kind.value == kind
-    if free == ("rotY",):
+    if free == "rotY":
         assert robot.placement([math.pi / 2], "tip")[:3, 0] == pytest.approx([0.0, 0.0, -1.0])
 
 
 @pytest.mark.parametrize(("free", "factor"), [("rotY", math.pi / 180.0), ("transZ", 0.5)])
 def test_a_d6_joint_has_the_limits_of_its_free_direction(read: Read, free: str, factor: float) -> None:
     ends = f"float limit:{free}:physics:low = -45\nfloat limit:{free}:physics:high = 90"
-    limit = present(read(d6([free], ends, ALL), unit=0.5).tree.joints[0].limit)
+    limit = present(read(d6(free, ends, ALL), unit=0.5).tree.joints[0].limit)
     assert (limit.lower, limit.upper) == pytest.approx((-45 * factor, 90 * factor))
 
 
@@ -248,11 +251,9 @@ MIMICS = {
 
 
 @pytest.mark.parametrize(("schema", "words", "expected"), MIMICS.values(), ids=MIMICS)
-def test_mimic_joints_follow_their_rule(
-    read: Read, schema: str, words: str, expected: tuple[float, float]
-) -> None:
+def test_mimic_joints_follow_their_rule(read: Read, schema: str, words: str, expected: object) -> None:
     follower = joint("wrist", "Revolute", "upper", "hand", words, schema, axis="Z")
-    links = body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + body("hand", "(0, 0, 1)")
+    links = BASE + body("upper", "(0, 0, 1)") + body("hand", "(0, 0, 1)")
     robot = read(links + SHOULDER + follower)
     rule = present(robot.tree.joints[1].mimic)
     assert (robot.nq, rule.leader) == (1, "shoulder")
@@ -264,7 +265,7 @@ def test_mimic_joints_follow_their_rule(
 def with_schemas(schemas: str, words: str = "") -> str:
     """Write the arm whose prismatic joint has applied schemas."""
     plain = 'def PhysicsPrismaticJoint "rail"'
-    return LINKS + JOINTS.replace(plain + " {", f"{plain} (prepend apiSchemas = [{schemas}]) {{\n{words}")
+    return ARM.replace(plain + " {", f"{plain} (prepend apiSchemas = [{schemas}]) {{\n{words}")
 
 
 def test_a_mimic_rule_between_an_angle_and_a_length_is_not_scaled_and_is_reported(read: Read) -> None:
@@ -274,9 +275,8 @@ def test_a_mimic_rule_between_an_angle_and_a_length_is_not_scaled_and_is_reporte
     assert (mimic.leader, mimic.multiplier) == ("shoulder", 0.5)
 
 
-def test_value_clips_are_refused_before_their_files_are_read(write: Write, tmp_path: Path) -> None:
-    secret = tmp_path / "secret.usda"
-    secret.write_text("#usda 1.0\nTOPSECRET")
+def test_value_clips_are_refused_before_their_files_are_read(write: Write) -> None:
+    secret = write("#usda 1.0\nTOPSECRET", "secret.usda")
     clips = (
         f"\nclips = {{\ndictionary default = {{\nasset[] assetPaths = [@{secret}@]\n"
         f'asset manifestAssetPath = @{secret}@\nstring primPath = "/base"\n'
@@ -284,7 +284,7 @@ def test_value_clips_are_refused_before_their_files_are_read(write: Write, tmp_p
     )
     head = 'def Xform "upper" ('
     with pytest.raises(urdfkin.UrdfkinError, match="value clips") as caught:
-        loaded(write(stage((LINKS + JOINTS).replace(head, head + clips))))
+        loaded(write(stage((ARM).replace(head, head + clips))))
     assert "TOPSECRET" not in str(caught.value)
 
 
@@ -310,22 +310,14 @@ def test_two_trees_below_one_articulation_root_are_chosen_by_their_root_bodies(w
 def test_units_and_axes_that_a_stage_does_not_state_are_findings(write: Write) -> None:
     robot = loaded(write(f'#usda 1.0\ndef Xform "arm" {{\n{LINKS}{JOINTS}\n}}\n'))
     assert codes(robot) == {"USD301": None, "USD302": None}
-    assert "centimetre" in next(one.message for one in robot.findings if one.code == "USD301")
+    assert re.search("USD301: .*centimetre", str(findings(robot)))
 
 
 def test_a_prim_with_another_pose_than_its_joints_give_is_reported(read: Read) -> None:
-    robot = read((LINKS + JOINTS).replace("localPos0 = (0, 0, 1)", "localPos0 = (0, 0, 1.001)"))
-    ((code, name, message),) = findings(robot)
-    assert (code, name) == ("USD304", "/arm/upper")
-    assert "0.001 m" in message
+    robot = read((ARM).replace("localPos0 = (0, 0, 1)", "localPos0 = (0, 0, 1.001)"))
+    (finding,) = findings(robot)
+    assert re.match(r"USD304 /arm/upper: .*\b0\.001 m", finding)
     assert "elsewhere" in str(robot.certificate().reading)
-
-
-def test_a_stage_may_show_the_robot_in_another_configuration(read: Read) -> None:
-    robot = read(LINKS.replace("(2, 0, 1)", "(2, 0.75, 1)") + JOINTS)
-    assert codes(robot) == {}
-    robot.placement([0.0, 0.0], "lower")
-    assert "with 1 joint not at zero" in str(robot.certificate().reading)
 
 
 def renamed(text: str) -> str:
@@ -334,7 +326,7 @@ def renamed(text: str) -> str:
 
 
 def test_several_articulations_need_a_choice(write: Write) -> None:
-    text = stage(LINKS + JOINTS)
+    text = stage(ARM)
     path = write(text + renamed(text))
     with pytest.raises(InputError, match=r"2 articulations.*/arm/base, /other/base"):
         loaded(path)
@@ -344,7 +336,7 @@ def test_several_articulations_need_a_choice(write: Write) -> None:
 
 
 def test_the_articulation_of_all_prims_has_the_name_of_its_root_prim_or_of_the_file(write: Write) -> None:
-    text = stage(LINKS + JOINTS + joint("mount", "Fixed", "", "base") + body("stray"))
+    text = stage(ARM + joint("mount", "Fixed", "", "base") + body("stray"))
     robot = loaded(write(text), articulation="/")
     assert robot.name == "arm"
     assert codes(robot) == {"USD202": "/arm/stray"}
@@ -355,7 +347,7 @@ def test_the_articulation_of_all_prims_has_the_name_of_its_root_prim_or_of_the_f
 
 
 def test_robots_with_the_same_joint_names_may_be_shown_in_different_configurations(write: Write) -> None:
-    text = stage(LINKS + JOINTS + joint("mount", "Fixed", "", "base"))
+    text = stage(ARM + joint("mount", "Fixed", "", "base"))
     robot = loaded(write(text.replace("(2, 0, 1)", "(2, 0.75, 1)") + renamed(text)), articulation="/")
     assert set(robot.joint_names) == {"shoulder", "rail", "shoulder_", "rail_"}
     assert codes(robot) == {}
@@ -414,36 +406,17 @@ def test_a_variant_inside_an_instance_is_selected(write: Write) -> None:
         assert codes(robot) == {}
 
 
-@pytest.mark.parametrize("arc", ARCS)
-def test_references_payloads_and_instances_are_followed(write: Write, arc: str) -> None:
-    write(stage(LINKS + JOINTS), "parts/arm.usda")
-    robot = loaded(write(f'{PLAIN}def "mine" (\n    {arc} = @./parts/arm.usda@</arm>\n) {{ }}\n'))
-    assert robot.link_names == ("base", "upper", "lower")
-    assert reach(robot) == pytest.approx(2.0)
-    assert codes(robot) == {}
+def binary(write: Write, suffix: str) -> Path:
+    """Write the arm in USD's binary format, .usdc, or as a package, .usdz."""
+    from pxr import Sdf, UsdUtils
 
-
-def crate_file(write: Write) -> Path:
-    """Write the arm in USD's binary format."""
-    from pxr import Sdf
-
-    text = write(stage(LINKS + JOINTS))
-    assert Sdf.Layer.FindOrOpen(str(text)).Export(str(text.with_suffix(".usdc")))
-    return text.with_suffix(".usdc")
-
-
-def package(write: Write) -> Path:
-    """Write the arm as a package."""
-    from pxr import UsdUtils
-
-    text = write(stage(LINKS + JOINTS))
-    assert UsdUtils.CreateNewUsdzPackage(str(text), str(text.with_suffix(".usdz")))
-    return text.with_suffix(".usdz")
-
-
-def test_crate_files_and_packages_are_read(write: Write) -> None:
-    for file in (crate_file(write), package(write)):
-        assert reach(loaded(file)) == pytest.approx(2.0)
+    text = write(stage(ARM))
+    path = text.with_suffix(suffix)
+    if suffix == ".usdz":
+        assert UsdUtils.CreateNewUsdzPackage(str(text), str(path))
+    else:
+        assert Sdf.Layer.FindOrOpen(str(text)).Export(str(path))
+    return path
 
 
 # -- findings ------------------------------------------------------------------------------------------------
@@ -459,7 +432,7 @@ SPHERICAL = joint("ball", "Spherical", "base", "upper")
 CROWD = 'def PointInstancer "crowd" {\nrel prototypes = </arm/crowd/one>\n%s}\n'
 PROTOTYPE = joint("gear", "Revolute", "crowd/one/a", "crowd/one/b")
 SLIDE = body("side") + joint("slide", "Prismatic", "base", "side", axis="Y", limits=(-1, 1))
-IN_RADIANS = LINKS + JOINTS.replace("= -90", "= -1.5708").replace("= 180", "= 3.14159")
+IN_RADIANS = ARM.replace("= -90", "= -1.5708").replace("= 180", "= 3.14159")
 
 
 def equality(coefficient: int) -> str:
@@ -471,94 +444,108 @@ def equality(coefficient: int) -> str:
 RELATIONSHIPS = {
     "PhysxMimicJointAPI:rotX": "physxMimicJoint:rotX:referenceJoint", "NewtonMimicAPI": "newton:mimicJoint",
 }  # fmt: skip
+COUPLINGS = (
+    '"MjcEqualityJointAPI"',
+    '"PhysxTendonAxisAPI:t"',
+    '"OtherMimicAPI"',
+    '"OtherMimicAPI", "PhysxTendonAxisAPI:u"',
+)
 OVER = 'over "ghost" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {\n}\n'
+PLACE, SAMPLES = "translate = (0, 0, 1)", "translate.timeSamples = { 0: (0, 0, 5) }"
 
 #: Content of /arm, and the findings: the code, the path of the prim and, in some cases, the message.
-LISTED: dict[str, tuple[str, list[tuple[str, ...]]]] = {
+LISTED: dict[str, tuple[str, list[str]]] = {
     **{
         f"a relationship without {schema}": (
             with_schemas('"PhysicsDriveAPI:linear"', f"rel {name} = </arm/joints/shoulder>"),
-            [("USD203", "/arm/rail", f"{name} has no effect, because {schema} is not applied")],
+            [f"USD203 /arm/rail: {name} has no effect, because {schema} is not applied"],
         )
         for schema, name in RELATIONSHIPS.items()
     },
     "limits that lock a joint, as in Robotiq's gripper": (
-        LINKS + JOINTS.replace("= -90", "= -0.001").replace("= 180", "= 0.001"), [],
+        ARM.replace("= -90", "= -0.001").replace("= 180", "= 0.001"), [],
     ),
     "a joint to a prim that a missing layer defines": (
-        LINKS + JOINTS + OVER + joint("j", "Fixed", "ghost", "lower"), [("USD201", "/arm/j")],
+        ARM + OVER + joint("j", "Fixed", "ghost", "lower"), ["USD201 /arm/j"],
     ),
     "a PointInstancer of bodies": (
-        LINKS + JOINTS + CROWD % f'def Xform "one" {{\n{body("a")}{body("b")}{PROTOTYPE}}}\n'
+        ARM + CROWD % f'def Xform "one" {{\n{body("a")}{body("b")}{PROTOTYPE}}}\n'
         + joint("lead", "Fixed", "upper", "crowd/one/a"),
         [
-            (
-                "USD101", "/arm/crowd",
-                "the prototypes of this PointInstancer have 2 bodies and 1 joints, which are not read",
-            ),
-            (
-                "USD201", "/arm/lead",
-                "body1 of this joint names a prim that is a prototype of a PointInstancer: /arm/crowd/one/a",
-            ),
+            "USD101 /arm/crowd: the prototypes of this PointInstancer have 2 bodies and 1 joints, "
+            "which are not read",
+            "USD201 /arm/lead: body1 of this joint names a prim that is a prototype of a PointInstancer: "
+            "/arm/crowd/one/a",
         ],
     ),
-    "a joint that closes a loop": (LINKS + JOINTS + CLOSING, [("USD101", "/arm/closing")]),
+    "a joint that closes a loop": (ARM + CLOSING, ["USD101 /arm/closing"]),
     "a joint outside the articulation": (
-        LINKS + JOINTS + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"), [("USD101", "/arm/closing")],
+        ARM + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"), ["USD101 /arm/closing"],
     ),
     "a disabled joint": (
-        LINKS + JOINTS + joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false"),
-        [("USD101", "/arm/off")],
+        ARM + joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false"),
+        ["USD101 /arm/off"],
     ),
-    "a lost target": (LINKS + JOINTS + joint("lost", "Fixed", "upper", "nowhere"), [("USD201", "/arm/lost")]),
-    "a body without a joint": (LINKS + JOINTS + body("stray"), [("USD202", "/arm/stray")]),
-    "a mimic rule without its leader": (with_schemas(NEWTON), [("USD203", "/arm/rail")]),
+    "a lost target": (ARM + joint("lost", "Fixed", "upper", "nowhere"), ["USD201 /arm/lost"]),
+    "a body without a joint": (ARM + body("stray"), ["USD202 /arm/stray"]),
+    "a mimic rule without its leader": (with_schemas(NEWTON), ["USD203 /arm/rail"]),
     "a disabled mimic rule": (
         with_schemas(NEWTON, FOLLOWS.format("shoulder") + "bool newton:mimicEnabled = false"),
-        [("USD101", "/arm/rail", "the mimic rule of this joint is disabled")],
+        ["USD101 /arm/rail: the mimic rule of this joint is disabled"],
     ),
-    "limits in radians": (IN_RADIANS, [("USD303", "/arm/shoulder")]),
+    "limits in radians": (IN_RADIANS, ["USD303 /arm/shoulder"]),
     "a gear joint and a tendon": (
-        LINKS + JOINTS + GEAR + 'def MjcTendon "tendon" {\n}\n',
+        ARM + GEAR + 'def MjcTendon "tendon" {\n}\n',
         [
-            ("USD101", "/arm/gear", "a tree cannot represent this PhysxPhysicsGearJoint"),
-            ("USD101", "/arm/tendon", "a tree cannot represent this MjcTendon"),
+            "USD101 /arm/gear: a tree cannot represent this PhysxPhysicsGearJoint",
+            "USD101 /arm/tendon: a tree cannot represent this MjcTendon",
         ],
     ),
     **{
         f"a coupling by {schemas}": (
-            with_schemas(", ".join(f'"{one}"' for one in schemas.split(", "))),
-            [("USD101", "/arm/rail", f"urdfkin does not read {schemas}")],
+            with_schemas(schemas), ["USD101 /arm/rail: urdfkin does not read " + schemas.replace('"', "")],
         )
-        for schemas in (
-            "MjcEqualityJointAPI", "PhysxTendonAxisAPI:t", "OtherMimicAPI",
-            "OtherMimicAPI, PhysxTendonAxisAPI:u",
-        )
+        for schemas in COUPLINGS
     },
     "an equality without more terms than the mimic rule": (equality(0), []),
-    "an equality with more terms than the mimic rule": (equality(1), [("USD101", "/arm/rail")]),
+    "an equality with more terms than the mimic rule": (equality(1), ["USD101 /arm/rail"]),
     "a joint with a schema that would be listed": (
-        LINKS + JOINTS + joint("weld", "Fixed", "lower", "base", OUTSIDE, '"MjcEqualityWeldAPI"'),
-        [
-            (
-                "USD101", "/arm/weld",
-                "a tree cannot represent this FixedJoint, which is outside the articulation",
-            )
-        ],
+        ARM + joint("weld", "Fixed", "lower", "base", OUTSIDE, '"MjcEqualityWeldAPI"'),
+        ["USD101 /arm/weld: a tree cannot represent this FixedJoint, which is outside the articulation"],
     ),
     "a PointInstancer of a shape": (
-        LINKS + JOINTS + CROWD % 'def Cube "one" {\n}\n',
-        [("USD102", "/arm/crowd", "kinematics does not use this PointInstancer")],
+        ARM + CROWD % 'def Cube "one" {\n}\n',
+        ["USD102 /arm/crowd: kinematics does not use this PointInstancer"],
+    ),
+    **{  # Isaac Sim writes a path without a dot
+        f"the missing layer {layer}": (ARM + f'def "x" (references = @{layer}@</a>) {{ }}', ["USD103"])
+        for layer in ("./gone.usda", "configuration/gone.usda")
+    },
+    "time samples of a limit without a default value": (
+        ARM.replace("physics:upperLimit = 3", "physics:upperLimit.timeSamples = { 0: 3 }"),
+        ["USD104 /arm/rail", "USD102 /arm/rail"],
+    ),
+    "time samples of a translation without a default value": (
+        ARM.replace(PLACE, SAMPLES),
+        [
+            "USD104 /arm/upper: xformOp:translate has time samples, but no default value, "
+            "so urdfkin leaves it out", "USD304 /arm/upper",
+        ],
+    ),
+    "time samples with a default value": (ARM.replace(PLACE, f"{PLACE}\ndouble3 xformOp:{SAMPLES}"), []),
+    "time samples above the robot": (
+        moved(UP).replace(PLACE, SAMPLES) + ARM, ["USD104 /arm"],
     ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize(("content", "expected"), LISTED.values(), ids=LISTED)
-def test_parts_that_a_tree_cannot_represent_are_reported_with_their_path(
-    read: Read, content: str, expected: list[tuple[str, ...]]
+def test_unsupported_parts_are_reported_with_their_path(
+    read: Read, content: str, expected: list[str]
 ) -> None:
     robot = read(content)
-    assert [one[: len(two)] for one, two in zip(findings(robot), expected, strict=True)] == expected
+    for found, one in zip(findings(robot), expected, strict=True):
+        assert one in (found, found.partition(":")[0])
     assert robot.nq == 2
     assert not {"ghost", "a", "b"} & set(robot.link_names)
 
@@ -570,55 +557,37 @@ def test_a_blocked_value_is_treated_as_missing(read: Read) -> None:
         "bool physics:excludeFromArticulation = None",
         localPos0=(0, 0, 1), localPos1=None, localRot1=None, limits=("None", "None"),
     )  # fmt: skip
-    robot = read(body("base", schemas=ROOT) + body("upper", "(0, 0, 1)") + blocked)
+    robot = read(BASE + body("upper", "(0, 0, 1)") + blocked)
     (made,) = robot.tree.joints
     assert made.kind.value == "continuous"
     assert made.axis == pytest.approx([1.0, 0.0, 0.0])
     assert findings(robot) == []
-    ends = "float limit:rotY:physics:low = None\nfloat limit:rotY:physics:high = 90"
-    with pytest.raises(InputError, match=r"joint /arm/j: .* is blocked.*limit:rotY:physics:low = None"):
-        read(d6(["rotY"], ends, ALL))
-
-
-def test_time_samples_without_a_default_value_are_reported(write: Write, read: Read) -> None:
-    timed = JOINTS.replace("physics:upperLimit = 3", "physics:upperLimit.timeSamples = { 0: 3 }")
-    assert ("USD104", "/arm/rail") in [one[:2] for one in findings(read(LINKS + timed))]
-    text = stage(LINKS + JOINTS)
-    moving = text.replace("translate = (0, 0, 1)", "translate.timeSamples = { 0: (0, 0, 1) }")
-    assert moving != text
-    what = "xformOp:translate has time samples, but no default value, so urdfkin leaves it out"
-    assert ("USD104", "/arm/upper", what) in findings(loaded(write(moving)))
-    both = "translate = (0, 0, 1)\ndouble3 xformOp:translate.timeSamples = { 0: (0, 0, 5) }"
-    assert findings(loaded(write(text.replace("translate = (0, 0, 1)", both)))) == []
-    above = moved("double3", "{ 0: (1, 0, 0) }").replace("translate = ", "translate.timeSamples = ")
-    robot = loaded(write(text.replace('def Xform "arm" {', f'def Xform "arm" {{\n{above}')))
-    assert [one[:2] for one in findings(robot)] == [("USD104", "/arm")]
 
 
 def test_a_spline_without_a_default_value_is_reported(write: Write) -> None:
     if not hasattr(usd.library().Usd.Attribute, "HasSpline"):
         pytest.skip("this OpenUSD has no splines")
     spline = "double xformOp:translateZ.spline = {\n1: 1; post held,\n}"
-    text = stage(LINKS + JOINTS).replace("double3 xformOp:translate = (0, 0, 1)", spline)
+    text = stage(ARM).replace("double3 xformOp:translate = (0, 0, 1)", spline)
     robot = loaded(write(text.replace('["xformOp:translate"]', '["xformOp:translateZ"]', 1)))
     what = "xformOp:translateZ has a spline, but no default value, so urdfkin leaves it out"
-    assert findings(robot)[0] == ("USD104", "/arm/upper", what)
+    assert findings(robot)[0] == f"USD104 /arm/upper: {what}"
 
 
 @pytest.mark.parametrize("arc", ARCS)
-def test_a_layer_with_another_unit_or_up_axis_is_reported(write: Write, arc: str) -> None:
-    write(stage(LINKS + JOINTS, unit=0.01, up="Y"), "parts/arm.usda")
+def test_other_layers_are_read_and_another_unit_or_up_axis_is_reported(write: Write, arc: str) -> None:
+    write(stage(ARM, unit=0.01, up="Y"), "parts/arm.usda")
     text = f'{PLAIN}def Xform "mine" (\n    {arc} = @./parts/arm.usda@</arm>\n) {{\n%s\n}}\n'
     robot = loaded(write(text % ""))
     assert codes(robot) == {"USD301": "/mine", "USD302": "/mine"}
-    message = next(one[2] for one in findings(robot) if one[0] == "USD301")
-    assert "the layer parts/arm.usda has metersPerUnit 0.01, but the stage 1" in message
-    resolved = (
-        "double3 xformOp:rotateXYZ:unitsResolve = (90, 0, 0)\n"
-        "double3 xformOp:scale:unitsResolve = (0.01, 0.01, 0.01)\n"
-        'uniform token[] xformOpOrder = ["xformOp:rotateXYZ:unitsResolve", "xformOp:scale:unitsResolve"]'
+    words = "USD301 /mine: the layer parts/arm.usda has metersPerUnit 0.01, but the stage 1"
+    assert any(one.startswith(words) for one in findings(robot))
+    resolved = moved(
+        ("double3", "rotateXYZ:unitsResolve", (90, 0, 0)),
+        ("double3", "scale:unitsResolve", (0.01, 0.01, 0.01)),
     )
     robot = loaded(write(text % resolved))
+    assert robot.link_names == ("base", "upper", "lower")
     assert codes(robot) == {}
     assert reach(robot) == pytest.approx(0.02)
 
@@ -639,49 +608,44 @@ def test_a_sublayer_with_another_unit_is_reported(write: Write) -> None:
     assert codes(loaded(write(sublayered(stage(LINKS), "joints.usda")))) == {"USD301": "/arm"}
 
 
-SHEAR = (
-    "float xformOp:rotateZ = 45\nfloat3 xformOp:scale = (1, 2, 1)\n"
-    'uniform token[] xformOpOrder = ["xformOp:scale", "xformOp:rotateZ"]\n'
-)
+SCALED, TURNED = ("float3", "scale", (1, 2, 1)), ("float", "rotateZ", 45)
 
 
-def test_a_sheared_frame_is_no_link_but_a_sheared_body_is_refused(write: Write, read: Read) -> None:
-    frame = f'def Xform "skew" {{\n{SHEAR}}}\n'
+def test_a_sheared_frame_is_no_link(read: Read) -> None:
+    frame = f'def Xform "skew" {{\n{moved(SCALED, TURNED)}}}\n'
     robot = read(body("base", inside=frame, schemas=ROOT) + LINKS.partition("}\n")[2] + JOINTS)
     assert robot.link_names == ("base", "upper", "lower")
-    assert [one[:2] for one in findings(robot)] == [("USD102", "/arm/base/skew")]
-    scaled = moved("float3", (1, 2, 1), "scale")
-    above = stage(LINKS + JOINTS).replace('"arm" {', f'"arm" {{\n{scaled}')
-    turned = above.replace('(0, 0, 1)\nuniform token[] xformOpOrder = ["xformOp:translate"]',
-        '(0, 0, 1)\nfloat xformOp:rotateZ = 45\n'
-        'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:rotateZ"]')  # fmt: skip
-    assert turned != above
-    with pytest.raises(InputError, match=r"/arm/upper: .* has shear.*: found the scale 1, 2, 1 of /arm"):
-        loaded(write(turned))
+    assert codes(robot) == {"USD102": "/arm/base/skew"}
 
 
 # -- hostile files ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("content", "why"),
-    [
-        (LINKS + SPHERICAL, r"joint /arm/ball: urdfkin does not support spherical joints"),
-        (d6(["rotY", "rotZ"]), r"degrees of freedom.*rotY, rotZ"),
-        (LINKS, "no joint between bodies"),
-    ],
-    ids=["a spherical joint", "a joint with two free rotations", "a stage without joints"],
-)
-def test_a_stage_without_joints_or_with_unsupported_joints_is_refused(
-    read: Read, content: str, why: str
+SHEARED = moved(SCALED) + ARM.replace(moved(UP), moved(UP, TURNED))
+BLOCKED = "float limit:rotY:physics:low = None\nfloat limit:rotY:physics:high = 90"
+
+UNREADABLE = "OpenUSD does not accept this file"
+REFUSED = {
+    "a spherical joint": (
+        stage(LINKS + SPHERICAL), r"joint /arm/ball: urdfkin does not support spherical joints",
+    ),
+    "a joint with two free rotations": (stage(d6("rotY rotZ")), r"degrees of freedom.*rotY, rotZ"),
+    "a stage without joints": (stage(LINKS), "no joint between bodies"),
+    "a blocked limit": (
+        stage(d6("rotY", BLOCKED, ALL)), r"joint /arm/j: .* is blocked.*limit:rotY:physics:low = None",
+    ),
+    "a sheared body": (stage(SHEARED), r"/arm/upper: .* has shear.*: found the scale 1, 2, 1 of /arm"),
+    "a URDF": ("<robot/>", UNREADABLE),
+    "a stage without its end": ("#usda 1.0\ndef Xform {", UNREADABLE),
+    "a crate file without content": ("PXR-USDC", UNREADABLE),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "why"), REFUSED.values(), ids=REFUSED)
+def test_a_file_that_is_no_stage_of_a_tree_is_refused_with_the_reason(
+    write: Write, text: str, why: str
 ) -> None:
     with pytest.raises(InputError, match=why):
-        read(content)
-
-
-@pytest.mark.parametrize("text", ["<robot/>", "#usda 1.0\ndef Xform {", "PXR-USDC"])
-def test_text_that_is_no_usd_is_an_error(write: Write, text: str) -> None:
-    with pytest.raises(InputError):
         loaded(write(text))
 
 
@@ -695,13 +659,10 @@ def test_text_that_is_no_usd_is_an_error(write: Write, text: str) -> None:
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("arc", ["sublayer", "reference", "payload", "variant"])
-def test_a_reference_outside_the_folder_is_refused(
-    write: Write, tmp_path: Path, reference: str, why: str, arc: str
-) -> None:
-    (tmp_path / "secret.usda").write_text(stage(LINKS + JOINTS))
+def test_a_reference_outside_the_folder_is_refused(write: Write, reference: str, why: str, arc: str) -> None:
     path = write("", "robot/robot.usda")
-    (path.parent / "link.usda").symlink_to(tmp_path / "secret.usda")
-    (path.parent / "notes.txt").write_text("#usda 1.0\n")
+    path.with_name("link.usda").symlink_to(write(stage(ARM), "secret.usda"))
+    write("#usda 1.0\n", "robot/notes.txt")
     own = f"({'payload' if arc == 'payload' else 'references'} = @{reference}@</arm>)"
     text = {
         "sublayer": f"#usda 1.0\n(\n    subLayers = [@{reference}@]\n)\n",
@@ -717,11 +678,6 @@ def test_a_reference_outside_the_folder_is_refused(
             loaded(path)
 
 
-@pytest.mark.parametrize("layer", ["./gone.usda", "configuration/gone.usda"])  # Isaac Sim writes the second
-def test_a_missing_layer_is_a_finding_with_and_without_a_dot_before_its_path(read: Read, layer: str) -> None:
-    assert codes(read(LINKS + JOINTS + f'def "x" (references = @{layer}@</a>) {{ }}')) == {"USD103": None}
-
-
 #: Metadata and content of a layer that refers to another layer.
 LOOPS = {
     "subLayers": ("    subLayers = [@./{}.usda@]\n", ""),
@@ -732,15 +688,13 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("arc", LOOPS)
-def test_layers_that_refer_to_each_other_in_a_circle_are_a_finding(
-    write: Write, tmp_path: Path, arc: str
-) -> None:
-    arm = stage(LINKS + JOINTS).partition(")\n")[2]
+def test_layers_that_refer_to_each_other_in_a_circle_are_a_finding(write: Write, arc: str) -> None:
+    arm, files = stage(ARM).partition(")\n")[2], []
     for own, other in ("ab", "bc", "ca"):
         head, x = (part.format(other) for part in LOOPS[arc])
-        write(f"#usda 1.0\n(\n{head}{UNITS})\n{arm}{x}", f"{own}.usda")
-    for own in "abc":
-        robot = loaded(tmp_path / f"{own}.usda")
+        files.append(write(f"#usda 1.0\n(\n{head}{UNITS})\n{arm}{x}", f"{own}.usda"))
+    for file in files:
+        robot = loaded(file)
         assert robot.nq == 2
         assert "USD103" in codes(robot)
 
@@ -751,7 +705,7 @@ def test_two_to_the_power_of_40_prims_are_an_error_in_limited_time(write: Write)
     prims = "".join(
         f'def "p{k}" {{\n{child.format("a", k + 1)}{child.format("b", k + 1)}}}\n' for k in range(40)
     )
-    path = write(stage(LINKS + JOINTS) + prims)
+    path = write(stage(ARM) + prims)
     begin = time.monotonic()
     with pytest.raises(InputError, match=r"cannot read this stage.*(does not|did not finish|memory)"):
         usd_check.read_usd(path, patience=4.0)
@@ -759,12 +713,10 @@ def test_two_to_the_power_of_40_prims_are_an_error_in_limited_time(write: Write)
 
 
 @pytest.mark.parametrize("arc", ["references", "payload", "subLayers"])
-def test_layers_of_hundreds_of_megabytes_are_refused_before_they_are_read(
-    write: Write, tmp_path: Path, arc: str
-) -> None:
-    plain, prim = stage(LINKS + JOINTS), f'def "x" ({arc} = @./large.usdc@</a>) {{ }}'
+def test_layers_of_hundreds_of_megabytes_are_refused_before_they_are_read(write: Write, arc: str) -> None:
+    plain, prim = stage(ARM), f'def "x" ({arc} = @./large.usdc@</a>) {{ }}'
     path = write(sublayered(plain, "large.usdc") if arc == "subLayers" else plain + prim)
-    with (tmp_path / "large.usdc").open("wb") as file:
+    with path.with_name("large.usdc").open("wb") as file:
         file.write(b"PXR-USDC")
         file.truncate(700_000_000)
     begin = time.monotonic()
@@ -781,7 +733,7 @@ def test_the_total_size_of_all_layers_is_limited(write: Write, monkeypatch: pyte
     for k in range(5):
         write(f'#usda 1.0\ndef "a" {{ }}\n{filler}', f"part{k}.usda")
     refs = "".join(f'def "x{k}" (references = @./part{k}.usda@</a>) {{ }}\n' for k in range(5))
-    path = write(stage(LINKS + JOINTS + refs))
+    path = write(stage(ARM + refs))
     own = path.stat().st_size
     monkeypatch.setattr(usd, "MOST", own + 2000)
     with pytest.raises(SourceError, match=f"too large: found over {own + 2000} bytes"):
@@ -790,16 +742,12 @@ def test_the_total_size_of_all_layers_is_limited(write: Write, monkeypatch: pyte
     assert len(usd.files_of(usd.library(), str(path))) == 6
 
 
-def test_a_stage_of_hundreds_of_layers_is_read_and_one_of_thousands_is_refused(
-    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from pxr import Sdf
-
-    part = Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
-    for k in range(200):  # the process may have 64 open files
-        part.Export(str(tmp_path / f"part{k}.usdc"))
+def test_hundreds_of_layers_are_read_but_not_thousands(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     refs = "".join(f'def "x{k}" (references = @./part{k}.usdc@</a>) {{ }}\n' for k in range(200))
-    path = write(stage(LINKS + JOINTS + refs))
+    path = write(stage(ARM + refs))
+    part = usd.library().Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
+    for k in range(200):  # the process may have 64 open files
+        part.Export(str(path.with_name(f"part{k}.usdc")))
     assert loaded(path).nq == 2
     monkeypatch.setattr(usd, "_LAYERS", 100)
     with pytest.raises(InputError, match="too many layers: found over 100"):
@@ -812,23 +760,22 @@ def test_textures_and_other_assets_are_never_opened(write: Write, tmp_path: Path
         'def Shader "s" {\nasset inputs:file = @./pipe.png@\nasset inputs:other = @/etc/passwd@\n'
         "asset[] inputs:more = [@./pipe.png@, @https://example.org/a.png@]\n}\n"
     )
-    assert loaded(write(stage(LINKS + JOINTS + shape))).nq == 2
+    assert loaded(write(stage(ARM + shape))).nq == 2
 
 
-@pytest.mark.parametrize("make", [crate_file, package])
-def test_a_truncated_file_is_an_error_unless_a_truncated_package_still_has_the_whole_robot(
-    write: Write, make: Callable[[Write], Path]
-) -> None:
-    file = make(write)
-    data, whole = file.read_bytes(), loaded(file).urdf
+@pytest.mark.parametrize("suffix", [".usdc", ".usdz"])
+def test_a_truncated_binary_file_is_an_error_or_has_the_whole_robot(write: Write, suffix: str) -> None:
+    file = binary(write, suffix)
+    data, whole = file.read_bytes(), loaded(file)
+    assert reach(whole) == pytest.approx(2.0)
     for share in (0.0, 0.01, 0.11, 0.22, 0.3, 0.33, 0.44, 0.56, 0.6, 0.67, 0.78, 0.9, 0.99):
         file.write_bytes(data[: int(share * len(data))])
         try:
             robot = loaded(file)
         except (InputError, SourceError):
             continue
-        assert file.suffix == ".usdz", share
-        assert robot.urdf == whole, share
+        assert suffix == ".usdz", share
+        assert robot.urdf == whole.urdf, share
 
 
 DEEDS = {
@@ -839,9 +786,7 @@ DEEDS = {
 
 
 @pytest.mark.parametrize("deed", DEEDS)
-def test_a_program_in_the_confined_process_cannot_write_files_or_start_processes(
-    tmp_path: Path, deed: str
-) -> None:
+def test_the_confined_process_cannot_write_files_or_start_processes(tmp_path: Path, deed: str) -> None:
     file = tmp_path / "made"
     words = f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit(5)\n{DEEDS[deed]}"
     if os.geteuid() == 0 and deed != "write":
@@ -850,46 +795,39 @@ def test_a_program_in_the_confined_process_cannot_write_files_or_start_processes
     assert not file.exists() or file.stat().st_size == 0
 
 
-def test_a_reference_that_openusd_would_find_in_the_current_folder_is_refused(
-    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    elsewhere = tmp_path / "elsewhere"
-    (elsewhere / "configuration").mkdir(parents=True)
-    (elsewhere / "configuration" / "arm.usda").write_text(stage(LINKS + JOINTS))
+def test_a_reference_to_the_current_folder_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(write(stage(ARM), "elsewhere/configuration/arm.usda").parents[1])
     path = write(stage('def "x" (references = @configuration/arm.usda@) { }'), "robot/robot.usda")
-    monkeypatch.chdir(elsewhere)
     with pytest.raises(InputError, match="outside the folder"):
         loaded(path)
 
 
-def test_a_pointer_of_git_lfs_is_refused_with_its_remedy(write: Write, tmp_path: Path) -> None:
-    pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n"
-    write(pointer, "base.usd")
-    for path in (tmp_path / "base.usd", write(stage(LINKS + 'def "x" (references = @base.usd@) { }'))):
+def test_a_pointer_of_git_lfs_is_refused_with_its_remedy(write: Write) -> None:
+    pointer = write("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "base.usd")
+    for path in (pointer, write(stage(LINKS + 'def "x" (references = @base.usd@) { }'))):
         with pytest.raises(InputError, match=r"base\.usd: this file is a pointer of Git LFS.*git lfs pull"):
             loaded(path)
 
 
-def test_a_damaged_binary_file_never_ends_the_process_that_calls_load(write: Write, tmp_path: Path) -> None:
+def test_a_damaged_binary_file_never_ends_the_process_that_calls_load(write: Write) -> None:
     rng = np.random.default_rng(0)
-    whole = np.frombuffer(crate_file(write).read_bytes(), np.uint8)
-    for k in range(12):
+    file = binary(write, ".usdc")
+    whole = np.frombuffer(file.read_bytes(), np.uint8)
+    for _ in range(12):
         damaged = whole.copy()
         damaged[rng.integers(0, len(whole), 20)] = rng.integers(0, 256, 20)
-        file = tmp_path / f"damaged{k}.usdc"
         file.write_bytes(damaged.tobytes())
         with contextlib.suppress(urdfkin.UrdfkinError):
             loaded(file, verify=False)
 
 
-def test_a_layer_that_is_a_device_and_a_stage_that_does_not_exist_are_refused(
-    write: Write, tmp_path: Path
-) -> None:
-    os.mkfifo(tmp_path / "pipe.usda")
+def test_a_layer_that_is_a_device_and_a_stage_that_does_not_exist_are_refused(write: Write) -> None:
+    path = write(stage(ARM + 'def "x" (references = @./pipe.usda@</a>) { }'))
+    os.mkfifo(path.with_name("pipe.usda"))
     with pytest.raises(InputError, match="not a regular file"):
-        loaded(write(stage(LINKS + JOINTS + 'def "x" (references = @./pipe.usda@</a>) { }')))
+        loaded(path)
     with pytest.raises(SourceError):
-        loaded(tmp_path / "none.usda")
+        loaded(path.with_name("none.usda"))
 
 
 # -- errors of the reader ------------------------------------------------------------------------------------
@@ -909,7 +847,7 @@ def loaded_in_this_process(monkeypatch: pytest.MonkeyPatch, path: Path) -> urdfk
 def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
     write: Write, monkeypatch: pytest.MonkeyPatch, mistake: str
 ) -> None:
-    path = write(stage(LINKS + JOINTS, unit=0.5))
+    path = write(stage(ARM, unit=0.5))
     assert loaded_in_this_process(monkeypatch, path).nq == 2
     side, motion = usd._StageReader._side, usd._StageReader._motion
 
@@ -926,36 +864,24 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
 
     monkeypatch.setattr(usd._StageReader, "_side", wrong_side)
     monkeypatch.setattr(usd._StageReader, "_motion", wrong_motion)
-    words = "OpenUSD's parser of UsdPhysics and urdfkin disagree about this joint"
-    with pytest.raises(OracleError, match=words):
+    with pytest.raises(OracleError, match="parser of UsdPhysics and urdfkin disagree about this joint"):
         loaded_in_this_process(monkeypatch, path)
 
 
 # -- the same robot in several formats -----------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Mistake:
-    """A mistake of a converter, in one joint."""
+def as_usd(robot: urdfkin.Robot, mistake: str = "", where: str = "") -> str:
+    """Write a robot of revolute, continuous, prismatic and fixed joints as a stage, as a converter would.
 
-    kind: str
-    joint: str
-
-
-def as_usd(robot: urdfkin.Robot, spell: Callable[[str], str] = str, mistake: Mistake | None = None) -> str:
-    """Write a robot of revolute, continuous, prismatic and fixed joints as a stage, as a converter would."""
+    The converter makes a mistake in one joint, `where`.
+    """
     tree = robot.tree
-    prims = [
-        body(spell(link), inside=f"double3 xformOp:translate = {_point(T)}\n"
-             f"quatd xformOp:orient = {_quaternion(T)}\n"
-             'uniform token[] xformOpOrder = ["xformOp:translate", "xformOp:orient"]',
-             schemas=ROOT * (link == tree.links[0]))
-        for link, T in zip(tree.links, robot.placement(np.zeros(robot.nq), list(tree.links)), strict=True)
-    ]  # fmt: skip
-    joints = (
-        _joint_in_usd(tree, k, spell, mistake.kind if mistake and mistake.joint == one.name else "")
-        for k, one in enumerate(tree.joints)
-    )
+    placements, prims = robot.placement(np.zeros(robot.nq), list(tree.links)), list[str]()
+    for link, T in zip(tree.links, placements, strict=True):
+        placed = moved(("double3", "translate", _point(T)), ("quatd", "orient", _quaternion(T)))
+        prims.append(body(transcoded(link), "", placed, ROOT * (link == tree.links[0])))
+    joints = (_joint_in_usd(tree, k, mistake * (one.name == where)) for k, one in enumerate(tree.joints))
     return stage("".join([*prims, 'def Scope "joints" {\n', *joints, "}\n"]))
 
 
@@ -968,7 +894,7 @@ def _quaternion(T: Any) -> tuple[float, ...]:
     return tuple(np.roll(quaternion_of(T[:3, :3]), 1).tolist())
 
 
-def _joint_in_usd(tree: KinematicTree, k: int, spell: Callable[[str], str], mistake: str) -> str:
+def _joint_in_usd(tree: KinematicTree, k: int, mistake: str) -> str:
     one = tree.joints[k]
     R = _with_first_axis(-one.axis if mistake == "axis sign" else one.axis)
     A, B = one.T_parent_joint @ pose(R), pose(R)
@@ -977,20 +903,20 @@ def _joint_in_usd(tree: KinematicTree, k: int, spell: Callable[[str], str], mist
     B = B @ _MOVED[mistake] if mistake == "other frames on the axis" else B
     frames: dict[str, Any] = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
     frames |= {f"localRot{i}": _quaternion(T) for i, T in enumerate((A, B))}
-    ends = [spell(tree.links[one.parent]), spell(tree.links[k + 1])]
+    ends = [transcoded(tree.links[one.parent]), transcoded(tree.links[k + 1])]
     degrees = 180.0 / math.pi if one.kind.turns else 1.0
     rule = one.mimic if mistake != "mimic dropped" else None
     words, limits = "", list[float]()
     if rule is not None:
         multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
-        words = FOLLOWS.format(f"joints/{spell(rule.leader)}")
+        words = FOLLOWS.format(f"joints/{transcoded(rule.leader)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
     if one.limit is not None and one.kind.bounded:
         limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
     name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
     first, second = ends[::-1] if mistake == "exchanged bodies" else ends
     schema = NEWTON if rule else ""
-    return joint(spell(one.name), name, first, second, words, schema, limits=limits, **frames)
+    return joint(transcoded(one.name), name, first, second, words, schema, limits=limits, **frames)
 
 
 _X = np.array([1.0, 0.0, 0.0])
@@ -1010,6 +936,11 @@ def _with_first_axis(axis: Any) -> Any:
     return np.column_stack((axis, y, np.cross(axis, y)))
 
 
+def in_both_orders(a: urdfkin.Robot, b: urdfkin.Robot) -> list[Sameness]:
+    """Compare two robots, and then the second with the first."""
+    return [urdfkin.same(*robots, bounds=False) for robots in ((a, b), (b, a))]
+
+
 ROBOTS = [
     "panda", "ur5", "so101", "talos_left_arm", "ur10",
     "solo12", "finger_edu", "g1", "allegro_left_hand", "bolt",
@@ -1017,9 +948,9 @@ ROBOTS = [
 
 
 @pytest.mark.parametrize("name", ROBOTS[:3])
-def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(write: Write, name: str) -> None:
+def test_single_precision_explains_the_difference_from_the_urdf(converted: Read, name: str) -> None:
     robot = loaded(name)
-    found = urdfkin.same(robot, loaded(write(as_usd(robot, transcoded))), boxes=0)
+    found = urdfkin.same(robot, converted(robot), boxes=0)
     assert found.single is not None
     assert found.up_to_single
     assert (found.unexplained, found.within_single) == ((), False)
@@ -1031,27 +962,23 @@ def test_rounding_to_single_precision_explains_the_difference_from_the_urdf(writ
 
 
 def test_all_outputs_have_the_verdict_up_to_single_precision(write: Write, tmp_path: Path) -> None:
-    files = {name: tmp_path / name for name in ("map.toml", "a.md", "a.html", "ur5.urdf")}
     robot = loaded("ur5")
-    files["ur5.urdf"].write_text(robot.urdf)
-    words = ["same", str(files["ur5.urdf"]), str(write(as_usd(robot, transcoded))), "--boxes", "0"]
-    done = command(*words, "--write-map", str(files["map.toml"]), "--markdown", str(files["a.md"]),
-                   "--html", str(files["a.html"]))  # fmt: skip
-    assert done.code == 0, done.text + done.err
-    found = urdfkin.same(robot, loaded(words[2]), boxes=0)
+    urdf, usda = write(robot.urdf, "ur5.urdf"), write(as_usd(robot))
+    files = {option: tmp_path / f"file{option}" for option in ("--write-map", "--markdown", "--html")}
+    words = [word for option, file in files.items() for word in (option, str(file))]
+    done = good("same", str(urdf), str(usda), "--boxes", "0", *words)
+    found = urdfkin.same(robot, loaded(usda), boxes=0)
     assert found.up_to_single
     assert found.up_to
     assert "SAME UP TO SINGLE PRECISION" in done.text
-    heading = (
-        f"argest distance over all configurations within limits, after changes of {', '.join(found.up_to)}"
-    )
-    for text in (" ".join(done.text.split()), files["a.md"].read_text(), files["a.html"].read_text()):
+    changes = ", ".join(found.up_to)
+    heading = f"argest distance over all configurations within limits, after changes of {changes}"
+    for text in (" ".join(done.text.split()), files["--markdown"].read_text(), files["--html"].read_text()):
         assert heading in text
-    note = next(line for line in files["map.toml"].read_text().splitlines() if line.startswith("note = "))
-    assert note.endswith(': same up to single precision"')
+    assert re.search(r'^note = .*: same up to single precision"$', files["--write-map"].read_text(), re.M)
     assert str(found.convention().note).endswith(": same up to single precision")
     assert "same up to single precision>" in repr(found)
-    assert "same up to single precision" in command(*words[:3], words[2], "--boxes", "0").text
+    assert "same up to single precision" in good("same", str(urdf), str(usda), str(usda), "--boxes", "0").text
 
 
 def odd(kind: str, more: str) -> urdfkin.Robot:
@@ -1064,9 +991,9 @@ def odd(kind: str, more: str) -> urdfkin.Robot:
     )
 
 
-def test_a_joint_that_never_moves_is_matched_by_its_name_in_usd(write: Write) -> None:
+def test_a_joint_that_never_moves_is_matched_by_its_name_in_usd(converted: Read) -> None:
     named = odd("revolute", urdfs.limit())
-    free = loaded(write(as_usd(named, transcoded)))
+    free = converted(named)
     assert "tn__k0_k3" in [one.name for one in free.tree.joints]
     for robot in (odd("revolute", urdfs.limit() + urdfs.mimic("j.0", 0)), odd("fixed", "")):
         as_named = urdfkin.same(robot, named, boxes=0)
@@ -1101,38 +1028,34 @@ def test_an_error_smaller_than_the_rounding_of_a_long_slide_is_found_at_its_join
     [one] = map(str, found.unexplained)
     assert one == "joint elbow: origin 50.01 µm off, rounding explains at most 14.9 nm"
     done = command("same", "-", str(stage_file), "--boxes", "0", stdin=LONG_SLIDE)
-    assert done.code == 1, done.text + done.err
+    assert done.code == 1, done.err
     assert "joint elbow" in " ".join(done.text.split())
 
 
 @pytest.mark.parametrize("kind", ["a micrometre", "a microradian", "another zero"])
 @pytest.mark.parametrize("name", ["slide", "elbow", "wrist"])
-def test_rounding_never_explains_an_error_above_the_rounding_of_the_joint(
-    write: Write, kind: str, name: str
-) -> None:
+def test_rounding_does_not_explain_a_larger_error_of_a_joint(converted: Read, kind: str, name: str) -> None:
     if (kind, name) == ("another zero", "slide"):
         kind = "a microradian"
     robot = urdfkin.load(LONG_SLIDE)
-    found = urdfkin.same(robot, loaded(write(as_usd(robot, mistake=Mistake(kind, name)))), bounds=False)
+    found = urdfkin.same(robot, converted(robot, kind, name), bounds=False)
     assert not found
     assert [one.place for one in found.unexplained] == [f"joint {name}"]
 
 
-def test_a_joint_frame_at_another_point_of_the_axis_is_the_same_joint(write: Write) -> None:
+def test_a_joint_frame_at_another_point_of_the_axis_is_the_same_joint(converted: Read) -> None:
     robot = urdfkin.load(LONG_SLIDE)
     for name in ("slide", "elbow", "wrist"):
-        stage_text = as_usd(robot, mistake=Mistake("other frames on the axis", name))
-        found = urdfkin.same(robot, loaded(write(stage_text)), boxes=0)
+        other = converted(robot, "other frames on the axis", name)
+        found = urdfkin.same(robot, other, boxes=0)
         assert found.up_to_single, found.unexplained
-        assert not urdfkin.same(loaded(write(stage_text)), robot, bounds=False).unexplained
+        assert not urdfkin.same(other, robot, bounds=False).unexplained
 
 
-def test_rounding_does_not_explain_an_error_of_a_millionth_in_a_mimic_multiplier(write: Write) -> None:
+def test_rounding_does_not_explain_an_error_of_a_millionth_in_a_mimic_multiplier(converted: Read) -> None:
     robot = loaded("panda")
     name = next(one.name for one in robot.tree.joints if one.mimic is not None)
-    found = urdfkin.same(
-        robot, loaded(write(as_usd(robot, mistake=Mistake("a millionth", name)))), bounds=False
-    )
+    found = urdfkin.same(robot, converted(robot, "a millionth", name), bounds=False)
     assert not found
     assert str(found.unexplained[0]).startswith(f"joint {name}: mimic multiplier 1.00000")
 
@@ -1144,8 +1067,8 @@ def test_rounding_does_not_explain_another_pose_of_the_robot_in_the_stage(write:
     assert [str(one) for one in found.unexplained] == ["link rail: base at another place"]
 
 
-def test_a_certificate_up_to_single_precision_is_rechecked(write: Write) -> None:
-    robots = urdfkin.load(LONG_SLIDE), loaded(write(as_usd(urdfkin.load(LONG_SLIDE))))
+def test_a_certificate_up_to_single_precision_is_rechecked(converted: Read) -> None:
+    robots = urdfkin.load(LONG_SLIDE), converted(urdfkin.load(LONG_SLIDE))
     document = certificate(urdfkin.same(*robots, boxes=0))
     assert document["verdict"] == "same up to single precision"
     assert recheck(document, *robots) == []
@@ -1174,10 +1097,9 @@ def with_mimic(robot: urdfkin.Robot) -> urdfkin.Robot:
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ROBOTS)
-def test_each_mistake_of_a_converter_is_detected_and_described(write: Write, name: str) -> None:
+def test_each_mistake_of_a_converter_is_detected_and_described(converted: Read, name: str) -> None:
     robot = loaded(name)
-    for kind, mistake_word in MISTAKES.items():
-        word = mistake_word
+    for kind, word in MISTAKES.items():
         moving = [one for one in robot.tree.joints if one.kind.nq == 1]
         if kind == "mimic dropped":
             robot = with_mimic(robot)
@@ -1190,25 +1112,23 @@ def test_each_mistake_of_a_converter_is_detected_and_described(write: Write, nam
             moving = [one for one in moving if np.linalg.norm(one.T_parent_joint[:3, 3]) > 1e-3]
         assert moving, kind
         spoilt = moving[len(moving) // 2]
-        wrong_stage = loaded(write(as_usd(robot, transcoded, Mistake(kind, spoilt.name))))
-        found = urdfkin.same(robot, wrong_stage, boxes=0)
-        said = [*found.up_to, *codes(wrong_stage)]
+        wrong = converted(robot, kind, spoilt.name)
+        found = urdfkin.same(robot, wrong, boxes=0)
+        said = [*found.up_to, *codes(wrong)]
         said += [one.words for one in (*found.differences, *found.remarks)]
-        if kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > LARGEST_ANGLE:
-            word = ": limits "  # the limits are too large for radians, so only `same` reports the mistake
+        # If the limits are too large for radians, only `same` reports the mistake.
+        wide = kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > LARGEST_ANGLE
         assert not found.up_to_single or kind == "radians", (kind, name)
-        assert any(word in one for one in said), (kind, name, said)
+        assert any((": limits " if wide else word) in one for one in said), (kind, name, said)
         if kind == "radians":
             assert any(one.what == "limits" for one in found.remarks)
 
 
-def test_three_formats_are_compared_in_pairs(
-    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_three_formats_are_compared_in_pairs(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco")
     robot = loaded("planar_two_link")
     write(robot.urdf, "arm.urdf")
-    write(as_usd(robot), "arm.usda")
+    monkeypatch.chdir(write(as_usd(robot), "arm.usda").parent)
     elbow, tip = (robot.placement([0.0, 0.0], name)[:3, 3] for name in ("link_2", "tip"))
     inertia = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
     link = f'<body name="{{0}}" pos="{{1}}">{inertia}<joint name="joint_{{0[5]}}" axis="0 0 1"/>'
@@ -1218,7 +1138,6 @@ def test_three_formats_are_compared_in_pairs(
         + f'<site name="tip" pos="{" ".join(map(repr, (tip - elbow).tolist()))}"/>'
         "</body></body></worldbody></mujoco>", "arm.xml",
     )  # fmt: skip
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")  # a narrow terminal breaks rows into lines
     done = good("same arm.urdf arm.xml arm.usda --boxes 0")
     assert done.text.count("same up to single precision") == 2
@@ -1226,22 +1145,21 @@ def test_three_formats_are_compared_in_pairs(
     assert "more than two robots" in refused("same arm.urdf arm.xml arm.usda --map a=b")
 
 
-def test_diff_with_a_stage_lists_a_mistake_at_its_joint_and_no_rounding(write: Write) -> None:
+def test_diff_with_a_stage_lists_a_mistake_at_its_joint_and_no_rounding(converted: Read) -> None:
     robot = urdfkin.load(LONG_SLIDE.replace("elbow", "elbow-1").replace("forearm", "forearm.1"))
-    plain = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded))))
+    plain = urdfkin.diff(robot, converted(robot))
     assert (plain.changes, plain.total) == ((), None)
     assert plain.rounding is not None
     assert 0.0 < plain.rounding[0] < 1e-3
-    unbounded = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded))), effects=False)
+    unbounded = urdfkin.diff(robot, converted(robot), effects=False)
     assert headline(unbounded) == "nothing changed, apart from rounding to single precision"
     assert as_data(unbounded)["rounding"] == {"metres": None, "radians": None}
-    stage_file = write(as_usd(robot, transcoded, Mistake("a micrometre", "elbow-1")))
-    found = urdfkin.diff(robot, loaded(stage_file))
+    found = urdfkin.diff(robot, converted(robot, "a micrometre", "elbow-1"))
     assert [str(one) for one in found.changes] == ["joint elbow-1: origin 0.997 µm off"]
     assert [one.element for one in found.effects] == ["joint elbow-1"]
     assert 0.9e-6 < found.effects[0].interval.lower < 1.3e-6
     assert found.rounding is None
-    flipped = urdfkin.diff(robot, loaded(write(as_usd(robot, transcoded, Mistake("axis sign", "elbow-1")))))
+    flipped = urdfkin.diff(robot, converted(robot, "axis sign", "elbow-1"))
     assert [str(one) for one in flipped.changes] == ["joint elbow-1: axis turned by 3.142 rad"]
 
 
@@ -1269,9 +1187,8 @@ def test_check_prints_the_position_of_a_finding_in_all_formats(write: Write) -> 
     path = write(stage(IN_RADIANS))
     done = command("check", str(path))
     assert done.code == 0
-    number, line = next(
-        (i, line) for i, line in enumerate(path.read_text().splitlines(), 1) if '"shoulder"' in line
-    )
+    lines = path.read_text().splitlines()
+    number, line = next((i, line) for i, line in enumerate(lines, 1) if '"shoulder"' in line)
     assert f"robot.usda:{number}:1: USD303 warning: prim '/arm/shoulder'" in done.text
     assert f"{number} | {line}" in done.text
     [found] = json.loads(command("check", "--format", "json", str(path)).text)["findings"]
@@ -1301,7 +1218,7 @@ def test_a_finding_has_the_line_of_its_prim_between_comments_strings_and_metadat
         "matrix4d f = ( (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1) )\n"
     )
     data = 'def Scope "notes" (\n customData = {\n string stray = "{"\n dictionary more = {\n}\n}\n) {\n%s}\n'
-    text = stage(LINKS + JOINTS + data % noise + 'def Scope "in" {\n' + body("stray") + "}\n")
+    text = stage(ARM + data % noise + 'def Scope "in" {\n' + body("stray") + "}\n")
     [finding] = [one for one in loaded(write(text)).findings if one.code == "USD202"]
     assert finding.name == "/arm/in/stray"
     lines = text.splitlines()
@@ -1356,7 +1273,7 @@ def beside_a_far_link(error: float) -> tuple[str, str]:
     """Write a URDF whose elbow follows a link 1 km away, and a stage whose elbow does not."""
     mount = urdfs.joint("mount", "fixed", "b", "far", 'xyz="1000 0 0"')
     elbow = urdfs.joint("elbow", "continuous", "far", "tip", 'xyz="-999.7 0.1 0.2"')
-    links = body("base", schemas=ROOT) + body("b") + body("far") + body("tip")
+    links = BASE + body("b") + body("far") + body("tip")
     joints = turn("turn", "base", "b", (0, 0, 0.1)) + turn("elbow", "b", "tip", (0.3 + error, 0.1, 0.2))
     far = joint("mount", "Fixed", "b", "far", localPos0=(1000, 0, 0))
     return urdfs.robot(TURN, mount, elbow), links + joints + far
@@ -1371,22 +1288,20 @@ def after_a_far_joint(error: float) -> tuple[str, str]:
     )
     joints = turn("first", "base", "b", (1000, 0, 0), tuple(FAR_TURN.tolist()))
     joints += turn("second", "b", "tip", (0.3 + error, 0.1, 0.2))
-    return urdf, body("base", schemas=ROOT) + body("b") + body("tip") + joints
+    return urdf, BASE + body("b") + body("tip") + joints
 
 
 def unit_quaternion(noise: float) -> tuple[str, str]:
     """Write a URDF with a rotation by 1e-7 rad, and a stage with the identity instead."""
     urdf = urdfs.robot(urdfs.joint("turn", "continuous", "base", "tip", 'xyz="0 0 0.1" rpy="0 1e-7 0"'))
     joints = turn("turn", "base", "tip", (0, 0, 0.1), (1, 0, 0, noise))
-    return urdf, body("base", schemas=ROOT) + body("tip") + joints
+    return urdf, BASE + body("tip") + joints
 
 
 def far_tool(written: str) -> tuple[str, str]:
     """Write a URDF and a stage whose tool, 1 km away, is displaced by 20 micrometres."""
-    place = (
-        f'{written} xformOp:translate = (1000, 2e-5, 0)\nuniform token[] xformOpOrder = ["xformOp:translate"]'
-    )
-    links = body("base", schemas=ROOT) + body("b", inside=f'def Xform "tool" {{ {place}\n}}')
+    place = moved((written, "translate", (1000, 2e-5, 0)))
+    links = BASE + body("b", inside=f'def Xform "tool" {{ {place}}}')
     mount = urdfs.joint("mount", "fixed", "b", "tool", 'xyz="1000 0 0"')
     return urdfs.robot(TURN, mount), links + turn("turn", "base", "b", (0, 0, 0.1))
 
@@ -1409,79 +1324,64 @@ ROUNDED = {
 def test_only_the_rounding_of_a_number_explains_a_difference_in_either_order_of_the_models(
     read: Read, models: tuple[str, str], explained: bool
 ) -> None:
-    a, b = loaded(models[0]), read(models[1])
-    assert [urdfkin.same(*two, bounds=False).up_to_single for two in ((a, b), (b, a))] == [explained] * 2
+    found = in_both_orders(loaded(models[0]), read(models[1]))
+    assert [one.up_to_single for one in found] == [explained] * 2
 
 
 @pytest.mark.parametrize("lock", [{"slide": 0.3}, {"elbow": 0.7}, {"slide": -0.2, "wrist": 1.1}])
-def test_locked_joints_may_differ_only_by_the_rounding_of_their_numbers(
-    write: Write, lock: dict[str, float]
-) -> None:
+def test_locked_joints_may_differ_only_by_rounding(converted: Read, lock: dict[str, float]) -> None:
     text = LONG_SLIDE.replace("1000", "1")
-    robot = urdfkin.load(text, lock=lock)
-    rounded = loaded(write(as_usd(urdfkin.load(text))), lock=lock)
-    for a, b in ((robot, rounded), (rounded, robot)):
-        found = urdfkin.same(a, b, bounds=False)
+    robot, free = urdfkin.load(text, lock=lock), urdfkin.load(text)
+    rounded = converted(free, lock=lock)
+    for found in in_both_orders(robot, rounded):
         assert found.up_to_single, found.unexplained
     for name in ("slide", "elbow", "wrist"):
-        wrong_stage = as_usd(urdfkin.load(text), mistake=Mistake("a micrometre", name))
-        found = urdfkin.same(robot, loaded(write(wrong_stage), lock=lock), bounds=False)
+        found = urdfkin.same(robot, converted(free, "a micrometre", name, lock=lock), bounds=False)
         assert not found.up_to_single
         assert found.unexplained
 
 
-def free_base(kind: str, place: Sequence[float]) -> tuple[str, str]:
-    """Write a robot with a free base as a URDF and as a stage; `place` is the origin of the free joint."""
+def free_base(kind: str, height: float) -> tuple[str, str]:
+    """Write a robot with a free base as a URDF and as a stage; `height` is that of the free joint."""
     urdf = urdfs.robot(
-        urdfs.joint("free", kind, "world", "base", f'xyz="{place[0]} {place[1]} {place[2]}"', ""),
+        urdfs.joint("free", kind, "world", "base", f'xyz="0 0 {height}"', ""),
         urdfs.joint("j", "continuous", "base", "tip", 'xyz="0.1 0.2 0.3"'),
         name="arm",
     )
     shut = ("transZ", "rotX", "rotY") if kind == "planar" else ()
-    words = [f"float limit:{name}:physics:low = 1\nfloat limit:{name}:physics:high = -1\n" for name in shut]
-    schemas = ", ".join(f'"PhysicsLimitAPI:{name}"' for name in shut)
-    free = joint("free", "", "", "base", "".join(words), schemas, localPos0=tuple(place))
+    free = joint("free", "", "", "base", locks(shut), limit_schemas(shut), localPos0=(0, 0, height))
     hinge = turn("j", "base", "tip", (0.1, 0.2, 0.3))
-    return urdf, stage(body("base", schemas=ROOT) + body("tip") + hinge + free)
+    return urdf, stage(BASE + body("tip") + hinge + free)
 
 
 @pytest.mark.parametrize(("kind", "height"), [("floating", 0.0), ("planar", 0.5)])
-def test_a_free_base_must_have_the_same_frame_and_the_joints_after_it_may_be_rounded(
-    write: Write, kind: str, height: float
-) -> None:
-    urdf, text = free_base(kind, (0.0, 0.0, height))
-    for models in ((loaded(urdf), loaded(write(text))), (loaded(write(text)), loaded(urdf))):
-        found = urdfkin.same(*models, bounds=False)
+def test_only_the_joints_after_a_free_base_may_be_rounded(write: Write, kind: str, height: float) -> None:
+    urdf, text = free_base(kind, height)
+    for found in in_both_orders(loaded(urdf), loaded(write(text))):
         assert found.up_to_single, found.unexplained
     wrong_hinge = text.replace("(0.1, 0.2, 0.3)", "(0.100001, 0.2, 0.3)")
     found = urdfkin.same(loaded(urdf), loaded(write(wrong_hinge)), bounds=False)
     assert [one.place for one in found.unexplained] == ["joint j"]
     if kind == "planar":  # 0.1 in single precision is 1.5e-9 from 0.1
-        urdf, text = free_base(kind, (0.0, 0.0, 0.1))
+        urdf, text = free_base(kind, 0.1)
         found = urdfkin.same(loaded(urdf), loaded(write(text)), bounds=False)
         words = "link base: follows a planar or floating joint with a different frame"
         assert [str(one) for one in found.unexplained] == [words]
 
 
 @pytest.mark.parametrize("name", ["panda", "so101", "allegro_left_hand"])
-def test_two_rounded_stages_of_a_robot_are_the_same_up_to_the_roundings_of_both(
-    write: Write, name: str
-) -> None:
-    first = loaded(write(as_usd(loaded(name), transcoded)))
+def test_two_rounded_stages_are_the_same_up_to_the_roundings_of_both(converted: Read, name: str) -> None:
+    first = converted(loaded(name))
     moving = [one.name for one in first.tree.joints if one.kind.nq == 1]
-    elsewhere = Mistake("other frames on the axis", moving[len(moving) // 2])
-    second = loaded(write(as_usd(first, transcoded, elsewhere), "second.usda"))
-    for a, b in ((first, second), (second, first)):
-        found = urdfkin.same(a, b, bounds=False)
+    where = moving[len(moving) // 2]
+    second = converted(first, "other frames on the axis", where)
+    for found in in_both_orders(first, second):
         assert found.up_to_single, found.unexplained
         assert found.single is not None
         alone = [one.single.links.max(axis=0) for one in (first, second) if one.single is not None]
         assert max(alone[0][0], alone[1][0]) < found.single[0] <= (alone[0][0] + alone[1][0]) * 1.0001
-    mistake = Mistake("a micrometre", elsewhere.joint)
-    third = loaded(write(as_usd(first, transcoded, mistake), "third.usda"))
-    for a, b in ((first, third), (third, first)):
-        found = urdfkin.same(a, b, bounds=False)
-        assert [one.place for one in found.unexplained] == [f"joint {mistake.joint}"]
+    for found in in_both_orders(first, converted(first, "a micrometre", where)):
+        assert [one.place for one in found.unexplained] == [f"joint {where}"]
 
 
 def _angle_between(T: Any, U: Any) -> float:

@@ -1,6 +1,7 @@
 """The expansion of xacro files without ROS, with arguments, packages and errors."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -36,18 +37,15 @@ TOOL = f"""<robot {NAMESPACE}><xacro:macro name="tool" params="parent">
 </xacro:macro></robot>"""
 
 
-def write(path: Path, text: str) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text)
-    return path
+Write = Callable[..., Path]
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Path:
-    write(tmp_path / "ws" / "tools" / "urdf" / "tool.xacro", TOOL)
-    write(tmp_path / "ws" / "tools" / "package.xml", "<package><name>tools</name></package>")
-    write(tmp_path / "ws" / "my_arm" / "urdf" / "part.xacro", PART)
-    return write(tmp_path / "ws" / "my_arm" / "urdf" / "arm.urdf.xacro", ARM)
+def arm(write: Write) -> Path:
+    write(TOOL, "ws/tools/urdf/tool.xacro")
+    write("<package><name>tools</name></package>", "ws/tools/package.xml")
+    write(PART, "ws/my_arm/urdf/part.xacro")
+    return write(ARM, "ws/my_arm/urdf/arm.urdf.xacro")
 
 
 def test_a_xacro_file_is_loaded_with_its_arguments(arm: Path) -> None:
@@ -58,9 +56,7 @@ def test_a_xacro_file_is_loaded_with_its_arguments(arm: Path) -> None:
         assert robot.certificate().verified
 
 
-def test_the_expansion_does_not_change_the_working_directory(
-    arm: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_expansion_stays_in_the_working_directory(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(arm.parents[1])
     assert b'name="tool"' in expand(Path("urdf/arm.urdf.xacro"), {})
     assert Path.cwd() == arm.parents[1]
@@ -76,7 +72,7 @@ def test_the_command_and_the_call_that_load_a_robot_again_contain_the_arguments(
 
 
 def test_findings_refer_to_the_expanded_text(arm: Path) -> None:
-    write(arm.parent / "part.xacro", PART.replace("continuous", "hinge"))
+    arm.with_name("part.xacro").write_text(PART.replace("continuous", "hinge"))
     (finding,) = urdfkin.check(arm)
     assert (finding.code, finding.file) == ("URDF501", f"{arm} (expanded)")
 
@@ -91,26 +87,22 @@ def test_findings_refer_to_the_expanded_text(arm: Path) -> None:
         ("<link", "not well-formed|unclosed|invalid"),
     ],
 )
-def test_a_file_that_cannot_be_expanded_is_an_error_with_the_reason(
-    tmp_path: Path, text: str, reason: str
-) -> None:
-    path = write(tmp_path / "r.xacro", f'<robot name="r" {NAMESPACE}>{text}</robot>')
+def test_a_failed_expansion_is_an_error_with_the_reason(write: Write, text: str, reason: str) -> None:
+    path = write(f'<robot name="r" {NAMESPACE}>{text}</robot>', "r.xacro")
     with pytest.raises(XacroError, match=f"(?s)cannot expand the file: found .*({reason})"):
         urdfkin.load(path)
 
 
-def test_an_endless_expansion_ends_with_an_error(tmp_path: Path) -> None:
+def test_an_endless_expansion_ends_with_an_error(write: Write) -> None:
     endless = '<xacro:property name="x" value="${9**9**9**9}"/><link name="${x}"/>'
-    path = write(tmp_path / "r.xacro", f'<robot name="r" {NAMESPACE}>{endless}</robot>')
+    path = write(f'<robot name="r" {NAMESPACE}>{endless}</robot>', "r.xacro")
     with pytest.raises(XacroError, match="did not finish"):
         expand(path, {}, patience=3.0)
 
 
-def test_mistakes_with_xacro_are_errors_with_a_remedy(
-    arm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_mistakes_with_xacro_are_errors_with_a_remedy(arm: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SourceError, match="no such file"):
-        urdfkin.load(tmp_path / "r.xacro")
+        urdfkin.load(arm.with_name("r.xacro"))
     with pytest.raises(InputError, match="xacro_args"):
         read_source("panda", xacro_args={"n": 1})
     with pytest.raises(urdfkin.UrdfError, match="expand the file first"):
@@ -151,10 +143,9 @@ def test_packages_are_searched_in_the_documented_order(tmp_path: Path) -> None:
 
 
 def test_a_package_is_also_found_by_its_search_path_or_its_manifest_but_not_by_an_invalid_name(
-    tmp_path: Path,
+    write: Write, tmp_path: Path
 ) -> None:
-    clone = tmp_path / "clone-main"
-    write(clone / "package.xml", "<package><name> my_arm </name></package>")
+    clone = write("<package><name> my_arm </name></package>", "clone-main/package.xml").parent
     (tmp_path / "pkg").mkdir()
     assert find_package("pkg", None, {"ROS_PACKAGE_PATH": str(tmp_path / "pkg")}) == tmp_path / "pkg"
     assert find_package("my_arm", clone / "urdf" / "a.urdf", {}) == clone

@@ -22,24 +22,24 @@ from tests.urdfs import joint, robot
 from urdfkin.system.files import Edit
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import WRITTEN_OUT, Fix
-from urdfkin.urdf.lint import Finding, Severity
+from urdfkin.urdf.lint import Severity
 from urdfkin.urdf.lint.autofix import TILT, Mended, differences, mend
 from urdfkin.urdf.lint.rules.joints import unit_vector
 from urdfkin.urdf.lint.runner import Examined, examine
 from urdfkin.urdf.sources import Text, read_source
 
 
-def all_of() -> Callable[[Finding], bool]:
-    return lambda _: True
+def mended(data: bytes | str, look: Callable[[Text], Examined] = examine) -> Mended:
+    """Apply the fixes of all findings."""
+    return mend(text_of(data), look, lambda: lambda _: True)
 
 
-def mended(data: bytes | str) -> Mended:
-    raw = data.encode() if isinstance(data, str) else data
-    return mend(Text(raw, "<bytes>", "<bytes>"), examine, all_of)
+def text_of(data: bytes | str) -> Text:
+    return Text(data.encode() if isinstance(data, str) else data, "<bytes>", "<bytes>")
 
 
 def codes(data: bytes) -> list[str]:
-    return [finding.code for finding in examine(Text(data, "<bytes>", "<bytes>")).findings]
+    return [finding.code for finding in examine(text_of(data)).findings]
 
 
 SLOPPY = """<?xml version="1.0"?>\r
@@ -78,7 +78,7 @@ def test_a_fix_changes_only_the_bytes_of_its_finding() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_fixed_findings_of_an_unusual_document_disappear_and_no_new_findings_appear(case: Case) -> None:
-    before, done = examine(Text(case.data, "<bytes>", "<bytes>")), mended(case.data)
+    before, done = examine(text_of(case.data)), mended(case.data)
     after = examine(done.text)
     assert len(after.findings) == len(before.findings) - len(done.fixed)
     if any(finding.severity is Severity.ERROR for finding in before.findings):
@@ -134,7 +134,7 @@ def test_a_fix_that_would_change_the_robot_is_not_applied(damage: bytes, objecti
         findings = (dataclasses.replace(f, fix=wrong.get(f.code, f.fix)) for f in found.findings)
         return dataclasses.replace(found, findings=tuple(findings))
 
-    done = mend(Text(text.encode(), "<bytes>", "<bytes>"), look, all_of)
+    done = mended(text, look)
     assert done.text.data == text.encode()
     assert done.fixed == ()
     objections = (objection, "URDF503 would remain after the fix", "the fix would cause")

@@ -1,13 +1,23 @@
-"""Odd documents have the expected verdict, and findings with the expected place and text."""
+"""Odd documents have the expected findings: URDFs, MJCF and USD files, limits, any bytes, large files."""
 
 import re
+import time
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
+import pinocchio as pin
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.urdf.lint.cases import CASES
-from tests.urdf.lint.cases.arm import Case
-from urdfkin.urdf.lint import Finding, Severity, check
+import urdfkin
+from tests import urdfs
+from tests.urdf.lint.cases import CASES, left_out
+from tests.urdf.lint.cases.arm import Case, arm
+from urdfkin.urdf.lint import Finding, Limits, Severity, check, check_text
+from urdfkin.urdf.lint.pages import OF_OTHERS, explain, page
+from urdfkin.urdf.records import FURTHER_LIMITS
 
 SNAPSHOT = Path(__file__).with_name("messages.txt")
 
@@ -44,6 +54,206 @@ def test_the_messages_of_findings_equal_the_stored_snapshot() -> None:
     assert messages() == SNAPSHOT.read_text("utf-8"), (
         "messages changed: read the changes, then run python -m tests.urdf.lint.test_cases to accept them"
     )
+
+
+# -- parts of MJCF and USD files ---------------------------------------------------------------------------
+
+OF_MJCF = [code for code in OF_OTHERS if code.startswith("MJCF")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("code", OF_OTHERS)
+def test_only_the_bad_example_on_a_page_about_mjcf_or_usd_has_the_finding(code: str, tmp_path: Path) -> None:
+    of_mjcf, rule = code in OF_MJCF, OF_OTHERS[code]
+    pytest.importorskip("mujoco" if of_mjcf else "pxr")
+    found = []
+    for text in (page(code).example, page(code).cure):
+        file = tmp_path / ("robot.xml" if of_mjcf else "robot.usda")
+        file.write_text(text.lstrip())
+        findings = urdfs.loaded(file, verify=False).findings
+        codes = {code} if of_mjcf else OF_OTHERS.keys()
+        found.append({(one.code, one.severity) for one in findings if one.code in codes})
+    assert found == [{(code, rule.severity)}, set()]
+    assert explain(rule).startswith(f"{code} {rule.slug} ({rule.severity.value})")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", left_out.CASES, ids=lambda case: case.name)
+def test_each_mjcf_case_has_exactly_the_expected_findings_and_warnings(case: left_out.Mjcf) -> None:
+    pytest.importorskip("mujoco")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        robot = urdfkin.load(case.text, verify=False)
+    found = []
+    for one in robot.findings:
+        place = " ".join(filter(None, (one.element, one.name)))
+        if one.code in OF_MJCF:
+            found.append((one.code, f"{place}: {one.message}" if place else one.message))
+    assert sorted(found) == sorted(case.findings)
+    assert sum("MJCF101" in str(w.message) for w in caught) == [code for code, _ in found].count("MJCF101")
+
+
+def test_every_rule_about_mjcf_has_cases_with_and_without_the_finding() -> None:
+    for code in OF_MJCF:
+        assert {any(code == one for one, _ in case.findings) for case in left_out.CASES} == {True, False}
+
+
+# -- limits in each version of URDF ------------------------------------------------------------------------
+
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
+VERSIONS = ("1.0", "1.1", "1.2")
+USUAL = {"lower": "-1", "upper": "1", "effort": "10", "velocity": "5"}
+#: Values of an attribute: negative, infinite, no number, and valid.
+ODD = ("-1", "inf", "-inf", "nan", "", "fast", "1e400", "0x10", "1 ", "0", "-0", "+1", "1e-400")
+
+
+def limits() -> Iterator[dict[str, str]]:
+    """Yield limits with an odd attribute, with missing attributes, or with a lower limit above the upper."""
+    for name in (*USUAL, *FURTHER_LIMITS):
+        yield from ({**USUAL, name: value} for value in ODD)
+    for subset in range(16):
+        yield {name: value for i, (name, value) in enumerate(USUAL.items()) if subset >> i & 1}
+    yield {**USUAL, "lower": "2"}
+    yield {"lower": "2", "upper": "1"}
+    yield {"lower": "2", "effort": "1", "velocity": "1"}
+
+
+def joint_with(limit: dict[str, str], kind: str, version: str) -> str:
+    axis = '<axis xyz="0 0 1"/>' if kind in KINDS[:3] else ""
+    words = " ".join(f'{name}="{value}"' for name, value in limit.items())
+    robot = f'name="r" version="{version}"'
+    return arm(robot=robot, attributes=f'type="{kind}"', axis=axis, limit=f"<limit {words}/>")
+
+
+def pinocchio_reads(text: str) -> bool:
+    try:
+        pin.buildModelFromXML(text)
+    except ValueError:
+        return False
+    return True
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_limit_has_an_error_or_a_mark_exactly_if_pinocchio_refuses_it(kind: str, version: str) -> None:
+    for limit in limits():
+        text = joint_with(limit, kind, version)
+        findings = check(text.encode())
+        marked = any(finding.oracle is not None for finding in findings)
+        refused = any(finding.severity is Severity.ERROR for finding in findings)
+        right = not marked if pinocchio_reads(text) else marked or refused
+        assert right, (limit, [str(finding) for finding in findings])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FURTHER_LIMITS)
+@pytest.mark.parametrize("value", ["-1", "inf", "nan", "", "fast"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_limits_of_urdf_1_2_are_checked_only_in_version_1_2(kind: str, value: str, name: str) -> None:
+    codes = {
+        version: {f.code for f in check(joint_with({**USUAL, name: value}, kind, version).encode())}
+        for version in VERSIONS
+    }
+    code = "URDF509" if value == "-1" else "URDF301"
+    assert [version for version in VERSIONS if code in codes[version]] == ["1.2"], codes
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_lower_limit_above_the_upper_is_an_error_on_every_joint_in_version_1_2(kind: str) -> None:
+    text = joint_with({**USUAL, "lower": "2"}, kind, "1.2")
+    assert "URDF507" in [finding.code for finding in check(text.encode())]
+    assert not pinocchio_reads(text)
+
+
+# -- any bytes ---------------------------------------------------------------------------------------------
+
+DOCUMENTS = [case.data for case in CASES if len(case.data) < 5_000]
+
+#: Words and characters with a meaning in XML or in a URDF.
+TOKENS = [
+    *(b"<joint ", b"</joint>", b"<link name='", b"/>", b">", b"'", b'"', b"&", b"&#9;", b"<!--", b"-->"),
+    *(b"<![CDATA[", b"]]>", b"<!DOCTYPE robot [", b"nan", b"1e400", b"${x}", b"\xff", b"\0", b"\xef\xbb\xbf"),
+    *(b"mimic", b"xyz", b"xmlns='a'", b"version='1.1'", b"quat_xyzw='0 0 0 1'", b"type='planar'", b"base"),
+    *(b"l1", b"\t", b"\r\n"),
+]
+
+
+@given(st.binary(max_size=400), st.lists(st.sampled_from(TOKENS), max_size=40))
+def test_the_check_of_any_bytes_and_tokens_raises_no_exception(data: bytes, tokens: list[bytes]) -> None:
+    check_text(data)
+    check_text(b"<robot name='r'>" + b" ".join(tokens))
+
+
+@given(st.sampled_from(DOCUMENTS), st.data())
+def test_a_changed_document_always_has_the_same_findings(document: bytes, data: st.DataObject) -> None:
+    start = data.draw(st.integers(0, len(document)))
+    length = data.draw(st.integers(0, 40))
+    mutant = document[:start] + data.draw(st.sampled_from([*TOKENS, b""])) + document[start + length :]
+    findings = check_text(mutant)
+    assert list(findings) == sorted(findings, key=lambda finding: (finding.line, finding.column))
+    assert findings == check_text(mutant)
+
+
+# -- large files -------------------------------------------------------------------------------------------
+
+MANY = 50_000
+
+
+def chain(back: str = "", mimic: bool = False) -> bytes:
+    """Write a chain of many joints, with each link and each joint on its own line."""
+    follow = ["", *(urdfs.mimic(f"j{i}") * mimic for i in range(MANY - 1))]
+    text = urdfs.chain(follow, origin="", axis="").replace("<joint", "\n<joint").replace("<link", "\n<link")
+    return text.replace("</robot>", f"{back}</robot>").encode()
+
+
+def timed(data: bytes, seconds: float = 20.0) -> tuple[Finding, ...]:
+    start = time.process_time()
+    findings = check_text(data)
+    assert time.process_time() - start < seconds
+    return findings
+
+
+@pytest.mark.long
+def test_a_chain_of_50000_links_has_no_finding_and_a_loop_has_one_error_on_its_line() -> None:
+    assert timed(chain()) == ()
+    back = urdfs.joint("back", "fixed", f"l{MANY}", "l0", axis="")
+    (finding,) = timed(chain("\n" + back))
+    assert (finding.code, finding.line) == ("URDF412", 2 * MANY + 3)
+    codes = {finding.code for finding in timed(chain(mimic=True))}
+    assert codes == {"URDF524", "URDF525"}
+
+
+@pytest.mark.long
+def test_suggestions_for_5000_unknown_links_take_a_limited_time() -> None:
+    joints = "".join(urdfs.joint(f"j{i}", "fixed", f"x{i}", f"l{i}", axis="") for i in range(5_000))
+    links = "".join(f'<link name="l{i}"/>' for i in range(5_000))
+    findings = timed(f'<robot name="r">{links}{joints}</robot>'.encode())
+    assert sum(finding.count for finding in findings) == 5_000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("limits", "code"),
+    [
+        (Limits(bytes=10), "URDF108"), (Limits(elements=1), "URDF114"), (Limits(depth=1), "URDF115"),
+        (Limits(attributes=0), "URDF116"), (Limits(name=2), "URDF117"),
+    ],
+)  # fmt: skip
+def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: Limits, code: str) -> None:
+    (finding,) = check_text(b'<robot name="r"><link name="a"/></robot>', limits=limits)
+    assert finding.code == code
+    assert "--max-" in str(finding.remedy)
+
+
+@pytest.mark.long
+def test_a_number_that_is_too_long_is_an_error_only_if_kinematics_uses_the_number() -> None:
+    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0 0 {}"/></joint>'
+    mass = '<inertial><mass value="{}"/></inertial>'
+    text = '<robot name="r"><link name="a">{}</link><link name="b"/>' + joint + "</robot>"
+    for inside, origin, severity in (("", "1" * 9, "error"), (mass.format("1" * 9), "1", "warning")):
+        findings = check_text(text.format(inside, origin).encode(), limits=Limits(number=8))
+        assert ("URDF305", severity) in [(f.code, f.severity.value) for f in findings]
 
 
 if __name__ == "__main__":

@@ -12,8 +12,8 @@ import pytest
 
 import urdfkin
 from scripts import make_pages
+from tests import urdfs
 from tests.urdf.lint.cases.arm import arm
-from tests.urdf.lint.examples import document
 from tests.urdf.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.catalogue import catalogue
@@ -32,6 +32,15 @@ _LIMITS = {
     "too-many-elements": Limits(elements=10),
     "markup-too-long": Limits(markup=100),
 }
+
+
+def document(example: str) -> str:
+    """Return an example as a whole URDF; see `urdfkin.urdf.lint.pages.Page`."""
+    text = example.strip("\n")
+    if not text.startswith(("<joint", "<link", "<material", "<!--")):
+        return example
+    links = '<link name="base"/>\n<link name="tip"/>\n' if text.startswith(("<joint", "<!--")) else ""
+    return f'<robot name="example">\n{links}{text}\n</robot>\n'
 
 
 def findings_of(rule: Rule, example: str) -> list[Finding]:
@@ -168,9 +177,6 @@ def test_the_nearest_comment_silences_a_finding_and_all_other_comments_are_unuse
 
 @pytest.mark.slow
 def test_findings_beyond_the_number_of_stored_ones_are_also_silenced() -> None:
-    links = '<link name="a"/>' + "<link name='b'/>"
-    joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/>{}</joint>'
-    many = "<odd/>" * (WRITTEN_OUT + 5)
-    text = f"<robot name='r'>{links}{joint.format(many)}</robot>"
+    text = urdfs.robot(urdfs.joint("j", "fixed", "a", "b", axis="", more="<odd/>" * (WRITTEN_OUT + 5)))
     assert len(check(text)) == WRITTEN_OUT
     assert check(COMMENT.format("URDF207") + text) == []

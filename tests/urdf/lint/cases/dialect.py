@@ -3,14 +3,9 @@
 from tests.urdf.lint.cases.arm import ACCEPT, LIMIT, MESH, REJECT, SPHERE, WARN, Case, arm, axis, fixed
 
 _INCLUDE = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/passwd"/>'
-
 _XACRO = 'name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"'
-
 _SAID = "<!-- urdfkin: ignore[{}] as drawn -->"
-
 _LONG = '<axis xyz="0 0 2"/>'
-
-
 _CP1252 = '<?xml version="1.0" encoding="cp1252"?>\n'
 
 

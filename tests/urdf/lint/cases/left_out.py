@@ -9,17 +9,10 @@ class Mjcf:
         self.findings = [tuple(one.split(" ", 1)) for one in findings]
 
 
-_LIMITED = 'limited="true" range="-1 1"'
+_SLIDE = 'type="slide" limited="true" range="-1 1"'
 
 
-def _two(
-    *,
-    joint: str = f'type="slide" {_LIMITED}',
-    inside: str = "",
-    body: str = "",
-    world: str = "",
-    more: str = "",
-) -> str:
+def _two(*, joint: str = _SLIDE, inside: str = "", body: str = "", world: str = "", more: str = "") -> str:
     """Write two bodies in the world, each with one joint, and an additional part."""
     mass = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
     return f"""<mujoco>
@@ -45,7 +38,6 @@ _USELESS = "kinematics does not use "
 _SPATIAL = '<tendon><spatial name="t"><site site="s"/><site site="r"/></spatial></tendon>'
 
 _MOTOR = '<actuator><motor joint="a"/></actuator>'
-
 CASES = [
     Mjcf("nothing", _two()),
     Mjcf("a-line-between-two-joints", _held('<joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/>')),
@@ -100,8 +92,7 @@ CASES = [
         _hinge("-5 5", inside='<joint name="c" limited="true" range="-90 0"/>'),
     ),
     Mjcf(
-        "a-free-body-that-stands-elsewhere",
-        _two(joint='type="free"', body='pos="0 0 1"'),
+        "a-free-body-that-stands-elsewhere", _two(joint='type="free"', body='pos="0 0 1"'),
         "MJCF102 joint b: qpos0 places this body at (0, 0, 1); in the neutral configuration the body is"
         " at the origin",
     ),

@@ -3,12 +3,11 @@
 from tests.urdf.lint.cases.arm import ACCEPT, REJECT, WARN, Case, arm, axis, bounds, follows, limit, xyz
 
 _PLAIN = arm()
-
+_UTF16 = _PLAIN.replace("<?xml", '<?xml encoding="UTF-16"').encode("utf-16")
+_NEW = 'name="r" version="1.2"'
 #: An external DTD, or an entity that reads a file.
 _DEFAULT = '<!DOCTYPE robot [<!ATTLIST origin xyz CDATA "9 9 9">]>'
 _ENTITY = '<!DOCTYPE r [<!ENTITY % p SYSTEM "file:///etc/passwd">%p;]>'
-
-_UTF16 = _PLAIN.replace("<?xml", '<?xml encoding="UTF-16"').encode("utf-16")
 
 _BAD = {
     "infinity": "inf 0 0", "negative-infinity": "-Infinity 0 0", "overflow": "1e400 0 0",
@@ -18,8 +17,6 @@ _BAD = {
     "unicode-minus": "\u22121 0 0", "no-break-space": "0\u00a00 1", "unit": "100mm 0 0",
     "hex-float": "0x1p-3 0 0",
 }  # fmt: skip
-
-_NEW = 'name="r" version="1.2"'
 
 
 def origin(attributes: str, version: str = "1.0") -> str:

@@ -1,0 +1,19 @@
+"""A fixture that writes files of robots."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    """Write a text into a file with this name, in a folder of the test; return the path of the file."""
+
+    def of(text: str, name: str = "robot.usda") -> Path:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, "utf-8")
+        return path
+
+    return of
