@@ -58,16 +58,7 @@ def test_a_written_table_is_read_exactly(tree: KinematicTree, convention: str, f
     np.testing.assert_array_equal(again.tool, table.tool)
 
 
-def test_an_invalid_or_missing_file_is_named_in_the_error(tmp_path: Path) -> None:
-    bad = 'convention = "standard"\nrows = [["x", 0, 0, 0]]'
-    for name, text, message in (
-        ("broken.toml", "rows = [", "broken.toml: not valid TOML"),
-        ("arm.xls", "", "must have the suffix .toml, .json, .csv, .tsv"),
-        ("bad.toml", bad, "bad.toml, row 1, a: this is not a number"),
-    ):
-        (tmp_path / name).write_text(text)
-        with pytest.raises(InputError, match=message):
-            read_table(tmp_path / name)
+def test_a_missing_file_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="cannot be read"):
         read_table(tmp_path / "missing.toml")
 
@@ -394,9 +385,26 @@ def test_an_error_in_a_table_is_reported_with_position_and_reason(
     assert re.search(message, refused(tmp_path, of_rows(rows, keys)))
 
 
-def test_a_null_robot_name_is_an_error_and_a_csv_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
-    text = json.dumps({"convention": "standard", "robot": None, "rows": [[0.1, 0, 0, 0]]})
-    assert "robot: a name must be text: found None" in refused(tmp_path, text, ".json")
+NULL = '{"convention": "standard", "robot": null, "rows": [[0.1, 0, 0, 0]]}'
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix", "message"),
+    [
+        ("rows = [", ".toml", ": not valid TOML"),
+        ("", ".xls", "must have the suffix .toml, .json, .csv, .tsv"),
+        (NULL, ".json", "robot: a name must be text: found None"),
+        pytest.param("[" * 200_000, ".json", ": not valid", id="deep JSON"),
+        pytest.param(f"rows = {'[' * 20_000}", ".toml", ": not valid", id="deep TOML"),
+    ],
+)
+def test_an_error_in_a_file_is_reported_with_the_name_of_the_file(
+    text: str, suffix: str, message: str, tmp_path: Path
+) -> None:
+    assert message in refused(tmp_path, text, suffix)
+
+
+def test_a_csv_file_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
     file = tmp_path / "sheet.csv"
     file.write_bytes(b"\xef\xbb\xbf# convention: standard\r\na,alpha,d,theta\r\n0.1,pi/2,0,0\r\n,,,\r\n")
     assert read_table(file).rows[0].cells == (0.1, math.pi / 2, 0.0, 0.0, 0.0)
@@ -550,12 +558,6 @@ def test_any_text_gives_a_table_or_an_error_of_urdfkin(text: str, suffix: str) -
     for head in ("", "# convention: standard\na,alpha,d,theta\n", 'convention = "standard"\n'):
         with contextlib.suppress(UrdfkinError):
             table_from_text(head + text, suffix)
-
-
-def test_extremely_deep_nesting_gives_an_error_of_urdfkin() -> None:
-    for suffix, text in ((".json", "[" * 200_000), (".toml", f"rows = {'[' * 20_000}")):
-        with pytest.raises(InputError, match="not valid"):
-            table_from_text(text, suffix)
 
 
 def test_the_last_digits_of_every_shipped_reference_table_are_read() -> None:
