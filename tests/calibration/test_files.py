@@ -1,7 +1,5 @@
 """Files of a calibration: measured poses, the factory calibration of a Universal Robots arm, the new URDF."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

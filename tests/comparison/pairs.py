@@ -1,7 +1,5 @@
 """Changes of a robot; for each change it is known whether the changed robot is still the same robot."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace

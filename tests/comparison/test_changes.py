@@ -1,7 +1,5 @@
 """`diff`: the changes between two versions of a robot, and the effect of each change."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

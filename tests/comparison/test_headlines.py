@@ -1,7 +1,5 @@
 """The headline, the exit code and the page of `same` answer the user's question."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from importlib.metadata import version

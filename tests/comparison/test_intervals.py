@@ -1,7 +1,5 @@
 """The interval of the largest distance contains the largest distance, and is narrow."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

@@ -3,8 +3,6 @@
 `python scripts/check_same.py` tries all changes on all robots; the tests try one change for each robot.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from itertools import permutations

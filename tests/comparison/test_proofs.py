@@ -1,7 +1,5 @@
 """The proofs of `same` hold for random pairs of arms, and forged certificates are rejected."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable

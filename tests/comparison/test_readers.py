@@ -1,7 +1,5 @@
 """How other libraries read a file: the element that causes a difference is named."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

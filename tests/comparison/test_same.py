@@ -1,7 +1,5 @@
 """`same`: verdicts, changes of B, remarks and certificates."""
 
-from __future__ import annotations
-
 import copy
 import json
 import time
@@ -234,8 +232,7 @@ def test_a_written_certificate_passes_the_recheck(compared: tuple[Robot, Robot, 
 
 
 @pytest.mark.parametrize(
-    ("name", "what"),
-    [("elbow", None), pytest.param("panda", "all of it", marks=pytest.mark.slow)],
+    ("name", "what"), [("elbow", None), pytest.param("panda", "all of it", marks=pytest.mark.slow)]
 )
 def test_a_certificate_of_a_robot_and_a_modified_copy_passes_the_recheck(name: str, what: str | None) -> None:
     a = robot(name)

@@ -1,7 +1,5 @@
 """Small serial robots for tests of tables, and the comparison of a table's poses with other poses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Conversions between conventions, trees, URDFs and tables do not change the placement."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A derived table has the poses of its chain for every geometry, and the cells that a person would write."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import math
@@ -48,9 +46,7 @@ def demand_short(table: DHTable, path: FrameChain) -> None:
 
 @pytest.mark.slow
 @given(
-    trees(),
-    st.booleans(),
-    *map(st.sampled_from, (CONVENTIONS, ("tip", "flange"), ("last", "first", "each"))),
+    trees(), st.booleans(), *map(st.sampled_from, (CONVENTIONS, ("tip", "flange"), ("last", "first", "each")))
 )
 @settings(max_examples=700)
 def test_the_tables_of_random_chains_are_exact_and_short(

@@ -1,7 +1,5 @@
 """Exported code runs and agrees with Pinocchio; exported text and drawings show the table."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import xml.etree.ElementTree as ET

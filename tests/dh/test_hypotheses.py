@@ -1,7 +1,5 @@
 """For a misread table, the fitting interpretation is reported; for a table of another robot, none is."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Tables are read from common file formats, and the error for a wrong file names the mistake."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import math
@@ -16,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.cli.test_dh import run
+from tests.cli.running import good
 from tests.dh.arms import CONVENTIONS
 from tests.random_chains import trees
 from tests.reading import present
@@ -206,17 +204,15 @@ def test_a_urdf_with_the_suffix_txt_is_not_a_table(tmp_path: Path) -> None:
 
 def test_dh_prints_a_table_file_unchanged_or_converted(tmp_path: Path) -> None:
     path, out = str(reference_path("kinova")), tmp_path / "again.csv"
-    result = run(path, "--degrees")
-    assert "q1 + 180" in result.text
-    assert "agrees within rounding" in result.text
-    assert run(path, "--format", "csv", "-o", str(out)).code == 0
+    text = good("dh", path, "--degrees").text
+    assert "q1 + 180" in text
+    assert "agrees within rounding" in text
+    good("dh", path, "--format", "csv", "-o", str(out))
     assert read_table(out).rows[0].theta == math.pi
-    modified = run(path, "--convention", "modified", "--format", "csv", "-o", str(out))
-    assert modified.code == 0
+    good("dh", path, "--convention", "modified", "--format", "csv", "-o", str(out))
     wanted = to_convention(read_table(path), "modified")
     assert [row.cells for row in read_table(out).rows] == [row.cells for row in wanted.rows]
-    derived = run(path, "--last", "flange")
-    assert "q1 + pi" not in derived.text
+    assert "q1 + pi" not in good("dh", path, "--last", "flange").text
 
 
 @pytest.mark.parametrize(
@@ -427,10 +423,7 @@ def test_a_csv_file_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
         ("", "header: the table has no column 'a': found nothing"),
         ("a,alpha,d,theta\n", "rows: a table needs a row"),
         ("# anlges: degrees\na,alpha,d,theta\n0,0,0,0\n", "unknown key in a table: found 'anlges'"),
-        (
-            'a,alpha,d,theta\n"0,3",0,0,0\n',
-            "row 1, a: this is not a number: found '0,3'; separate cells",
-        ),
+        ('a,alpha,d,theta\n"0,3",0,0,0\n', "row 1, a: this is not a number: found '0,3'; separate cells"),
         ("a;alpha;d;phi\n0;0;0;0\n", "header: the table has no column 'theta'"),
         ("a [mm],alpha_i,x,theta\n0,pi/2,0.1,0\n", "header: the table has no column 'd'"),
         ("a;alpha;d;theta\n0;q1;0;0\n", "joint variable belongs in theta of a revolute joint, or in d"),

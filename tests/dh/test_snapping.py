@@ -1,7 +1,5 @@
 """In no configuration does a snapped table move the tip further than the stated bound."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -42,11 +40,7 @@ def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArra
 
 
 @pytest.mark.slow
-@given(
-    st.integers(0, 10_000),
-    st.sampled_from([1e-9, 3.7e-6, 1e-4, 2e-3]),
-    st.sampled_from(CONVENTIONS),
-)
+@given(st.integers(0, 10_000), st.sampled_from([1e-9, 3.7e-6, 1e-4, 2e-3]), st.sampled_from(CONVENTIONS))
 @settings(max_examples=50)
 def test_no_configuration_moves_the_tip_by_more_than_declared(seed: int, noise: Any, convention: Any) -> None:
     tree = nearly_round(seed, noise)

@@ -1,7 +1,5 @@
 """The class of an arm, its OPW parameters, and solvers of other libraries that give the poses of its tip."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -3,8 +3,6 @@
 A branch that took it for another member would return wrong numbers without a word.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 

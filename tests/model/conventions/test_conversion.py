@@ -1,7 +1,5 @@
 """Conversions of q, v, a and Jacobians between conventions: laws, user files, errors, maps of `same`."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from pathlib import Path

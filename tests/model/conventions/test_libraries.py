@@ -7,8 +7,6 @@ then `pip uninstall usd-core` and `pip install --force-reinstall usd-exchange`, 
 Conventions of libraries that cannot be installed agree with published statements.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
