@@ -93,8 +93,7 @@ def test_the_listed_conversions_make_both_robots_move_alike(name: str, what: str
 @pytest.mark.slow
 def test_the_distance_does_not_depend_on_the_order_of_the_models() -> None:
     a, b = robot("elbow"), other("elbow", "tilted by 0.001")
-    there, back = urdfkin.same(a, b).worst, urdfkin.same(b, a).worst
-    there, back = present(there), present(back)
+    there, back = present(urdfkin.same(a, b).worst), present(urdfkin.same(b, a).worst)
     assert (there.lower, there.upper) == pytest.approx((back.lower, back.upper), rel=5e-3)
 
 

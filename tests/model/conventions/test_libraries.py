@@ -78,10 +78,6 @@ def _farthest_mass(robot: Robot, q: FloatArray) -> float:
     return float(np.linalg.norm(places, axis=-1).max() + np.linalg.norm(masses or [[0.0] * 3], axis=-1).max())
 
 
-def _worst(robot: Robot, library: Library, conversion: Conversion) -> float:
-    return max(float(found.max()) for found, _ in _differences(robot, library, conversion))
-
-
 def _conversion(robot: Robot, name: str, library: Library, **changes: Any) -> Conversion:
     joints = library.names if name == "idyntree" else None
     return robot.convention(replace(find_convention(name), **changes), joints)
@@ -124,7 +120,7 @@ def test_a_mistake_in_a_convention_is_detected(name: str, mistake: str, tmp_path
     robot = _loaded("go2" if mistake == "point" else "a1", name)  # the A1's base has its mass at the origin
     library = LIBRARIES[name](robot, tmp_path)
     wrong = _conversion(robot, name, library, **mistaken(find_convention(name), mistake))
-    assert _worst(robot, library, wrong) > 1e-3
+    assert max(found.max() for found, _ in _differences(robot, library, wrong)) > 1e-3
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -277,11 +273,8 @@ G1_NAMES = ["left_hip_pitch_joint", "right_hip_pitch_joint", "waist_yaw_joint", 
 
 def _pairs(words: str) -> list[str]:
     """Return the names of both sides, but "torso" once."""
-    return [name for word in words.split() for name in ([word] if word == "torso" else _sides(word))]
-
-
-def _sides(part: str) -> list[str]:
-    return [f"{side}_{part}" for side in SIDES]
+    both = " ".join(f"left_{word} right_{word}" for word in words.split())
+    return both.replace("left_torso right_torso", "torso").split()
 
 
 #: github.com/jiemingcui/gaponet, tasks/humanoid_amass/motions/joint_names.py: h1_2_with_hand_fix_joints.
