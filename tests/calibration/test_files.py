@@ -163,20 +163,16 @@ def drawn_in() -> list[FloatArray]:
     return [S[0], *(X[i] @ S[i + 1] for i in range(5))]
 
 
-def as_yaml(origins: list[FloatArray]) -> str:
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
     lines = ["kinematics:"]
-    for link, T in zip(LINKS, origins, strict=True):
+    for link, T in zip(LINKS, drawn_in(), strict=True):
         six = [*T[:3, 3], *euler_of("XYZ", T[:3, :3])]
         named = zip(("x", "y", "z", "roll", "pitch", "yaw"), six, strict=True)
         # The driver writes the shortest digits; YAML 1.1 reads 1e-05 as a string.
         lines += [f"  {link}:", *(f"    {name}: {float(value):.16g}" for name, value in named)]
-    return "\n".join([*lines, "  hash: calib_12788084448423163542", ""])
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
     path = tmp_path / "my_robot_calibration.yaml"
-    path.write_text(as_yaml(drawn_in()))
+    path.write_text("\n".join([*lines, "  hash: calib_12788084448423163542", ""]))
     return path
 
 

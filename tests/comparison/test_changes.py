@@ -104,7 +104,9 @@ def test_differences_between_a_urdf_and_an_mjcf_file_are_reported_at_the_joint(t
     assert effect.element == "joint elbow"
     assert effect.interval.lower == pytest.approx(0.025, rel=1e-6)
     assert found.total is not None
-    assert "joint elbow: origin 25 mm off\n" in run("diff", *files_of(tmp_path, OLD, MJCF)).text
+    (old,), new = files_of(tmp_path, OLD), tmp_path / "new.xml"
+    new.write_text(MJCF)
+    assert "joint elbow: origin 25 mm off\n" in run("diff", old, str(new)).text
     assert not urdfkin.diff(MJCF, MJCF)
     same_robot = MJCF.replace("0.425", "0.4").replace("0 0.1 1", "0 0 1").replace("-2 1.5", "-2 2")
     assert {change.what for change in urdfkin.diff(OLD, same_robot).changes} == {"velocity", "effort"}

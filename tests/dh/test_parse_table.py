@@ -311,12 +311,6 @@ def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
     return str(caught.value).removeprefix(str(file))
 
 
-def of_rows(rows: str, keys: dict[str, str]) -> str:
-    """Write a TOML file without the keys that have an empty value."""
-    lines = {"convention": "'standard'", **keys, "rows": rows}
-    return "".join(f"{key} = {value}\n" for key, value in lines.items() if value)
-
-
 @pytest.mark.parametrize(
     ("rows", "keys", "message"),
     [
@@ -378,7 +372,9 @@ def of_rows(rows: str, keys: dict[str, str]) -> str:
 def test_an_error_in_a_table_is_reported_with_position_and_reason(
     rows: str, keys: dict[str, str], message: str, tmp_path: Path
 ) -> None:
-    assert re.search(message, refused(tmp_path, of_rows(rows, keys)))
+    lines = {"convention": "'standard'", **keys, "rows": rows}
+    text = "".join(f"{key} = {value}\n" for key, value in lines.items() if value)
+    assert re.search(message, refused(tmp_path, text))
 
 
 NULL = '{"convention": "standard", "robot": null, "rows": [[0.1, 0, 0, 0]]}'

@@ -127,14 +127,9 @@ def test_the_lever_of_a_snapped_angle_is_the_length_of_the_remaining_chain() -> 
 @pytest.mark.parametrize("beyond", [0.0, 3.0])
 def test_the_lever_of_two_combined_fixed_angles_begins_at_the_next_joint(beyond: float) -> None:
     """Neither angle is nearly round, but their sum is."""
-    joints = [
-        (z_joint("a"), "l0", "l1"),
-        (z_joint("bolt", rotation("x", 0.3), JointKind.FIXED), "l1", "l2"),
-        (z_joint("b", rotation("x", math.pi / 2 - 0.3 + OFF)), "l2", "l3"),
-        (z_joint("c", shift(beyond, 0, 0)), "l3", "l4"),
-        (z_joint("end", shift(0, 0.5, 0), JointKind.FIXED), "l4", "tip"),
-    ]
-    snap = present(dh_table(build_tree("bolted", "l0", joints), "tip", snap=10 * OFF).snap)
+    bolt, turned = rotation("x", 0.3), rotation("x", math.pi / 2 - 0.3 + OFF)
+    tree = arm(np.eye(4), bolt, turned, shift(beyond, 0, 0), kinds="RFRR", tip=shift(0, 0.5, 0))
+    snap = present(dh_table(tree, "tip", snap=10 * OFF).snap)
     assert [change.lever for change in snap.changes] == [pytest.approx(beyond + 0.5)]
     assert snap.metres == pytest.approx(OFF * (beyond + 0.5), rel=1e-9)
     assert 0.0 < snap.measured_metres <= snap.metres
