@@ -56,3 +56,8 @@ def loaded(source: Any, **how: Any) -> Robot:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urdfkin.UrdfWarning)
         return urdfkin.load(to_urdf(source) if isinstance(source, KinematicTree) else source, **how)
+
+
+def built(*joints: str, **how: Any) -> Robot:
+    """Load the robot that consists of these joints and their links, without warnings."""
+    return loaded(robot(*joints), **how)

@@ -1,7 +1,5 @@
 """Arms with known errors, and poses measured on them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

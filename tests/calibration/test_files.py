@@ -1,7 +1,5 @@
 """Files of a calibration: measured poses, the factory calibration of a Universal Robots arm, the new URDF."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
@@ -11,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests import urdfs
 from tests.calibration.arms import BRANCHED, pose
 from tests.cli.running import urdfkin
 from tests.reading import present
+from tests.urdfs import joint, limit
 from urdfkin.calibration.calibrate import read_poses
 from urdfkin.calibration.universal_robots import (
     LINKS,
@@ -136,14 +136,15 @@ BOMB = "\n".join(
         "kinematics: {shoulder: {x: *a9}}",
     ]
 )
-NOMINAL = {
-    "shoulder": "0 0 0.1807 0 0 0",
-    "upper_arm": "0 0 0 1.570796327 0 0",
-    "forearm": "-0.6127 0 0 0 0 0",
-    "wrist_1": "-0.57155 0 0.17415 0 0 0",
-    "wrist_2": "0 -0.11985 0 1.570796327 0 0",
-    "wrist_3": "0 0.11655 0 1.570796326589793 3.141592653589793 3.141592653589793",
-}
+#: Origins of the joints in the description.
+NOMINAL = (
+    'xyz="0 0 0.1807"',
+    'xyz="0 0 0" rpy="1.570796327 0 0"',
+    'xyz="-0.6127 0 0"',
+    'xyz="-0.57155 0 0.17415"',
+    'xyz="0 -0.11985 0" rpy="1.570796327 0 0"',
+    'xyz="0 0.11655 0" rpy="1.570796326589793 3.141592653589793 3.141592653589793"',
+)
 
 
 def drawn_in() -> list[FloatArray]:
@@ -162,20 +163,16 @@ def drawn_in() -> list[FloatArray]:
     return [S[0], *(X[i] @ S[i + 1] for i in range(5))]
 
 
-def as_yaml(origins: list[FloatArray]) -> str:
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
     lines = ["kinematics:"]
-    for link, T in zip(LINKS, origins, strict=True):
+    for link, T in zip(LINKS, drawn_in(), strict=True):
         six = [*T[:3, 3], *euler_of("XYZ", T[:3, :3])]
         named = zip(("x", "y", "z", "roll", "pitch", "yaw"), six, strict=True)
         # The driver writes the shortest digits; YAML 1.1 reads 1e-05 as a string.
         lines += [f"  {link}:", *(f"    {name}: {float(value):.16g}" for name, value in named)]
-    return "\n".join([*lines, "  hash: calib_12788084448423163542", ""])
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
     path = tmp_path / "my_robot_calibration.yaml"
-    path.write_text(as_yaml(drawn_in()))
+    path.write_text("\n".join([*lines, "  hash: calib_12788084448423163542", ""]))
     return path
 
 
@@ -185,28 +182,15 @@ def controller() -> DHTable:
 
 def description(prefix: str) -> str:
     """Return the joints of the ROS description as a URDF."""
-    lines = [f'<robot name="ur10e"><link name="{prefix}base_link"/>']
-    parent, named = f"{prefix}base_link_inertia", zip(LINKS.items(), NOMINAL.values(), strict=True)
-
-    def fixed(name: str, parent: str, child: str, rpy: str) -> str:
-        return (
-            f'<link name="{child}"/><joint name="{prefix}{name}" type="fixed"><parent link="{parent}"/>'
-            f'<child link="{child}"/><origin xyz="0 0 0" rpy="{rpy}"/></joint>'
-        )
-
-    lines.append(fixed("base_link-base_link_inertia", f"{prefix}base_link", parent, f"0 0 {math.pi}"))
-    lines.append(fixed("base_link-base_fixed_joint", f"{prefix}base_link", f"{prefix}base", f"0 0 {math.pi}"))
-    for (link, joint), six in named:
-        x, y, z, *rpy = six.split()
-        lines.append(
-            f'<link name="{prefix}{link}_link"/>\n<joint name="{prefix}{joint}" type="revolute">\n'
-            f'  <parent link="{parent}"/><child link="{prefix}{link}_link"/>\n'
-            f'  <origin rpy="{" ".join(rpy)}" xyz="{x} {y} {z}"/><axis xyz="0 0 1"/>\n'
-            '  <limit lower="-6.28" upper="6.28" effort="1" velocity="1"/></joint>'
-        )
-        parent = f"{prefix}{link}_link"
-    lines.append(fixed("flange-tool0", parent, f"{prefix}tool0", "0 0 0"))
-    return "\n".join([*lines, "</robot>"])
+    half_turn, links = f'rpy="0 0 {math.pi}"', ["base_link_inertia", *(f"{link}_link" for link in LINKS)]
+    parts = [
+        joint("base_link-base_link_inertia", "fixed", "base_link", "base_link_inertia", half_turn, ""),
+        joint("base_link-base_fixed_joint", "fixed", "base_link", "base", half_turn, ""),
+    ]
+    for name, parent, child, origin in zip(LINKS.values(), links, links[1:], NOMINAL, strict=False):
+        parts.append(joint(name, "revolute", parent, child, origin, more=limit(-6.28, 6.28)))
+    text = urdfs.robot(*parts, joint("flange-tool0", "fixed", links[-1], "tool0", axis=""))
+    return re.sub(r' (name|link)="', rf' \1="{prefix}', text)
 
 
 def test_the_driver_and_a_urdf_apply_roll_pitch_yaw_in_different_orders(file: Path) -> None:
@@ -231,8 +215,8 @@ def test_the_calibration_file_is_written_to_the_urdf_of_the_ros_description(pref
     found = universal_robots(robot, file, "urdf")
     assert present(found.certificate).verified
     written = load(found.text)
-    for (link, joint), T in zip(LINKS.items(), drawn_in(), strict=True):
-        here = written.tree.joints[written.tree.joint_index(prefix + joint)].T_parent_joint
+    for (link, name), T in zip(LINKS.items(), drawn_in(), strict=True):
+        here = written.tree.joints[written.tree.joint_index(prefix + name)].T_parent_joint
         assert np.abs(here[:3, 3] - T[:3, 3]).max() < 1e-15, link
     q = written.sample(20)
     true = universal_robots(robot, file)
@@ -305,7 +289,7 @@ def blank(data: bytes) -> bytes:
 
 def origins(data: bytes) -> dict[str, FloatArray]:
     robot = load(data, verify=False)
-    return {joint.name: joint.T_parent_joint for joint in robot.tree.joints}
+    return {one.name: one.T_parent_joint for one in robot.tree.joints}
 
 
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])

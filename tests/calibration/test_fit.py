@@ -1,7 +1,5 @@
 """A calibration finds known errors up to the noise, with the stated covariance."""
 
-from __future__ import annotations
-
 import io
 import re
 
@@ -86,10 +84,8 @@ def test_gains_are_identified_and_not_written() -> None:
     found = true.calibrate(fit=["gains"])
     np.testing.assert_allclose(found.values, true.truth, atol=1e-14)
     assert found.written.text == true.robot.urdf.encode()
-    assert any(
-        line.startswith("these gains are not written, because a URDF cannot store them: ")
-        for line in doubts(found)
-    )
+    words = "these gains are not written, because a URDF cannot store them: "
+    assert any(line.startswith(words) for line in doubts(found))
 
 
 @pytest.mark.parametrize("convention", list(DHConvention))
@@ -244,10 +240,8 @@ def test_a_joint_without_motion_in_the_poses_is_reported() -> None:
     q[:, 2] = 0.4
     found = arm.calibrate(arm.poses(q), q)
     assert found.identification.rank == 26
-    assert any(
-        "26 parameters are identifiable from these poses; more varied poses would identify 4 more: " in line
-        for line in doubts(found)
-    )
+    words = "26 parameters are identifiable from these poses; more varied poses would identify 4 more: "
+    assert any(words in line for line in doubts(found))
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Derivatives of the tip's pose by each parameter, compared with difference quotients at fifty digits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

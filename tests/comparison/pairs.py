@@ -1,11 +1,10 @@
 """Changes of a robot; for each change it is known whether the changed robot is still the same robot."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import cache, partial, reduce
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,14 @@ Branch = tuple[Joint, str, str]
 def written(found: Sameness) -> Any:
     """Return the certificate of a comparison, after it was written as JSON and read."""
     return json.loads(json.dumps(certificate(found)))
+
+
+def files_of(folder: Path, *texts: str) -> list[str]:
+    """Write each URDF to a file, and return the paths of the files."""
+    files = [folder / f"model_{number}.urdf" for number in range(len(texts))]
+    for file, text in zip(files, texts, strict=True):
+        file.write_text(text)
+    return [str(file) for file in files]
 
 
 def certified(found: Sameness, a: Robot, b: Robot) -> bool:

@@ -1,7 +1,5 @@
 """Find the largest distance of a frame by a global search, and compute this distance at fifty digits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

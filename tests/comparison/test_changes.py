@@ -1,13 +1,12 @@
 """`diff`: the changes between two versions of a robot, and the effect of each change."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 
 import urdfkin
 from tests.cli.running import urdfkin as run
+from tests.comparison.pairs import files_of
 from tests.reading import present
 from urdfkin.comparison.diff import ModelChange
 from urdfkin.report.diff import markdown_of
@@ -70,9 +69,8 @@ def test_a_change_of_the_name_is_reported_without_an_effect() -> None:
 
 
 def test_diff_prints_changes_and_effects_in_every_format(tmp_path: Path) -> None:
-    (tmp_path / "old.urdf").write_text(OLD)
-    (tmp_path / "new.urdf").write_text(NEW)
-    old, new, page = (str(tmp_path / name) for name in ("old.urdf", "new.urdf", "comment.md"))
+    old, new = files_of(tmp_path, OLD, NEW)
+    page = str(tmp_path / "comment.md")
     done = run("diff", old, new, "--markdown", page)
     assert done.code == 1
     assert "joint elbow: origin x 0.4 -> 0.425\n    alone moves lower by up to 25 mm" in done.text
@@ -106,10 +104,9 @@ def test_differences_between_a_urdf_and_an_mjcf_file_are_reported_at_the_joint(t
     assert effect.element == "joint elbow"
     assert effect.interval.lower == pytest.approx(0.025, rel=1e-6)
     assert found.total is not None
-    old, new = tmp_path / "old.urdf", tmp_path / "new.xml"
-    old.write_text(OLD)
+    (old,), new = files_of(tmp_path, OLD), tmp_path / "new.xml"
     new.write_text(MJCF)
-    assert "joint elbow: origin 25 mm off\n" in run("diff", str(old), str(new)).text
+    assert "joint elbow: origin 25 mm off\n" in run("diff", old, str(new)).text
     assert not urdfkin.diff(MJCF, MJCF)
     same_robot = MJCF.replace("0.425", "0.4").replace("0 0.1 1", "0 0 1").replace("-2 1.5", "-2 2")
     assert {change.what for change in urdfkin.diff(OLD, same_robot).changes} == {"velocity", "effort"}

@@ -1,7 +1,5 @@
 """The headline, the exit code and the page of `same` answer the user's question."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from importlib.metadata import version
@@ -12,7 +10,7 @@ import pytest
 import urdfkin
 from tests import urdfs
 from tests.cli.running import urdfkin as run
-from tests.comparison.pairs import certified
+from tests.comparison.pairs import certified, files_of
 from tests.comparison.test_pairs import FOLLOWING
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic
@@ -70,16 +68,24 @@ def test_a_moved_tool_is_equivalent_up_to_tools_and_not_within_a_smaller_distanc
 
 
 def test_a_rotated_tool_is_reported_in_radians() -> None:
+    from urdfkin.report.diff import headline as of
+
     a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
     assert "without changes of B, tcp is 20 mrad off" in headline(a, b)
     assert not urdfkin.same(a, b).within(0.019)
+    assert of(urdfkin.diff(a, b)) == "1 change; together they turn tcp by up to 20 mrad"
 
 
-def test_within_counts_shifted_zeros_as_written() -> None:
+@pytest.mark.parametrize("rename", [False, True])
+def test_within_counts_shifted_zeros_as_written_also_with_different_names(rename: bool) -> None:
     a, b = arm(), arm(shoulder="0 0 0.001")
+    for name in ("world", "base", "upper", "lower", "tcp", "turn", "bend", "hold", "mount") * rename:
+        b = b.replace(f'"{name}"', f'"other_{name}"')
     found = urdfkin.same(a, b)
+    assert found
     assert found.up_to == ("zeros",)
     assert headline(a, b).startswith("EQUIVALENT up to zeros")
+    assert len(found.links) == 5
     assert found.written[1] == pytest.approx(1e-3, rel=1e-6)
     assert not found.within(1e-4)
     assert found.within(1.001e-3)
@@ -100,9 +106,8 @@ def test_a_joint_of_a_different_type_is_a_difference_without_an_upper_bound() ->
     a, b = arm(), arm(second="prismatic")
     found = urdfkin.same(a, b)
     worst = present(found.worst)
-    far = math.hypot(
-        1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0))
-    )  # the joint turns by 1 rad in A and moves by 1 m in B
+    # The joint turns by 1 rad in A and moves by 1 m in B.
+    far = math.hypot(1.0, 0.1 * math.sin(1.0), 0.1 * (1.0 - math.cos(1.0)))
     assert worst.lower == pytest.approx(far, rel=1e-3)
     assert math.isinf(worst.upper)
     assert headline(a, b).startswith("DIFFERS by 1.005 m or more and 1 rad or more (no bound is proven)")
@@ -157,13 +162,11 @@ def test_without_computed_bounds_no_difference_is_within_a_distance() -> None:
 
 def test_the_exit_code_and_text_of_same_depend_on_the_option_within(tmp_path: Path) -> None:
     texts = arm(), arm(tool='<origin xyz="0 0 0.15"/>'), finger(-1.0), finger(-1.01)
-    a, b, f, g = files = [str(tmp_path / f"{name}.urdf") for name in "abfg"]
-    for file, text in zip(files, texts, strict=True):
-        Path(file).write_text(text)
+    a, b, f, g = files_of(tmp_path, *texts)
     assert run("same", a, b).code == 0
-    refused = run("same", a, b, "--within", "1e-6")
-    assert refused.code == 1
-    assert "NOT WITHIN 1e-06 m and rad" in refused.text
+    done = run("same", a, b, "--within", "1e-6")
+    assert done.code == 1
+    assert "NOT WITHIN 1e-06 m and rad" in done.text
     done = run("same", f, g, "--within", "1e-3")
     assert done.code == 0
     assert "WITHIN 0.001 m and rad" in done.text
@@ -171,9 +174,9 @@ def test_the_exit_code_and_text_of_same_depend_on_the_option_within(tmp_path: Pa
 
 
 def test_the_page_shows_the_verdict_within_the_distance_and_the_origin_of_the_models(tmp_path: Path) -> None:
-    for name, text in (("a", finger(-1.0)), ("b", finger(-1.01))):
-        (tmp_path / f"{name}.urdf").write_text(text)
-    a, b, page = (str(tmp_path / name) for name in ("a.urdf", "b.urdf", "page.html"))
+    arms = arm(tool='<origin xyz="0 0 0.15"/>'), arm()
+    a, b, *both = files_of(tmp_path, finger(-1.0), finger(-1.01), *arms)
+    page = str(tmp_path / "page.html")
     assert run("same", a, b, "--within", "1e-3", "--html", page).code == 0
     text = Path(page).read_text()
     assert 'class="verdict good"' in text
@@ -187,9 +190,6 @@ def test_the_page_shows_the_verdict_within_the_distance_and_the_origin_of_the_mo
     assert run("same", a, b, "--within", "1e-4", "--html", page).code == 1
     assert 'class="verdict bad"' in Path(page).read_text()
     assert run("same", a, a, "--strict", "--html", page).code == 0
-    both = str(tmp_path / "c.urdf"), str(tmp_path / "d.urdf")
-    Path(both[0]).write_text(arm(tool='<origin xyz="0 0 0.15"/>'))
-    Path(both[1]).write_text(arm())
     assert run("same", *both, "--strict", "--html", page).code == 1
     assert 'class="verdict bad"' in Path(page).read_text()
     assert run("same", *both, "--within", "0.01", "--html", page).code == 1
@@ -206,24 +206,6 @@ def test_a_table_is_compared_at_the_frames_that_both_models_name() -> None:
     found = urdfkin.same("ur5", replace(table, tool=tool))
     assert found
     assert not found.within(1e-3)
-
-
-def test_within_applies_to_robots_with_different_names_too() -> None:
-    b = arm(shoulder="0 0 0.001")
-    for name in ("world", "base", "upper", "lower", "tcp", "turn", "bend", "hold", "mount"):
-        b = b.replace(f'"{name}"', f'"other_{name}"')
-    found = urdfkin.same(arm(), b)
-    assert found
-    assert len(found.links) == 5
-    assert not found.within(1e-4)
-    assert found.within(1.001e-3)
-
-
-def test_diff_reports_radians_for_a_pure_rotation() -> None:
-    from urdfkin.report.diff import headline as of
-
-    a, b = arm(), arm(tool='<origin xyz="0 0 0.1" rpy="0 0 0.02"/>')
-    assert of(urdfkin.diff(a, b)) == "1 change; together they turn tcp by up to 20 mrad"
 
 
 def test_the_repr_of_a_result_states_the_verdict() -> None:

@@ -1,7 +1,5 @@
 """The interval of the largest distance contains the largest distance, and is narrow."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -16,7 +14,7 @@ from tests.comparison import pairs
 from tests.comparison.pairs import changed, robot
 from tests.comparison.searching import far, searched
 from tests.reading import present
-from tests.urdfs import joint, limit, loaded, mimic
+from tests.urdfs import built, joint, limit, mimic
 from tests.urdfs import robot as urdf
 from urdfkin.comparison.bounds import Boxes, DistanceSearch, tighten
 from urdfkin.comparison.certificate import certificate, recheck
@@ -89,11 +87,8 @@ def test_a_support_function_is_a_close_upper_bound(seed: int) -> None:
 
 
 def test_a_frame_with_an_unlimited_translation_has_no_bound() -> None:
-    turn, fly = (
-        joint("turn", "continuous", "a", "b", 'rpy="{} 0 0"'),
-        joint("fly", "floating", "b", "c", axis=""),
-    )
-    text = urdf(turn, fly)
+    turn = joint("turn", "continuous", "a", "b", 'rpy="{} 0 0"')
+    text = urdf(turn, joint("fly", "floating", "b", "c", axis=""))
     found = urdfkin.same(text.format("0"), text.format("0.1"))
     assert found.differences[0].place == "joint turn"
     worst = present(found.worst)
@@ -127,10 +122,11 @@ def bounds_of(search: DistanceSearch, frame: FramePair) -> tuple[Sequence[str], 
     return curvature(steps, [one for one in some if one is not None], search.variables, frame)
 
 
-def compare_with_difference_quotients(
-    search: DistanceSearch, frame: FramePair, names: Sequence[str], M: FloatArray
-) -> None:
-    """Compare bounds M on second derivatives with difference quotients of first derivatives."""
+def compare_with_difference_quotients(search: DistanceSearch, frame: FramePair) -> bool:
+    """Compare bounds on second derivatives with difference quotients; return whether there are bounds."""
+    names, M = bounds_of(search, frame)
+    if not np.isfinite(M).all():
+        return False
     boxes = Boxes(search, frame, names)
     c, step = search.random_values(200)[:, boxes.at], 1e-3
     largest = np.zeros_like(M)
@@ -144,15 +140,20 @@ def compare_with_difference_quotients(
         largest[i] = np.linalg.norm((ahead[1] - behind[1]) / (2.0 * step), axis=1).max(axis=0)
     assert (largest <= M + 1e-11).all()
     assert M.max() <= 10.0 * largest.max()
+    return True
 
 
-def two_joints(elbow: str, multiplier: float | None) -> urdfkin.Robot:
+def with_tool(*joints: str) -> Robot:
+    """Return a robot with a tool that is fixed to the link `fore`."""
+    return built(*joints, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis=""))
+
+
+def two_joints(elbow: str, multiplier: float | None) -> Robot:
     """Return an arm whose second joint has an origin, and mimics the first joint if there is a multiplier."""
     reach = 3.0 * max(1.0, abs(multiplier or 0.0))
     more = limit(-reach, reach) + ("" if multiplier is None else mimic("j1", multiplier))
     first = joint("j1", "revolute", "base", "upper", more=limit(-3, 3))
-    second = joint("j2", "revolute", "upper", "fore", elbow, "0 1 0", more)
-    return urdfkin.load(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
+    return with_tool(first, joint("j2", "revolute", "upper", "fore", elbow, "0 1 0", more))
 
 
 @pytest.mark.parametrize("multiplier", [None, 5.0, -0.25])
@@ -164,21 +165,16 @@ def test_second_derivatives_are_bounded_for_tilted_and_parallel_axes_and_mimic_j
     elbow: str, multiplier: float | None
 ) -> None:
     a, b = two_joints('xyz="1 0 0"', multiplier), two_joints(elbow, multiplier)
-    search, frame = search_of(a, b, "tool")
-    names, M = bounds_of(search, frame)
-    assert np.isfinite(M).all()
-    compare_with_difference_quotients(search, frame, names, M)
+    assert compare_with_difference_quotients(*search_of(a, b, "tool"))
 
 
 def test_a_prismatic_mimic_joint_is_bounded_together_with_the_mimicked_joint() -> None:
     s = 0.01
 
-    def arm(slide: str) -> urdfkin.Robot:
+    def arm(slide: str) -> Robot:
         first = joint("j1", "revolute", "base", "upper", more=limit())
         second = joint("j2", "prismatic", "upper", "fore", slide, "1 0 0", limit() + mimic("j1"))
-        return urdfkin.load(
-            urdf(first, second, joint("j3", "revolute", "fore", "tool", "", "0 1 0", limit()))
-        )
+        return built(first, second, joint("j3", "revolute", "fore", "tool", "", "0 1 0", limit()))
 
     search, frame = search_of(arm('xyz="0 0 0"'), arm(f'xyz="{s} 0 0" rpy="0 0 {-s}"'), "tool")
     upper = upper_bounds(search.alignment, search.variables, frame, FINE)[0]
@@ -213,9 +209,7 @@ def test_the_bound_of_a_box_by_first_derivatives_is_not_less_than_the_corners(va
 
 
 @pytest.mark.parametrize("tool", [(0.0, 0.0, 0.0), (0.1, -0.2, 0.3)])
-def test_the_jacobian_of_a_tool_point_agrees_with_finite_differences(
-    tool: tuple[float, float, float],
-) -> None:
+def test_the_jacobian_of_a_tool_point_agrees_with_finite_differences(tool: tuple[float, ...]) -> None:
     arm, none = robot("panda"), cast(Boxes, None)  # the point depends on no box
     q, step = arm.sample(5, seed=1), 1e-6
     p, J = Boxes._origin(none, arm, q, "panda_hand", np.array(tool))
@@ -230,11 +224,7 @@ def test_the_jacobian_of_a_tool_point_agrees_with_finite_differences(
 @pytest.mark.parametrize(("name", "what", "link"), BOXES)
 def test_no_second_derivative_is_larger_than_its_bound(name: str, what: str, link: str) -> None:
     search, frame = search_of(robot(name), present(changed(name, what)), link)
-    names, M = bounds_of(search, frame)
-    if not np.isfinite(M).all():
-        assert what == "other rule"
-        return
-    compare_with_difference_quotients(search, frame, names, M)
+    assert compare_with_difference_quotients(search, frame) or what == "other rule"
 
 
 @pytest.mark.slow
@@ -251,8 +241,7 @@ def test_with_many_differences_the_upper_bound_is_tightened_close_to_the_lower_b
 def two_turns(place: str, inside: str) -> Robot:
     """Return an arm with two joints about z; the second joint contains the text `inside`."""
     first = joint("j1", "revolute", "base", "upper", f'xyz="{place} 0 0"', more=limit())
-    second = joint("j2", "revolute", "upper", "fore", more=limit() + inside)
-    return loaded(urdf(first, second, joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis="")))
+    return with_tool(first, joint("j2", "revolute", "upper", "fore", more=limit() + inside))
 
 
 def test_a_joint_that_mimics_in_only_one_model_is_bounded_as_a_separate_variable() -> None:
@@ -289,9 +278,7 @@ def test_a_bound_proven_by_boxes_is_confirmed_by_a_recheck() -> None:
 def test_the_distance_between_robots_without_moving_joints_is_reported() -> None:
     text = urdf(joint("j", "fixed", "base", "mount", 'xyz="0.3 {} 0"', axis=""))
     found = urdfkin.same(text.format(0), text.format(0.004))
-    assert (
-        found.verdict is Verdict.SAME_AFTER
-    )  # another tool is no difference; the distance counts as written
+    assert found.verdict is Verdict.SAME_AFTER  # another tool is no difference
     worst = present(found.worst_as_written)
     assert worst.lower == pytest.approx(0.004, rel=1e-9)
     assert 0.004 <= worst.upper <= 0.00402

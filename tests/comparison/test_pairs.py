@@ -1,28 +1,28 @@
-"""Robots of the catalogue and known changes of these robots: every verdict is right.
+"""Robots and known changes of these robots: every verdict is right.
 
 `python scripts/check_same.py` tries all changes on all robots; the tests try one change for each robot.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import urdfkin
 from tests import urdfs
 from tests.comparison import pairs
-from tests.comparison.pairs import changed, robot
+from tests.comparison.pairs import certified, changed, loaded, moves_alike, robot, written
 from tests.dh.arms import disguised, elbow
 from tests.reading import present
-from tests.urdfs import joint, limit, mimic
-from urdfkin.comparison.certificate import certificate, recheck
+from tests.urdfs import built, joint, limit, mimic
+from urdfkin.comparison.certificate import SAME
 from urdfkin.comparison.result import Verdict
 from urdfkin.dh import dh_table
+from urdfkin.robot import Robot
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.writer import to_urdf
 
 ROBOTS = sorted(catalogue())
 MOVED = [what for what in pairs.UNLIKE if what not in ("other rule", "rounded")]
@@ -64,10 +64,10 @@ def test_a_mimic_joint_with_a_larger_multiplier_is_detected(name: str) -> None:
 @pytest.mark.parametrize("name", ["ur5", "panda", "xarm7", "kinova", "go2", "laikago", "iris"])
 def test_a_robot_with_all_names_zeros_signs_and_the_base_changed_is_recognised(name: str) -> None:
     a = robot(name)
-    b = urdfkin.load(to_urdf(pairs.renamed(pairs.everything(a.tree))), verify=False)
+    b = loaded(pairs.renamed(pairs.everything(a.tree)))
     found = urdfkin.same(a, b, bounds=False)
     assert found.verdict is Verdict.SAME_AFTER, found.differences[:3]
-    assert pairs.moves_alike(found, a, b, 1e-10)
+    assert moves_alike(found, a, b, 1e-10)
 
 
 @pytest.mark.slow
@@ -76,7 +76,7 @@ def test_a_robot_with_all_names_zeros_signs_and_the_base_changed_is_recognised(n
     "name", ["human", "icub", "romeo", "pr2", "tiago_pro", "tiago_dual", "g1_with_hands"]
 )
 def test_a_robot_with_random_names_zeros_and_signs_is_recognised_in_seconds(name: str, seed: int) -> None:
-    b = pairs.loaded(pairs.disguised(robot(name).tree, seed))
+    b = loaded(pairs.disguised(robot(name).tree, seed))
     began = time.process_time()
     found = urdfkin.same(robot(name), b, bounds=False)
     assert found.verdict is Verdict.SAME_AFTER, found.differences[:3]
@@ -86,7 +86,7 @@ def test_a_robot_with_random_names_zeros_and_signs_is_recognised_in_seconds(name
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "pr2", "talos"])
 def test_a_mimic_joint_with_a_larger_multiplier_is_detected_despite_new_names(name: str) -> None:
-    b = pairs.loaded(pairs.disguised(pairs.with_another_rule(robot(name).tree), 1))
+    b = loaded(pairs.disguised(pairs.with_another_rule(robot(name).tree), 1))
     found = urdfkin.same(robot(name), b, bounds=False)
     assert {one.what for one in found.differences} == {"mimic rule"}
 
@@ -98,8 +98,7 @@ def test_a_table_with_other_signs_zeros_base_and_tool_is_the_same_robot(kinds: s
     table = replace(disguised(dh_table(tree, "tip"), seed), base_frame="foot", tip_frame="hand")
     joints = [joint.name for joint in tree.joints if joint.kind.nv]
     given = dict(zip(joints, (row.joint for row in table.rows), strict=True))
-    a = urdfkin.load(to_urdf(pairs.bounded(tree)), verify=False)
-    found = urdfkin.same(a, urdfkin.load(table, verify=False), map=given, bounds=False)
+    found = urdfkin.same(loaded(pairs.bounded(tree)), loaded(table), map=given, bounds=False)
     assert found.verdict is Verdict.SAME_AFTER, found.differences
 
 
@@ -107,7 +106,7 @@ def test_joints_of_equal_names_are_matched_on_a_body_with_many_joints() -> None:
     a, b = robot("go2"), present(changed("go2", "axis bent"))
     found = urdfkin.same(a, b)
     assert [one.a for one in found.joints] == [one.b for one in found.joints]
-    assert recheck(certificate(found), a, b) == []
+    assert certified(found, a, b)
 
 
 @pytest.mark.slow
@@ -126,8 +125,8 @@ def test_mirrored_arms_are_distinguished_without_equal_names() -> None:
         second = joint(b, "continuous", f"{a}_link", f"{b}_link", f'xyz="0 {y} 0.2"', "1 0 0")
         return first + second + joint(c, "continuous", f"{b}_link", f"{c}_link", f'xyz="0.1 {y} -0.2"')
 
-    a = urdfkin.load(urdfs.robot(arm("left", 0.3), arm("right", -0.3)), verify=False)
-    b = urdfkin.load(to_urdf(pairs.renamed(pairs.everything(a.tree))), verify=False)
+    a = built(arm("left", 0.3), arm("right", -0.3), verify=False)
+    b = loaded(pairs.renamed(pairs.everything(a.tree)))
     found = urdfkin.same(a, b, bounds=False)
     assert found, found.differences
 
@@ -161,3 +160,130 @@ def test_mimic_rules_that_differ_by_more_than_rounding_are_a_difference(
 ) -> None:
     found = urdfkin.same(FOLLOWING.format(0.5, 0.1), FOLLOWING.format(multiplier, offset))
     assert found.verdict is Verdict.DIFFERS
+
+
+# -- planar and floating joints with other frames -----------------------------------------------------
+
+CHAIN = urdfs.robot(
+    joint("free", "{}", "ground", "body", 'xyz="0.1 0.2 0.3" rpy="0.2 -0.3 0.4"'),
+    joint("hip", "revolute", "body", "thigh", 'xyz="0.3 0.1 0" rpy="{} 0.5 0"', "0 1 0", limit(-1, 1.5)),
+    joint("knee", "revolute", "thigh", "foot", 'xyz="0 0 -0.4" rpy="0.3 0 0"', "1 0 0", limit(-1, 1.5)),
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+@pytest.mark.parametrize("also", ["", "renamed", "rerooted"])
+def test_free_joints_with_a_different_zero_pose_are_equivalent(kind: str, also: str) -> None:
+    a = loaded(CHAIN.format(kind, "0"), verify=True)
+    tree = pairs.counted_elsewhere(a.tree)
+    assert tree is not a.tree
+    b = loaded(pairs.renamed(tree) if also == "renamed" else tree, verify=True)
+    if also == "rerooted":  # the foot is the root, and the free joint is reversed
+        b = loaded(pairs.counted_elsewhere(pairs.rerooted(a.tree)), verify=True)
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.SAME_AFTER
+    assert any("the pose of q[" in line for line in found.after)
+    assert moves_alike(found, a, b)
+    assert "within the bounds" in str(found.checked)
+    assert found.as_written is not None
+    assert certified(found, a, b)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_joints_behind_a_free_joint_are_compared(kind: str) -> None:
+    a, b = loaded(CHAIN.format(kind, "0")), loaded(CHAIN.format(kind, "0.001"))
+    for other in (b, loaded(pairs.counted_elsewhere(b.tree))):
+        found = urdfkin.same(a, other)
+        assert [one.place for one in found.differences] == ["joint hip"]
+        assert found.differences[0].radians == pytest.approx(0.001 * np.cos(0.5), rel=0.2)
+        worst = present(found.worst)
+        assert 0.0 < worst.lower <= worst.upper <= 1.03 * worst.lower
+
+
+def test_a_tilted_plane_of_a_planar_joint_is_a_difference() -> None:
+    a = loaded(CHAIN.format("planar", "0"))
+    b = loaded(CHAIN.format("planar", "0").replace("0.2 -0.3 0.4", "0.2 -0.299 0.4"))
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.DIFFERS
+    assert found.differences[0].words.startswith("joint free: its plane is tilted by")
+    assert np.isinf(present(found.worst).upper)  # a planar joint has no limits
+    assert certified(found, a, b)
+
+
+# -- the order of joints -----------------------------------------------------------------------------
+
+AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+
+
+def gantry(order: str, wrist: str = "turn", tilt: str = "0") -> Robot:
+    """Return three prismatic joints in an order, then a revolute joint about z and a prismatic joint."""
+    joints, parent = list[str](), "base"
+    for i, name in enumerate([*order, *(["turn", "quill"] if wrist == "turn" else ["quill", "turn"])]):
+        child = f"{order}{i}" if i < 3 else f"{wrist}{i}" if i < 4 else "tool"
+        kind, axis = ("revolute", "0 0 1") if name == "turn" else ("prismatic", AXES.get(name, "0 0 1"))
+        origin = f'xyz="0 0 0" rpy="{tilt} 0 0"' if i == 4 else ""
+        joints.append(joint(name, kind, parent, child, origin, axis, limit(-1, 1.5)))
+        parent = child
+    return built(*joints, verify=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "wrist"), [("xyz", "quill"), ("zyx", "turn"), ("yzx", "quill")])
+def test_robots_with_reordered_prismatic_joints_are_the_same(order: str, wrist: str) -> None:
+    a, b = gantry("xyz"), gantry(order, wrist)
+    found = urdfkin.same(a, b)
+    assert found.verdict is Verdict.SAME
+    assert {(one.a, one.b) for one in found.joints} == {(name, name) for name in (*"xyz", "turn", "quill")}
+    assert found.orders
+    assert moves_alike(found, a, b)
+    assert certified(found, a, b)
+
+
+@pytest.mark.slow
+def test_every_order_of_orthogonal_prismatic_joints_gives_the_same_robot() -> None:
+    a = gantry("xyz")
+    for order in permutations("xyz"):
+        assert urdfkin.same(a, gantry("".join(order)), bounds=False).verdict is Verdict.SAME
+
+
+def test_a_joint_order_that_the_axes_do_not_allow_is_a_difference() -> None:
+    assert not urdfkin.same(gantry("xyz", tilt="0.001"), gantry("xyz", "quill", tilt="0.001"), bounds=False)
+
+
+@pytest.mark.slow
+def test_a_named_link_that_a_different_joint_carries_is_a_difference() -> None:
+    named = loaded(gantry("yxz").urdf.replace('"yxz', '"xyz'))
+    (one,) = urdfkin.same(gantry("xyz"), named, bounds=False).differences
+    assert one.words == "link xyz0 is carried by joint x in A, by joint y in B"
+
+
+@pytest.mark.slow
+def test_the_schema_allows_conversions_and_joint_orders() -> None:
+    from jsonschema import Draft202012Validator
+
+    schema = Draft202012Validator(SAME.schema())
+    a = loaded(CHAIN.format("planar", "0"))
+    for found in (
+        urdfkin.same(a, loaded(pairs.counted_elsewhere(a.tree)), bounds=False),
+        urdfkin.same(gantry("xyz"), gantry("zyx"), bounds=False),
+    ):
+        schema.validate(written(found))
+
+
+@pytest.mark.parametrize("floating_first", [True, False])
+def test_a_root_joint_in_only_one_model_is_the_only_difference(floating_first: bool) -> None:
+    text = CHAIN.format("fixed", "0").replace(
+        '<axis xyz="0 0 1"/></joint><joint name="hip"', '</joint><joint name="hip"'
+    )
+    fixed, longer = (loaded(each, verify=True) for each in (text, text.replace("0 0 -0.4", "0 0 -0.425")))
+    floating = urdfkin.load(text, root_joint="floating")
+    found = urdfkin.same(*(floating, fixed) if floating_first else (fixed, floating))
+    assert [one.words for one in found.differences] == [f"joint root_joint is only in {'BA'[floating_first]}"]
+    assert found.worst is None
+    both = (floating, longer) if floating_first else (longer, floating)
+    found = urdfkin.same(*both)
+    worst = present(found.worst)
+    assert (worst.lower, worst.upper) == pytest.approx((0.025, 0.025), rel=1e-9)
+    assert certified(found, *both)

@@ -1,7 +1,5 @@
 """The proofs of `same` hold for random pairs of arms, and forged certificates are rejected."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable
@@ -13,8 +11,7 @@ import pytest
 
 import urdfkin
 from tests.comparison.pairs import written
-from tests.urdfs import joint, limit, loaded, mimic
-from tests.urdfs import robot as urdf
+from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.bounds import tighten
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Sameness, Verdict
@@ -27,7 +24,7 @@ from urdfkin.robot import Robot
 AXES = ("0 0 1", "0 1 0", "1 0 0", "0.6 0 0.8", "0 -0.6 0.8")
 
 
-def arm(kinds: list[str], numbers: FloatArray, rules: dict[int, tuple[int, float]]) -> str:
+def arm(kinds: list[str], numbers: FloatArray, rules: dict[int, tuple[int, float]]) -> Robot:
     """Return a chain of joints; `rules` has the mimicked joint and the multiplier of each mimic joint."""
     parts = []
     for i, (kind, row) in enumerate(zip(kinds, numbers, strict=True)):
@@ -35,7 +32,7 @@ def arm(kinds: list[str], numbers: FloatArray, rules: dict[int, tuple[int, float
         inside += mimic(f"j{rules[i][0]}", rules[i][1], row[8]) if i in rules else ""
         origin = 'xyz="{} {} {}" rpy="{} {} {}"'.format(*row[:6])
         parts.append(joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", origin, AXES[int(row[9]) % 5], inside))
-    return urdf(*parts)
+    return built(*parts, verify=False)
 
 
 def random_pair(seed: int) -> tuple[Robot, Robot]:
@@ -65,7 +62,7 @@ def random_pair(seed: int) -> tuple[Robot, Robot]:
                 free[i] = int(rng.integers(i)), float(rng.choice([1.1, -1, 2]))
             case 4:
                 others[i] = "continuous" if kinds[i] == "revolute" else kinds[i]
-    return loaded(arm(kinds, numbers, rules), verify=False), loaded(arm(others, other, free), verify=False)
+    return arm(kinds, numbers, rules), arm(others, other, free)
 
 
 def largest_distance(a: Robot, b: Robot, links: list[str]) -> tuple[float, float]:
@@ -103,9 +100,8 @@ def test_no_sample_of_two_random_arms_exceeds_a_proven_bound(seed: int) -> None:
     found = urdfkin.same(a, b, boxes=2**10)
     off, turned = largest_distance(a, b, [f"l{i}" for i in range(len(a.tree.links))])
     names = set(a.coordinate_names), set(b.coordinate_names)
-    if (
-        names[0] <= names[1] or names[1] <= names[0]
-    ):  # otherwise, rules connect coordinates with different names
+    # Otherwise, rules connect coordinates with different names.
+    if names[0] <= names[1] or names[1] <= names[0]:
         assert off <= found.written[0] + 1e-9
         assert turned <= found.written[1] + 3e-7
     assert found.verdict is not Verdict.SAME or off < 1e-9
@@ -113,17 +109,18 @@ def test_no_sample_of_two_random_arms_exceeds_a_proven_bound(seed: int) -> None:
     assert found.verdict is Verdict.DIFFERS or recheck(certificate(found), a, b) == []
 
 
-def hinge(more: str, kind: str = "revolute") -> str:
-    return joint("hinge", kind, "base", "door", more=more)
+def hinge(more: str) -> str:
+    return joint("hinge", "revolute", "base", "door", more=more)
+
+
+def mount(parent: str, length: float = 1.0) -> str:
+    return joint("mount", "fixed", parent, "tool", f'xyz="{length} 0 0"', axis="")
 
 
 def test_a_joint_without_limits_behind_a_difference_leaves_no_bound() -> None:
-    behind = (
-        joint("free", "floating", "door", "body", axis=""),
-        joint("mount", "fixed", "body", "tool", axis=""),
-    )
-    a = loaded(urdf(hinge(limit(-0.5, 0.5)), *behind))
-    b = loaded(urdf(joint("hinge", "fixed", "base", "door"), *behind))
+    behind = joint("free", "floating", "door", "body", axis=""), mount("body", 0.0)
+    a = built(hinge(limit(-0.5, 0.5)), *behind)
+    b = built(joint("hinge", "fixed", "base", "door"), *behind)
     found = urdfkin.same(a, b)
     assert [one.upper for one in found.frames if one.frame == "tool"] == [math.inf]
     assert not found.within(1.0)
@@ -133,8 +130,8 @@ def test_a_joint_without_limits_behind_a_difference_leaves_no_bound() -> None:
 
 
 def test_within_is_false_if_a_different_root_link_exceeds_the_distance() -> None:
-    a = loaded(urdf(joint("slide", "prismatic", "base", "tip", axis="1 0 0", more=limit(-2, 2))))
-    b = loaded(urdf(joint("slide", "prismatic", "tip", "base", axis="-1 0 0", more=limit(-2, 2))))
+    a = built(joint("slide", "prismatic", "base", "tip", axis="1 0 0", more=limit(-2, 2)))
+    b = built(joint("slide", "prismatic", "tip", "base", axis="-1 0 0", more=limit(-2, 2)))
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.SAME_AFTER
     assert not found.within(1e-6)
@@ -154,9 +151,7 @@ def test_the_bound_of_a_box_includes_the_multipliers_of_both_prismatic_mimic_joi
     arm = joint("turn", "revolute", "base", "arm", 'xyz="0 {} 0"', more=limit())
     rest = joint("slide", "prismatic", "arm", "tool", axis="1 0 0", more=limit(-9, 9) + "{}")
     lever = joint("lever", "revolute", "base", "handle", 'xyz="0 0 9"', more=limit())
-    a, b = (
-        loaded(urdf(arm.format(y), rest.format(mimic("lever", m)), lever)) for y, m in ((0, 1.0), (-5, 2.0))
-    )
+    a, b = (built(arm.format(y), rest.format(mimic("lever", m)), lever) for y, m in ((0, 1.0), (-5, 2.0)))
     comparator = Comparator((a, b), {}, bounds=True)
     written = comparator.as_written(comparator.alignment())
     search = comparator.search(written, variables_of(written, comparator.tolerance), as_written=True)
@@ -169,8 +164,7 @@ def test_the_bound_of_a_box_includes_the_multipliers_of_both_prismatic_mimic_joi
 
 def test_the_limits_of_a_mimic_joint_do_not_restrict_the_joint_that_it_mimics() -> None:
     turn = joint("turn", "continuous", "base", "wheel")
-    mount = joint("mount", "fixed", "door", "tool", 'xyz="1 0 0"', axis="")
-    a, b = (loaded(urdf(turn, hinge(limit(-0.1, 0.1) + mimic("turn", m)), mount)) for m in (1.0, 1.1))
+    a, b = (built(turn, hinge(limit(-0.1, 0.1) + mimic("turn", m)), mount("door")) for m in (1.0, 1.1))
     found = urdfkin.same(a, b)
     off = np.linalg.norm((a.placement([3.0], "tool") - b.placement([3.0], "tool"))[:3, 3])
     assert off > 0.29
@@ -179,10 +173,9 @@ def test_the_limits_of_a_mimic_joint_do_not_restrict_the_joint_that_it_mimics() 
 
 
 def test_the_limits_of_a_mimicked_joint_in_only_one_model_are_used() -> None:
-    mount = joint("mount", "fixed", "door", "tool", 'xyz="1 0 0"', axis="")
     lever = joint("lever", "revolute", "base", "handle", 'xyz="0 5 0"', "0 1 0", limit(-3, 3))
-    a = loaded(urdf(hinge(limit(-0.1, 0.1)), mount))
-    b = loaded(urdf(hinge(limit(-0.1, 0.1) + mimic("lever")), mount, lever))
+    a = built(hinge(limit(-0.1, 0.1)), mount("door"))
+    b = built(hinge(limit(-0.1, 0.1) + mimic("lever")), mount("door"), lever)
     (tool,) = (frame for frame in urdfkin.same(a, b).frames if frame.frame == "tool")
     off = np.linalg.norm((a.placement([0.1], "tool") - b.placement([-3.0], "tool"))[:3, 3])
     assert off > 1.99
@@ -190,19 +183,9 @@ def test_the_limits_of_a_mimicked_joint_in_only_one_model_are_used() -> None:
 
 
 def test_equal_robots_with_different_independent_joints_have_a_remark() -> None:
-    fore = 'xyz="1 0 0"'
-    a = loaded(
-        urdf(
-            hinge(limit()),
-            joint("wrist", "revolute", "door", "hand", fore, "0 1 0", limit(-2, 2) + mimic("hinge", 2)),
-        )
-    )
-    b = loaded(
-        urdf(
-            hinge(limit() + mimic("wrist", 0.5)),
-            joint("wrist", "revolute", "door", "hand", fore, "0 1 0", limit(-2, 2)),
-        )
-    )
+    wrist = joint("wrist", "revolute", "door", "hand", 'xyz="1 0 0"', "0 1 0", limit(-2, 2) + "{}")
+    a = built(hinge(limit()), wrist.format(mimic("hinge", 2)))
+    b = built(hinge(limit() + mimic("wrist", 0.5)), wrist.format(""))
     found = urdfkin.same(a, b)
     assert found.verdict is Verdict.SAME
     assert [one.words for one in found.remarks] == [
@@ -213,48 +196,25 @@ def test_equal_robots_with_different_independent_joints_have_a_remark() -> None:
 
 
 def test_the_axes_of_joints_that_never_move_are_not_compared() -> None:
-    a, b = (
-        loaded(
-            urdf(
-                hinge(limit()),
-                joint("idle", "revolute", "door", "hand", axis=axis, more=limit() + mimic("hinge", 0)),
-            )
-        )
-        for axis in ("0 0 1", "0 1 0")
-    )
+    idle = joint("idle", "revolute", "door", "hand", axis="{}", more=limit() + mimic("hinge", 0))
+    a, b = (built(hinge(limit()), idle.format(axis)) for axis in ("0 0 1", "0 1 0"))
     assert urdfkin.same(a, b).verdict is Verdict.SAME
 
 
 @pytest.fixture(scope="module")
 def one_millimetre() -> tuple[Robot, Robot, Sameness]:
     """A floating arm, and the same arm with a link that is 1 mm longer."""
-    a, b = (
-        loaded(
-            urdf(
-                joint("free", "floating", "world", "base", axis=""),
-                hinge(limit()),
-                joint("mount", "fixed", "door", "tool", f'xyz="{length} 0 0"', axis=""),
-                joint("grip", "fixed", "tool", "grip", axis=""),
-            )
-        )
-        for length in (1.0, 1.001)
-    )
+    free = joint("free", "floating", "world", "base", axis="")
+    grip = joint("grip", "fixed", "tool", "grip", axis="")
+    a, b = (built(free, hinge(limit()), mount("door", length), grip) for length in (1.0, 1.001))
     return a, b, urdfkin.same(a, b)
 
 
 @pytest.fixture(scope="module")
 def reversed_axis() -> tuple[Robot, Robot, Sameness]:
     """An arm, and the same arm with one axis reversed."""
-    a, b = (
-        loaded(
-            urdf(
-                hinge(limit()),
-                joint("lift", "revolute", "door", "fore", 'xyz="1 0 0"', axis, limit()),
-                joint("mount", "fixed", "fore", "tool", 'xyz="1 0 0"', axis=""),
-            )
-        )
-        for axis in ("0 1 0", "0 -1 0")
-    )
+    lift = joint("lift", "revolute", "door", "fore", 'xyz="1 0 0"', "{}", limit())
+    a, b = (built(hinge(limit()), lift.format(axis), mount("fore")) for axis in ("0 1 0", "0 -1 0"))
     return a, b, urdfkin.same(a, b)
 
 
@@ -316,7 +276,7 @@ def tilted_slide(axis: str) -> Robot:
     drive = joint("drive", "continuous", "base", "drum", "", "0 0 1")
     frame = 'xyz="0.1 0 0" rpy="0.3 0.2 0.1"'
     slide = joint("slide", "prismatic", "drum", "tool", frame, axis, limit(-1, 1) + mimic("drive", 0.01))
-    return loaded(urdf(drive, slide), verify=False)
+    return built(drive, slide, verify=False)
 
 
 def test_the_bound_on_rounding_states_the_travel_of_a_joint_without_limits() -> None:
@@ -344,7 +304,7 @@ def test_a_joint_with_a_single_value_and_another_kind_in_b_is_a_difference(singl
     def arm(kind: str) -> Robot:
         lift = joint("lift", "revolute", "base", "arm", "", "0 0 1", limit())
         ends = limit(0.5, 0.5) if kind == single else limit()
-        return loaded(urdf(lift, joint("last", kind, "arm", "tool", "", "0 1 0", ends)), verify=False)
+        return built(lift, joint("last", kind, "arm", "tool", "", "0 1 0", ends), verify=False)
 
     found = urdfkin.same(arm("revolute"), arm("prismatic"))
     assert [(one.place, one.what) for one in found.differences] == [("joint last", "kind")]

@@ -1,7 +1,5 @@
 """How other libraries read a file: the element that causes a difference is named."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -11,11 +9,13 @@ import pytest
 import urdfkin
 from scripts.make_libraries import FEATURES
 from tests.cli.running import urdfkin as run
+from tests.comparison.pairs import files_of
 from urdfkin.comparison import readers
 from urdfkin.comparison.readers import compare_readers
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")]
 pytest.importorskip("mujoco")
+ROTATED = "has a different rotation at q = 0"
 TEXTS = {name: feature.text for name, feature in FEATURES.items()}
 
 
@@ -25,13 +25,7 @@ TEXTS = {name: feature.text for name, feature in FEATURES.items()}
         ("mimic", "mujoco", "j2", "mimic", "MuJoCo leaves the joint free"),
         ("mimic of a mimic", "yourdfpy", "j3", "mimic", "yourdfpy applies a different mimic rule"),
         ("prismatic, axis of length 2", "yourdfpy", "j2", "axis", "yourdfpy moves the joint 2 times as far"),
-        (
-            "quat_xyzw (URDF 1.1)",
-            "mujoco",
-            "j2",
-            "origin quat_xyzw",
-            "MuJoCo has a different rotation at q = 0",
-        ),
+        ("quat_xyzw (URDF 1.1)", "mujoco", "j2", "origin quat_xyzw", f"MuJoCo {ROTATED}"),
     ],
 )
 def test_the_element_that_explains_a_difference_is_named(
@@ -44,6 +38,10 @@ def test_the_element_that_explains_a_difference_is_named(
     assert found.worst > 0.1
 
 
+#: The end of the second joint's origin, and the beginning of its axis.
+ANGLES = ' rpy="0.1 0.2 0.3"/><axis xyz="0 1'
+
+
 @pytest.mark.parametrize(
     ("change", "element", "words"),
     [
@@ -51,11 +49,7 @@ def test_the_element_that_explains_a_difference_is_named(
         (('xyz="0 1 0"', 'xyz="0.6 0 0.8"'), "axis", "X uses a different joint axis: 0.6 0 0.8"),
         (('type="revolute">\n  <parent link="a"', 'type="prismatic">\n  <parent link="a"'), "axis", None),
         (('3"/><axis xyz="0 1 0"', '4"/><axis xyz="0 1 0"'), "origin rpy", None),
-        (
-            ('.3" rpy="0.1 0.2 0.3"/><axis xyz="0 1', '.4" rpy="0.1 0.2 0.3"/><axis xyz="0 1'),
-            "origin xyz",
-            None,
-        ),
+        ((f'.3"{ANGLES}', f'.4"{ANGLES}'), "origin xyz", None),
     ],
 )  # fmt: skip
 def test_a_changed_element_is_named(
@@ -124,33 +118,47 @@ def Xform "arm" (prepend apiSchemas = ["PhysicsArticulationRootAPI"]) {
 """
 
 
-def test_a_usd_file_is_read_by_newton_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "arm.usda"
+
+
+def from_usd(path: Path, text: str) -> urdfkin.Robot:
     pytest.importorskip("pxr")
-    path = tmp_path / "arm.usda"
-    path.write_text(USD)
-    robot = urdfkin.load(str(path))
+    path.write_text(text)
+    return urdfkin.load(str(path))
+
+
+def let_newton_read(path: Path, text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the library read another text than urdfkin has read."""
+    path.write_text(text)
+    monkeypatch.setattr(readers, "_source", lambda _: (str(path), "usd"))
+
+
+def test_a_usd_file_is_read_by_newton_only(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = from_usd(path, USD)
     monkeypatch.setattr(readers, "version", lambda name: None if name == "newton" else "1.0")
     with pytest.raises(urdfkin.InputError, match=r"no installed library reads USD.*pip install newton"):
         compare_readers(robot)
     assert compare_readers(robot, ["yourdfpy"])[0].refused == "the adapter of the library does not read USD"
 
 
-def test_newton_reads_a_usd_file_like_urdfkin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_newton_reads_a_usd_file_like_urdfkin(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("newton")
-    path = tmp_path / "arm.usda"
-    path.write_text(USD)
-    robot = urdfkin.load(str(path))
+    robot = from_usd(path, USD)
     (found,) = compare_readers(robot)
     assert (found.agrees, found.joints, found.missing) == (True, ("shoulder",), ())
-    path.write_text(USD.replace("(0, 0, 0.5)\n    float", "(0, 0, 0.501)\n    float"))
-    monkeypatch.setattr(readers, "_source", lambda _: (str(path), "usd"))
+    moved = USD.replace("(0, 0, 0.5)\n    float", "(0, 0, 0.501)\n    float")
+    let_newton_read(path, moved, monkeypatch)
     (found,) = compare_readers(robot)
     assert [one.joint for one in found.differences] == ["shoulder"]
     assert found.worst == pytest.approx(1e-3, rel=1e-2)
 
 
 #: A hand whose joint mimics the shoulder. The axis misses the hand's origin, so urdfkin adds a link.
-_HAND = """
+HAND = (
+    USD.rstrip().removesuffix("}")
+    + """
   def Xform "hand" (prepend apiSchemas = ["PhysicsRigidBodyAPI"]) {
     double3 xformOp:translate = (0.3, 0, 0.4)
     uniform token[] xformOpOrder = ["xformOp:translate"]
@@ -167,37 +175,31 @@ _HAND = """
   }
 }
 """
+)
 
 
 def test_newton_moves_mimic_joints_and_lacks_no_link_that_urdfkin_added(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("newton")
-    path = tmp_path / "arm.usda"
-    path.write_text(text := USD.rstrip().removesuffix("}") + _HAND)
-    robot = urdfkin.load(str(path))
+    robot = from_usd(path, HAND)
     assert set(robot.link_names) == {"base", "upper", "hand", "wrist_link", "world"}
     (found,) = compare_readers(robot)
     assert (found.agrees, found.joints, found.missing) == (True, ("shoulder",), ())
     assert found.same_order
-    path.write_text(text.replace("mimicCoef1 = -2", "mimicCoef1 = -2.1"))
-    monkeypatch.setattr(readers, "_source", lambda _: (str(path), "usd"))
+    let_newton_read(path, HAND.replace("mimicCoef1 = -2", "mimicCoef1 = -2.1"), monkeypatch)
     assert compare_readers(robot)[0].worst > 0.01
-    plain = text.replace("(0, 0, 0.1)", "(0, 0, 0)").replace("(0.3, 0, 0.4)", "(0.3, 0, 0.5)")
-    path.write_text(plain)
-    robot = urdfkin.load(str(path))
+    plain = HAND.replace("(0, 0, 0.1)", "(0, 0, 0)").replace("(0.3, 0, 0.4)", "(0.3, 0, 0.5)")
+    robot = from_usd(path, plain)
     path.write_text(plain.replace('(prepend apiSchemas = ["NewtonMimicAPI"])', ""))
     (one,) = compare_readers(robot)[0].differences
     assert (one.joint, one.words) == ("wrist", "Newton leaves the joint free")
 
 
 def test_a_body_that_a_library_lacks_is_missing_and_a_link_without_a_prim_is_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("pxr")
-    path = tmp_path / "arm.usda"
-    path.write_text(USD.rstrip().removesuffix("}") + _HAND)
-    robot = urdfkin.load(str(path))
+    robot = from_usd(path, HAND)
     poses = [{"base": np.eye(4).tolist()}] * 3
     answer = json.dumps({"joints": ["shoulder"], "poses": poses}).encode()
     monkeypatch.setattr(readers, "version", lambda _: "1.0")
@@ -216,14 +218,13 @@ def test_a_library_that_hangs_or_crashes_is_reported(monkeypatch: pytest.MonkeyP
 
 
 def test_the_command_readers_prints_and_writes_every_format(tmp_path: Path) -> None:
-    path = tmp_path / "robot.urdf"
-    path.write_text(TEXTS["mimic"])
-    done = run("readers", str(path), "--with", "mujoco,yourdfpy")
+    (path,) = files_of(tmp_path, TEXTS["mimic"])
+    done = run("readers", path, "--with", "mujoco,yourdfpy")
     assert done.code == 1
     assert "MuJoCo leaves the joint free" in done.text
-    data = run("readers", str(path), "--with", "mujoco,yourdfpy", "--format", "json").data
+    data = run("readers", path, "--with", "mujoco,yourdfpy", "--format", "json").data
     assert [one["library"] for one in data["readers"]] == ["MuJoCo", "yourdfpy"]
     assert json.dumps(data)
-    assert run("readers", str(path), "--with", "mujoco", "--format", "csv").text.count("\n") == 2
-    assert run("readers", str(path), "--with", "yourdfpy").code == 0
-    assert "did you mean" in run("readers", str(path), "--with", "mujocco").err
+    assert run("readers", path, "--with", "mujoco", "--format", "csv").text.count("\n") == 2
+    assert run("readers", path, "--with", "yourdfpy").code == 0
+    assert "did you mean" in run("readers", path, "--with", "mujocco").err

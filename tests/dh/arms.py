@@ -1,7 +1,5 @@
 """Small serial robots for tests of tables, and the comparison of a table's poses with other poses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -20,8 +18,8 @@ CONVENTIONS = ("standard", "modified")
 
 
 def arm(*steps: FloatArray, kinds: str = "", tip: FloatArray | None = None) -> KinematicTree:
-    """Return a serial robot with joint axes along z at the given poses; R is revolute, P is prismatic."""
-    named = {"R": JointKind.REVOLUTE, "P": JointKind.PRISMATIC}
+    """Return a serial robot with axes along z at the given poses; R is revolute, P prismatic, F fixed."""
+    named = {"R": JointKind.REVOLUTE, "P": JointKind.PRISMATIC, "F": JointKind.FIXED}
     joints = [
         (z_joint(f"j{i + 1}", T, named[kind]), f"l{i}", f"l{i + 1}")
         for i, (T, kind) in enumerate(zip(steps, kinds or "R" * len(steps), strict=True))

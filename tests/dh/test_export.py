@@ -1,9 +1,8 @@
-"""Exported code runs and agrees with Pinocchio, and exported text contains the table's numbers."""
+"""Exported code runs and agrees with Pinocchio; exported text and drawings show the table."""
 
-from __future__ import annotations
-
+import itertools
 import math
-from collections.abc import Callable
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,34 +12,37 @@ import pytest
 
 from scripts.check_forms import RUN, Job, Missing
 from tests.comparison.pairs import with_joint
-from tests.dh.arms import CONVENTIONS, arm
+from tests.dh.arms import CONVENTIONS, EPS, arm
 from tests.oracle import TreeOracle
 from tests.random_chains import configurations, rotation, shift
 from urdfkin.dh import FORMATS, dh_table, export, table_from_rows, units_of
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.model.tree import KinematicTree, Mimic
+from urdfkin.view.dh_drawing import drawing, row_corners
 
-EPS = float(np.finfo(np.float64).eps)
 LINK = shift(0.3, 0.1, 0.2) @ rotation("x", 1.0) @ rotation("z", 0.4)
+NEAR = shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4)
 
 
 def coupled() -> KinematicTree:
     """Return an arm with revolute and prismatic joints, a mimic joint, and nearly parallel axes."""
-    near = shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4)
-    tree = arm(LINK, near, LINK, LINK, kinds="RRPR", tip=LINK)
+    tree = arm(LINK, NEAR, LINK, LINK, kinds="RRPR", tip=LINK)
     return with_joint(tree, 3, replace(tree.joints[3], mimic=Mimic("j1", -0.5, 0.2)))
 
 
-def nearly_parallel() -> KinematicTree:
-    """Return an arm without mimic joints; one row of its table has a fifth parameter."""
-    return arm(LINK, shift(0.3, 0.2, 0.0) @ rotation("x", 1e-4) @ rotation("y", 2e-4), LINK, tip=LINK)
-
-
-TREES: dict[str, Callable[[], KinematicTree]] = {
-    "coupled": coupled,
-    "plain": lambda: arm(LINK, LINK, LINK, kinds="RPR", tip=LINK),
-    "nothing moves": lambda: arm(tip=LINK),
+PLAIN_ARM = arm(LINK, LINK, LINK, kinds="RPR", tip=LINK)
+TREES = {
+    "coupled": coupled(),
+    "plain": PLAIN_ARM,
+    "nearly parallel": arm(LINK, NEAR, LINK, tip=LINK),  # one row of its table has a fifth parameter
+    "nothing moves": arm(tip=LINK),
 }
+#: Formats that contain code, and the trees whose code is run.
+CODE = [
+    *itertools.product(("numpy", "c", "matlab", "sympy", "casadi"), ("coupled", "plain", "nothing moves")),
+    *itertools.product(("roboticstoolbox", "ets"), ("plain", "nearly parallel")),
+    ("matlab-rst", "plain"),
+]
 
 
 def check(
@@ -59,24 +61,9 @@ def check(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
-@pytest.mark.parametrize("name", TREES)
-@pytest.mark.parametrize("form", ["numpy", "c", "matlab", "sympy", "casadi"])
+@pytest.mark.parametrize(("form", "name"), CODE)
 def test_exported_code_agrees_with_pinocchio(form: str, name: str, convention: str, tmp_path: Path) -> None:
-    check(form, TREES[name](), convention, tmp_path, flip=["j2", "j3"] if name == "plain" else [])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("convention", CONVENTIONS)
-@pytest.mark.parametrize("form", ["roboticstoolbox", "ets"])
-def test_roboticstoolbox_code_agrees_with_pinocchio(form: str, convention: str, tmp_path: Path) -> None:
-    check(form, TREES["plain"](), convention, tmp_path, flip=["j2", "j3"])
-    check(form, nearly_parallel(), convention, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("convention", CONVENTIONS)
-def test_matlab_rigid_body_tree_code_agrees_with_pinocchio(convention: str, tmp_path: Path) -> None:
-    check("matlab-rst", TREES["plain"](), convention, tmp_path, flip=["j2", "j3"])
+    check(form, TREES[name], convention, tmp_path, flip=["j2", "j3"] if name == "plain" else [])
 
 
 @pytest.mark.slow
@@ -87,14 +74,14 @@ def test_symbolic_matlab_code_agrees_with_pinocchio(tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", ["roboticstoolbox", "ets", "matlab-rst"])
 def test_a_format_without_mimic_joints_refuses_mimic_joints(form: str) -> None:
     with pytest.raises(InputError, match="does not support mimic joints"):
-        export(dh_table(coupled(), "tip"), form)
+        export(dh_table(TREES["coupled"], "tip"), form)
 
 
 def test_beta_is_exported_as_a_separate_transform_and_limits_are_exported() -> None:
-    text = export(dh_table(nearly_parallel(), "tip"), "roboticstoolbox")
+    text = export(dh_table(TREES["nearly parallel"], "tip"), "roboticstoolbox")
     assert "ET.Ry(" in text
     assert "DHRobot" not in text
-    assert "rtb.DHRobot(" in export(dh_table(TREES["plain"](), "tip"), "roboticstoolbox")
+    assert "rtb.DHRobot(" in export(dh_table(PLAIN_ARM, "tip"), "roboticstoolbox")
     row = {"a": 1, "alpha": 0, "d": 0, "theta": 0, "limit": {"lower": -1.5, "upper": 2.5}}
     limited = table_from_rows([row, [1, 0, 0, 0]], "standard")
     for form in ("roboticstoolbox", "ets"):
@@ -129,7 +116,7 @@ def test_the_sympy_placement_of_a_table_is_exact() -> None:
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_every_format_names_the_convention_of_the_table(form: str, convention: str) -> None:
-    text = export(dh_table(TREES["plain"](), "tip", convention=convention), form)
+    text = export(dh_table(PLAIN_ARM, "tip", convention=convention), form)
     other = "modified" if convention == "standard" else "standard"
     assert convention in text or form == "matlab-rst"
     assert other not in text
@@ -138,7 +125,7 @@ def test_every_format_names_the_convention_of_the_table(form: str, convention: s
 
 def test_an_unknown_format_lists_similar_names() -> None:
     with pytest.raises(UnknownNameError, match="did you mean markdown"):
-        export(dh_table(TREES["plain"](), "tip"), "markdwon")
+        export(dh_table(PLAIN_ARM, "tip"), "markdwon")
 
 
 ROWS = [[0, 90, 0.3, 0], [0.4, 0, 0, -90], [0, 180, 0.1, 0, "P"]]
@@ -171,7 +158,7 @@ def test_the_latex_table_states_the_convention_in_the_caption_and_escapes_names(
 
 
 def test_mimic_joints_are_written_as_expressions_of_the_mimicked_joint() -> None:
-    text = export(dh_table(coupled(), "tip"), "terminal")
+    text = export(dh_table(TREES["coupled"], "tip"), "terminal")
     assert "-0.5 q1 " in text
     assert "with q1 = j1, q2 = j2, q3 = j3" in text
     assert "beta [rad]" in text
@@ -182,3 +169,49 @@ def test_snapped_values_are_listed_with_rows_and_effect() -> None:
     text = export(dh_table(tree, "tip", snap=1e-4), "terminal")
     assert "row 1: origin of j2, turned by 3.67e-06 rad, tip moves by at most 7.35e-07 m" in text
     assert math.isclose(3.6732e-06 * 0.2, 7.3464e-07)
+
+
+# -- drawings ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_a_drawing_is_an_svg_with_every_frame_and_joint(convention: str) -> None:
+    pytest.importorskip("matplotlib")
+    root = ET.fromstring(drawing(dh_table(PLAIN_ARM, "tip", convention=convention)))
+    assert root.tag.endswith("svg")
+    written = "".join("".join(node.itertext()) for node in root.iter() if node.tag.endswith("text"))
+    for name in ("j1", "j2", "j3", "tip", f"{convention} Denavit-Hartenberg frames"):
+        assert name in written
+    assert written.count("x") >= 4
+    assert written.count("z") >= 4
+
+
+@pytest.mark.slow
+def test_equal_tables_give_equal_drawings() -> None:
+    pytest.importorskip("matplotlib")
+    table = dh_table(arm(LINK, LINK), "tip")
+    assert drawing(table) == drawing(table)
+    assert drawing(table) != drawing(table, [0.5, 0.5])
+
+
+def test_a_chain_without_motion_can_be_drawn_and_a_batch_cannot() -> None:
+    pytest.importorskip("matplotlib")
+    assert "<svg" in drawing(dh_table(TREES["nothing moves"], "tip"))
+    with pytest.raises(InputError, match="needs exactly one configuration"):
+        drawing(dh_table(arm(LINK), "tip"), np.zeros((2, 1)))
+
+
+@pytest.mark.parametrize(("convention", "beta"), [("standard", 0.0), ("standard", 0.3), ("modified", 0.0)])
+def test_the_two_lines_of_a_row_lie_on_the_joint_axis_and_on_the_common_normal(
+    convention: str, beta: float
+) -> None:
+    table = dh_table(arm(LINK, LINK), "tip", convention=convention)
+    table = replace(table, rows=tuple(replace(row, beta=beta) for row in table.rows))
+    frames = table.frames([0.5, -0.7])
+    corners, standard = row_corners(table, frames), convention == "standard"
+    starts, ends = frames[:-1, :3, 3], frames[1:, :3, 3]
+    z = (frames[:-1] if standard else frames[1:])[:, :3, 2]
+    along, across = (corners - starts, ends - corners) if standard else (ends - corners, corners - starts)
+    np.testing.assert_allclose(np.cross(along, z), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(across, axis=1), [abs(row.a) for row in table.rows], atol=1e-12)

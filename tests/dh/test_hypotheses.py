@@ -1,7 +1,5 @@
 """For a misread table, the fitting interpretation is reported; for a table of another robot, none is."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -11,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from tests.cli.running import good, refused
 from tests.cli.test_dh import UR5, run
 from tests.dh.arms import CONVENTIONS, elbow, published
 from tests.reading import present
@@ -91,10 +90,8 @@ def test_an_invalid_table_has_no_other_interpretation(rows: Any) -> None:
 
 def test_interpretations_with_the_fewest_changes_are_tried_first() -> None:
     data = written(dh_table(elbow(), "tip"), "standard")
-    counts = [
-        interpretation.difference_count(stated_interpretation(data))
-        for interpretation, _ in other_interpretations(data)
-    ]
+    stated = stated_interpretation(data)
+    counts = [other.difference_count(stated) for other, _ in other_interpretations(data)]
     assert counts == sorted(counts)
     assert counts[0] == 1
 
@@ -111,18 +108,15 @@ def test_a_comparison_names_the_fitting_interpretation_and_exits_with_1(tmp_path
     assert result.code == 1
     assert "rad when it is read as standard, millimetres\n" in result.text
     file.write_text('convention = "standard"\n' + text)
-    refused = run(*UR5, "--compare", str(file))
-    assert refused.code == 2
     words = "more than one turn.*the table agrees with the URDF to .* read as millimetres, degrees"
-    assert re.search(words, refused.err)
+    assert re.search(words, refused("dh", *UR5, "--compare", str(file)))
 
 
 def test_a_table_with_implausible_units_or_columns_causes_a_warning() -> None:
     deg = {"angles": "degrees"}
     assert "look like radians" in table_warnings(table_from_rows([[0.4, 1.5708, 0, 0]], "standard", **deg))[0]
-    assert (
-        "look like metres" in table_warnings(table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm"))[0]
-    )
+    metres = table_from_rows([[0.4, 0, 0, 0]], "standard", lengths="mm")
+    assert "look like metres" in table_warnings(metres)[0]
     exchanged = [{"a": 1.5708, "alpha": 0.4}, {"a": -1.5708, "alpha": 0.3}]
     assert "a and alpha look exchanged" in table_warnings(table_from_rows(exchanged, "standard"))[0]
     for name in ("kinova", "panda", "ur3", "ur5", "ur10", "xarm7_modified", "xarm7_standard"):
@@ -157,34 +151,25 @@ def nameless(file: Path, convention: str) -> Path:
 def test_a_table_without_convention_is_compared_in_the_convention_that_fits(
     tmp_path: Path, convention: str
 ) -> None:
-    words = *UR5, "--compare", str(nameless(tmp_path / "ur5.toml", convention))
-    result = run(*words)
-    assert result.code == 0
-    assert f"The table names no convention; {convention} fits best." in result.text
-    assert run(*words, "--format", "json").data["read_as"] == convention
+    words = "dh", *UR5, "--compare", str(nameless(tmp_path / "ur5.toml", convention))
+    assert f"The table names no convention; {convention} fits best." in good(*words).text
+    assert good(*words, "--format", "json").data["read_as"] == convention
 
 
 @pytest.mark.slow
-def test_a_table_without_convention_and_in_wrong_units_is_refused_with_the_right_units(
-    tmp_path: Path,
-) -> None:
+def test_a_table_without_convention_and_in_wrong_units_is_refused_with_the_units(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "modified")
     file.write_text(file.read_text().replace('"-pi/2"', "-90").replace('"pi/2"', "90"))
-    refused = run(*UR5, "--compare", str(file))
-    assert refused.code == 2
     words = "more than one turn.*the table agrees with the URDF to .* when it is read as degrees"
-    assert re.search(words, refused.err)
+    assert re.search(words, refused("dh", *UR5, "--compare", str(file)))
 
 
 @pytest.mark.slow
 def test_a_table_that_fits_no_convention_is_refused_with_the_tip_errors(tmp_path: Path) -> None:
     file = nameless(tmp_path / "ur5.toml", "standard")
-    refused = run("ur3", *UR5[1:], "--compare", str(file))
-    assert refused.code == 2
-    assert re.search("and neither fits: found tip errors .* mm as standard and .* as modified", refused.err)
-    refused = run("panda", "--compare", str(file))
-    assert refused.code == 2
-    assert "the path have different joints" in refused.err
+    said = refused("dh", "ur3", *UR5[1:], "--compare", str(file))
+    assert re.search("and neither fits: found tip errors .* mm as standard and .* as modified", said)
+    assert "the path have different joints" in refused("dh panda --compare", str(file))
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Tables are read from common file formats, and the error for a wrong file names the mistake."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import math
@@ -16,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.cli.test_dh import run
+from tests.cli.running import good
 from tests.dh.arms import CONVENTIONS
 from tests.random_chains import trees
 from tests.reading import present
@@ -58,16 +56,7 @@ def test_a_written_table_is_read_exactly(tree: KinematicTree, convention: str, f
     np.testing.assert_array_equal(again.tool, table.tool)
 
 
-def test_an_invalid_or_missing_file_is_named_in_the_error(tmp_path: Path) -> None:
-    bad = 'convention = "standard"\nrows = [["x", 0, 0, 0]]'
-    for name, text, message in (
-        ("broken.toml", "rows = [", "broken.toml: not valid TOML"),
-        ("arm.xls", "", "must have the suffix .toml, .json, .csv, .tsv"),
-        ("bad.toml", bad, "bad.toml, row 1, a: this is not a number"),
-    ):
-        (tmp_path / name).write_text(text)
-        with pytest.raises(InputError, match=message):
-            read_table(tmp_path / name)
+def test_a_missing_file_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="cannot be read"):
         read_table(tmp_path / "missing.toml")
 
@@ -215,17 +204,15 @@ def test_a_urdf_with_the_suffix_txt_is_not_a_table(tmp_path: Path) -> None:
 
 def test_dh_prints_a_table_file_unchanged_or_converted(tmp_path: Path) -> None:
     path, out = str(reference_path("kinova")), tmp_path / "again.csv"
-    result = run(path, "--degrees")
-    assert "q1 + 180" in result.text
-    assert "agrees within rounding" in result.text
-    assert run(path, "--format", "csv", "-o", str(out)).code == 0
+    text = good("dh", path, "--degrees").text
+    assert "q1 + 180" in text
+    assert "agrees within rounding" in text
+    good("dh", path, "--format", "csv", "-o", str(out))
     assert read_table(out).rows[0].theta == math.pi
-    modified = run(path, "--convention", "modified", "--format", "csv", "-o", str(out))
-    assert modified.code == 0
+    good("dh", path, "--convention", "modified", "--format", "csv", "-o", str(out))
     wanted = to_convention(read_table(path), "modified")
     assert [row.cells for row in read_table(out).rows] == [row.cells for row in wanted.rows]
-    derived = run(path, "--last", "flange")
-    assert "q1 + pi" not in derived.text
+    assert "q1 + pi" not in good("dh", path, "--last", "flange").text
 
 
 @pytest.mark.parametrize(
@@ -324,12 +311,6 @@ def refused(tmp_path: Path, text: str, suffix: str = ".toml") -> str:
     return str(caught.value).removeprefix(str(file))
 
 
-def of_rows(rows: str, keys: dict[str, str]) -> str:
-    """Write a TOML file without the keys that have an empty value."""
-    lines = {"convention": "'standard'", **keys, "rows": rows}
-    return "".join(f"{key} = {value}\n" for key, value in lines.items() if value)
-
-
 @pytest.mark.parametrize(
     ("rows", "keys", "message"),
     [
@@ -391,12 +372,31 @@ def of_rows(rows: str, keys: dict[str, str]) -> str:
 def test_an_error_in_a_table_is_reported_with_position_and_reason(
     rows: str, keys: dict[str, str], message: str, tmp_path: Path
 ) -> None:
-    assert re.search(message, refused(tmp_path, of_rows(rows, keys)))
+    lines = {"convention": "'standard'", **keys, "rows": rows}
+    text = "".join(f"{key} = {value}\n" for key, value in lines.items() if value)
+    assert re.search(message, refused(tmp_path, text))
 
 
-def test_a_null_robot_name_is_an_error_and_a_csv_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
-    text = json.dumps({"convention": "standard", "robot": None, "rows": [[0.1, 0, 0, 0]]})
-    assert "robot: a name must be text: found None" in refused(tmp_path, text, ".json")
+NULL = '{"convention": "standard", "robot": null, "rows": [[0.1, 0, 0, 0]]}'
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix", "message"),
+    [
+        ("rows = [", ".toml", ": not valid TOML"),
+        ("", ".xls", "must have the suffix .toml, .json, .csv, .tsv"),
+        (NULL, ".json", "robot: a name must be text: found None"),
+        pytest.param("[" * 200_000, ".json", ": not valid", id="deep JSON"),
+        pytest.param(f"rows = {'[' * 20_000}", ".toml", ": not valid", id="deep TOML"),
+    ],
+)
+def test_an_error_in_a_file_is_reported_with_the_name_of_the_file(
+    text: str, suffix: str, message: str, tmp_path: Path
+) -> None:
+    assert message in refused(tmp_path, text, suffix)
+
+
+def test_a_csv_file_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
     file = tmp_path / "sheet.csv"
     file.write_bytes(b"\xef\xbb\xbf# convention: standard\r\na,alpha,d,theta\r\n0.1,pi/2,0,0\r\n,,,\r\n")
     assert read_table(file).rows[0].cells == (0.1, math.pi / 2, 0.0, 0.0, 0.0)
@@ -419,10 +419,7 @@ def test_a_null_robot_name_is_an_error_and_a_csv_of_a_spreadsheet_is_read(tmp_pa
         ("", "header: the table has no column 'a': found nothing"),
         ("a,alpha,d,theta\n", "rows: a table needs a row"),
         ("# anlges: degrees\na,alpha,d,theta\n0,0,0,0\n", "unknown key in a table: found 'anlges'"),
-        (
-            'a,alpha,d,theta\n"0,3",0,0,0\n',
-            "row 1, a: this is not a number: found '0,3'; separate cells",
-        ),
+        ('a,alpha,d,theta\n"0,3",0,0,0\n', "row 1, a: this is not a number: found '0,3'; separate cells"),
         ("a;alpha;d;phi\n0;0;0;0\n", "header: the table has no column 'theta'"),
         ("a [mm],alpha_i,x,theta\n0,pi/2,0.1,0\n", "header: the table has no column 'd'"),
         ("a;alpha;d;theta\n0;q1;0;0\n", "joint variable belongs in theta of a revolute joint, or in d"),
@@ -550,12 +547,6 @@ def test_any_text_gives_a_table_or_an_error_of_urdfkin(text: str, suffix: str) -
     for head in ("", "# convention: standard\na,alpha,d,theta\n", 'convention = "standard"\n'):
         with contextlib.suppress(UrdfkinError):
             table_from_text(head + text, suffix)
-
-
-def test_extremely_deep_nesting_gives_an_error_of_urdfkin() -> None:
-    for suffix, text in ((".json", "[" * 200_000), (".toml", f"rows = {'[' * 20_000}")):
-        with pytest.raises(InputError, match="not valid"):
-            table_from_text(text, suffix)
 
 
 def test_the_last_digits_of_every_shipped_reference_table_are_read() -> None:

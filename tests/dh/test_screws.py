@@ -1,7 +1,5 @@
 """Screws of a robot agree with a textbook example, the matrix exponential, Pinocchio and a written URDF."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

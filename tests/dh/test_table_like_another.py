@@ -1,7 +1,5 @@
 """A table with the frames of a published table has the numbers and exactly the motion of the URDF."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

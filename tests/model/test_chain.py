@@ -1,7 +1,5 @@
 """A chain has the same motion as the tree, for a path in any direction."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 

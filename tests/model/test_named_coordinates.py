@@ -1,7 +1,5 @@
 """q, v and a as text, mappings and tables: each notation gives the same numbers or an error."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from typing import Any
@@ -201,56 +199,46 @@ def test_an_invalid_text_of_any_length_is_refused_without_delay(arm: Robot) -> N
             q_of(arm, text)
 
 
-class Series:
-    def __init__(self, data: Any, index: Any) -> None:
-        self._data, self._index = np.array(data), list(index)
-
-    def keys(self) -> list[Any]:
-        return self._index
-
-    def __getitem__(self, label: Any) -> Any:
-        return self._data[self._index.index(label)]
-
-    def __len__(self) -> int:
-        return len(self._data)
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
-        return np.array(self._data, dtype=dtype)
-
-
-class DataFrame(Series):
-    def __getitem__(self, label: Any) -> Any:
-        return self._data[:, self._index.index(label)]
-
-
 class Columns:
+    """A batch whose last axis has labels, as a data frame has without `keys`."""
+
     def __init__(self, data: Any, columns: Any) -> None:
         self._data, self.columns = np.array(data), list(columns)
 
     def __getitem__(self, label: Any) -> Any:
-        return self._data[:, self.columns.index(label)]
+        return self._data[..., self.columns.index(label)]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
         return np.array(self._data, dtype=dtype)
+
+
+class Labelled(Columns):
+    """A series or a data frame of pandas."""
+
+    def keys(self) -> list[Any]:
+        return self.columns
+
+    def __len__(self) -> int:
+        return len(self._data)
 
 
 SHUFFLED = ["elbow", "lift", "shoulder"]
 
 
 def test_a_series_is_read_by_its_labels_in_any_order(arm: Robot) -> None:
-    named = Series([1.25, 0.1, -0.5], SHUFFLED)
+    named = Labelled([1.25, 0.1, -0.5], SHUFFLED)
     expected = arm.jacobian([0.1, -0.5, 1.25], "e")
     np.testing.assert_array_equal(arm.jacobian(named, "e"), expected)
     np.testing.assert_array_equal(arm.prepare("e").jacobian(named), expected)
     path = arm.chain("e", "a")
     np.testing.assert_array_equal(path.placement(named), path.placement([0.1, -0.5, 1.25]))
     with pytest.raises(InputError, match="no value for elbow"):
-        arm.jacobian(Series([0.1, -0.5], ["lift", "shoulder"]), "e")
+        arm.jacobian(Labelled([0.1, -0.5], ["lift", "shoulder"]), "e")
     with pytest.raises(UnknownNameError, match="unknown coordinate 'elbo'; did you mean elbow"):
-        arm.jacobian(Series([0.1, -0.5, 1.0], ["lift", "shoulder", "elbo"]), "e")
+        arm.jacobian(Labelled([0.1, -0.5, 1.0], ["lift", "shoulder", "elbo"]), "e")
 
 
-@pytest.mark.parametrize("kind", [DataFrame, Columns])
+@pytest.mark.parametrize("kind", [Labelled, Columns])
 def test_a_data_frame_is_a_batch_with_named_columns(kind: Any, arm: Robot) -> None:
     q = arm.sample(5, 3)
     found = arm.placement(kind(q[:, [2, 0, 1]], SHUFFLED), "e")
@@ -259,16 +247,16 @@ def test_a_data_frame_is_a_batch_with_named_columns(kind: Any, arm: Robot) -> No
 
 def test_labels_0_1_2_mean_the_order_of_the_coordinates(arm: Robot) -> None:
     expected = arm.placement([0.1, -0.5, 1.25], "e")
-    np.testing.assert_array_equal(arm.placement(Series([0.1, -0.5, 1.25], range(3)), "e"), expected)
-    np.testing.assert_array_equal(arm.placement(DataFrame([[0.1, -0.5, 1.25]], range(3)), "e")[0], expected)
+    np.testing.assert_array_equal(arm.placement(Labelled([0.1, -0.5, 1.25], range(3)), "e"), expected)
+    np.testing.assert_array_equal(arm.placement(Labelled([[0.1, -0.5, 1.25]], range(3)), "e")[0], expected)
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (Series([1.25, 0.1, -0.5], [2, 0, 1]), "the name of a coordinate must be text: found 2"),
-        (Series([0.1, -0.5, 1.25], ["lift", "shoulder", "lift"]), "q: a label occurs twice: found 'lift'"),
-        ([Series([1.25, 0.1, -0.5], SHUFFLED)] * 2, "q: a list of tables with labels"),
+        (Labelled([1.25, 0.1, -0.5], [2, 0, 1]), "the name of a coordinate must be text: found 2"),
+        (Labelled([0.1, -0.5, 1.25], ["lift", "shoulder", "lift"]), "q: a label occurs twice: found 'lift'"),
+        ([Labelled([1.25, 0.1, -0.5], SHUFFLED)] * 2, "q: a list of tables with labels"),
     ],
     ids=["numbers in another order", "a label twice", "a list of them"],
 )
@@ -324,8 +312,8 @@ NAMED: dict[str, Any] = {
     "a text with blanks": "elbow=pi / 3 lift=.1 shoulder=30 deg",
     "a text with brackets": "[shoulder=30deg,lift=5mm,elbow=1]",
     "a pose and a name": "ready, lift=.3",
-    "a series": Series([1.0, 0.1, -0.5], SHUFFLED),
-    "a data frame": DataFrame([[1.0, 0.1, -0.5], [1.1, 0.2, -0.6]], SHUFFLED),
+    "a series": Labelled([1.0, 0.1, -0.5], SHUFFLED),
+    "a data frame": Labelled([[1.0, 0.1, -0.5], [1.1, 0.2, -0.6]], SHUFFLED),
 }
 
 

@@ -3,8 +3,6 @@
 A branch that took it for another member would return wrong numbers without a word.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
@@ -26,7 +24,7 @@ from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
 from urdfkin.model.recursion import IDENTITY, ZERO
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.tree import JointKind
 from urdfkin.robot.trajectory import _rates
 from urdfkin.verify.bounds import magnitudes, movable
 from urdfkin.verify.exact.numbers import ExactJoint
@@ -152,12 +150,6 @@ def test_a_joint_kind_without_its_properties_cannot_be_defined() -> None:
         cast("Any", JointKind)._new_member_(JointKind, "screw")
 
 
-@pytest.mark.parametrize(("branch", "x"), [(pose_of, np.zeros(2)), (coordinates_of, np.eye(4))])
-def test_poses_refuse_a_new_joint_kind(branch: Callable[..., object], x: FloatArray) -> None:
-    with pytest.raises(REFUSED):
-        branch(new_kind(), x)
-
-
 def plan_of_last(robot: urdfkin.Robot) -> CompiledTree:
     return compile_tree(robot.tree, [len(robot.tree.joints)])
 
@@ -166,6 +158,8 @@ METHODS: Mapping[str, Callable[[urdfkin.Robot, Any], object]] = {
     "recursion": lambda robot, x: robot.placement(x, robot.tip_frame, verify=False),
     "split": lambda robot, x: robot.acceleration_breakdown(x, x, x, robot.tip_frame, verify=False),
     "size of terms": lambda robot, x: magnitudes(plan_of_last(robot), x, x, x, STILL_STATE),
+    "pose": lambda robot, x: pose_of(robot.tree.joints[0].kind, x),
+    "coordinates": lambda robot, _: coordinates_of(robot.tree.joints[0].kind, np.eye(4)),
     "sample": lambda robot, _: robot.sample(1),
     "names": lambda robot, _: robot.coordinate_names,
     "convention": lambda robot, _: robot.convention("mujoco"),

@@ -1,7 +1,5 @@
 """The order of a tree, distances of poses, integration, limits, and Pinocchio's layout."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from typing import Any
@@ -245,7 +243,8 @@ def test_joints_without_limits_and_empty_batches_have_no_violations() -> None:
     assert limit_violations(two_joints(), np.empty((0, 2))) == []
 
 
-def with_everything() -> KinematicTree:
+@pytest.fixture
+def everything() -> KinematicTree:
     joints = [
         joint("wheel", kind=JointKind.CONTINUOUS),
         joint("table", kind=JointKind.PLANAR),
@@ -256,20 +255,18 @@ def with_everything() -> KinematicTree:
 
 
 @pytest.mark.parametrize("mimic", [True, False])
-def test_from_pinocchio_inverts_to_pinocchio(mimic: bool) -> None:
-    tree = with_everything()
+def test_from_pinocchio_inverts_to_pinocchio(everything: KinematicTree, mimic: bool) -> None:
     q = np.random.default_rng(2).uniform(-3.0, 3.0, (2, 5, 4))
-    there = to_pinocchio(tree, q, mimic=mimic)
+    there = to_pinocchio(everything, q, mimic=mimic)
     assert there.shape == (2, 5, 6 if mimic else 9)
-    np.testing.assert_allclose(from_pinocchio(tree, there, mimic=mimic), q, atol=1e-14)
+    np.testing.assert_allclose(from_pinocchio(everything, there, mimic=mimic), q, atol=1e-14)
 
 
 @pytest.mark.parametrize("turns", [0, 1, -3])
 @pytest.mark.parametrize("angle", [-math.pi, math.pi, np.nextafter(-math.pi, 0.0), 3.0, -0.0])
-def test_from_pinocchio_returns_angles_in_plus_minus_pi(angle: float, turns: int) -> None:
-    tree = with_everything()
-    there = to_pinocchio(tree, np.full(4, angle + turns * math.tau), mimic=True)
-    found = from_pinocchio(tree, there, mimic=True)[[0, 3]]  # the wheel's, and the planar joint's
+def test_from_pinocchio_returns_angles_in_plus_minus_pi(everything: Any, angle: float, turns: int) -> None:
+    there = to_pinocchio(everything, np.full(4, angle + turns * math.tau), mimic=True)
+    found = from_pinocchio(everything, there, mimic=True)[[0, 3]]  # the wheel's, and the planar joint's
     assert (np.abs(found) <= math.pi).all()
     np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angle), atol=1e-14)
     if not turns:
@@ -279,33 +276,31 @@ def test_from_pinocchio_returns_angles_in_plus_minus_pi(angle: float, turns: int
 @pytest.mark.parametrize(("off", "refused"), [(1e-12, False), (1e-8, True), (-1e-3, True), (0.5, True)])
 @pytest.mark.parametrize("name", ["slide", "gear"])
 def test_from_pinocchio_refuses_a_mimic_joint_that_violates_its_rule(
-    name: str, off: float, refused: bool
+    everything: KinematicTree, name: str, off: float, refused: bool
 ) -> None:
-    tree = with_everything()
     q = np.array([[0.2, 0.0, 0.0, 0.0], [0.4, 1.0, 2.0, 3.0]])
-    there = to_pinocchio(tree, q)
+    there = to_pinocchio(everything, q)
     if name == "slide":
         there[1, 6] += off
     else:
         angle = 3.0 * 0.4 + 0.1 + off
         there[1, 7:] = math.cos(angle), math.sin(angle)
     if not refused:
-        np.testing.assert_allclose(from_pinocchio(tree, there), q, atol=1e-14)
+        np.testing.assert_allclose(from_pinocchio(everything, there), q, atol=1e-14)
         return
     with pytest.raises(InputError, match=f"{name}.*off by {abs(off):.3g}|off by {abs(off):.3g}.*{name}"):
-        from_pinocchio(tree, there)
+        from_pinocchio(everything, there)
 
 
 @pytest.mark.parametrize("at", [0, 4])
-def test_from_pinocchio_refuses_an_invalid_cosine_and_sine(at: int) -> None:
-    tree = with_everything()
-    there = to_pinocchio(tree, np.array([0.2, 0.5, -0.5, 1.0]), mimic=True)
+def test_from_pinocchio_refuses_an_invalid_cosine_and_sine(everything: KinematicTree, at: int) -> None:
+    there = to_pinocchio(everything, np.array([0.2, 0.5, -0.5, 1.0]), mimic=True)
     there[at : at + 2] *= 1.0 + 2e-6
     with pytest.raises(InputError, match="must have norm 1"):
-        from_pinocchio(tree, there, mimic=True)
+        from_pinocchio(everything, there, mimic=True)
 
 
 @pytest.mark.parametrize("length", [5, 7, 9])
-def test_a_configuration_of_the_wrong_length_is_refused(length: int) -> None:
+def test_a_configuration_of_the_wrong_length_is_refused(everything: KinematicTree, length: int) -> None:
     with pytest.raises(InputError, match="wrong length"):
-        from_pinocchio(with_everything(), np.zeros(length), mimic=True)
+        from_pinocchio(everything, np.zeros(length), mimic=True)

@@ -22,8 +22,6 @@ longer by the distance of the centre of mass, that of Newton's base by the dista
 is at most that of the farthest centre of mass of a link.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Conversions of q, v, a and Jacobians between conventions: laws, user files, errors, maps of `same`."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +11,11 @@ import pytest
 import urdfkin
 from tests import urdfs
 from tests.cli.running import good
-from tests.comparison.pairs import disguised, loaded
+from tests.comparison.pairs import disguised, files_of, loaded
 from tests.comparison.pairs import robot as pair
 from tests.model.conventions.libraries import LIBRARIES
 from tests.reading import present
-from tests.urdfs import joint, limit, mimic
+from tests.urdfs import built, joint, limit, mimic
 from urdfkin.comparison.result import Sameness
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.roundings import EPS
@@ -54,8 +52,19 @@ def dog() -> Robot:
 
 
 @pytest.fixture(scope="module")
+def arm() -> Robot:
+    return urdfkin.load("planar_two_link", verify=False)
+
+
+@pytest.fixture(scope="module")
 def cart() -> Robot:
     return urdfkin.load(PLANAR, verify=False)
+
+
+@pytest.fixture(params=[*map(find_convention, FLOATING), *ODD], ids=lambda how: how.name)
+def convention(request: pytest.FixtureRequest) -> Convention:
+    how: Convention = request.param
+    return how
 
 
 def _values(robot: Robot, n: int = 4) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -75,7 +84,6 @@ def test_every_listed_convention_has_data_and_evidence() -> None:
     assert {name for name in BUILT_IN if find_convention(name).measured} == set(LIBRARIES)
 
 
-@pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
 def test_conversion_from_a_convention_is_the_inverse_of_conversion_to_the_convention(
     dog: Robot, cart: Robot, convention: Convention
 ) -> None:
@@ -89,7 +97,6 @@ def test_conversion_from_a_convention_is_the_inverse_of_conversion_to_the_conven
             assert np.allclose(x, y, 0, 1e-13), name
 
 
-@pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
 def test_converted_accelerations_are_derivatives_of_converted_velocities(
     dog: Robot, cart: Robot, convention: Convention
 ) -> None:
@@ -102,7 +109,6 @@ def test_converted_accelerations_are_derivatives_of_converted_velocities(
         assert np.abs(conversion.to(q, v, a)[2] - expected).max() < 1e-5
 
 
-@pytest.mark.parametrize("convention", [*map(find_convention, FLOATING), *ODD], ids=lambda c: c.name)
 def test_a_robot_in_a_convention_satisfies_the_kinematic_identities(
     dog: Robot, cart: Robot, convention: Convention
 ) -> None:
@@ -131,9 +137,9 @@ def test_several_frames_at_once_equal_single_frames(dog: Robot) -> None:
 
 
 def test_equal_conventions_make_no_copy() -> None:
-    arm = urdfkin.load("ur5", verify=False)
-    q = arm.sample(10)
-    conversion = arm.convention("mujoco")
+    ur5 = urdfkin.load("ur5", verify=False)
+    q = ur5.sample(10)
+    conversion = ur5.convention("mujoco")
     assert conversion.to(q) is q
     assert conversion.to(q, q)[1] is q
     assert present(conversion.permutation).tolist() == list(range(6))
@@ -146,13 +152,12 @@ def test_the_convention_pinocchio_converts_as_to_pinocchio(name: str) -> None:
     assert np.allclose(robot.convention("pinocchio").to(q), robot.to_pinocchio(q), 0, 1e-15)
 
 
-def test_a_users_file_defines_order_names_signs_units_and_motor_zeros(tmp_path: Path) -> None:
+def test_a_users_file_defines_order_names_signs_units_and_motor_zeros(arm: Robot, tmp_path: Path) -> None:
     file = tmp_path / "motors.toml"
     file.write_text(
         'joints = ["2", "joint_1"]\nangle = "deg"\n'
         '[joint.joint_1]\nzero = 10\n[joint.joint_2]\nname = "2"\nsign = -1\nzero = 2048\nunit = 4096\n'
     )
-    arm = urdfkin.load("planar_two_link", verify=False)
     motors = arm.convention(file)
     assert motors.joint_names == ("2", "joint_1")
     assert np.allclose(motors.to([np.pi / 2, np.pi / 4]), [2048 - 512, 100])
@@ -185,10 +190,11 @@ TWICE = "two joints have the same name in the convention: found"
         ("=", "this is not a TOML file"),
     ],
 )
-def test_an_invalid_convention_file_is_an_error_with_the_place(text: str, words: str, tmp_path: Path) -> None:
+def test_an_invalid_convention_file_is_an_error_with_the_place(
+    arm: Robot, text: str, words: str, tmp_path: Path
+) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(text)
-    arm = urdfkin.load("planar_two_link", verify=False)
     with pytest.raises(InputError) as caught:
         arm.convention(file)
     assert words in str(caught.value)
@@ -203,25 +209,20 @@ def test_an_invalid_convention_file_is_an_error_with_the_place(text: str, words:
         ('like = "mujocco"', "mujoco, "),
         ("quaternoin = 1", "did you mean quaternion"),
         ("[joint.joint_1]\nsing = 1", "did you mean sign"),
+        (None, "did you mean mujoco"),
     ],
 )
-def test_an_unknown_name_in_a_convention_file_is_refused_with_the_nearest_name(
-    text: str, words: str, tmp_path: Path
+def test_an_unknown_convention_or_name_in_its_file_is_refused_with_the_nearest_name(
+    arm: Robot, text: str | None, words: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "mine.toml"
-    file.write_text(text)
+    file.write_text(text or "")
     with pytest.raises(UnknownNameError) as caught:
-        urdfkin.load("planar_two_link", verify=False).convention(file)
+        arm.convention(file if text else "mujocco")
     assert words in str(caught.value)
 
 
-def test_an_unknown_convention_is_an_error_with_the_nearest_name() -> None:
-    with pytest.raises(UnknownNameError, match="did you mean mujoco"):
-        urdfkin.load("planar_two_link", verify=False).convention("mujocco")
-
-
-def test_a_convention_without_a_known_joint_order_needs_an_explicit_order() -> None:
-    arm = urdfkin.load("planar_two_link", verify=False)
+def test_a_convention_without_a_known_joint_order_needs_an_explicit_order(arm: Robot) -> None:
     with pytest.raises(InputError, match="no known order of joints"):
         arm.convention("idyntree")
     assert arm.convention("idyntree", ["joint_2", "joint_1"]).to([1.0, 2.0]).tolist() == [2.0, 1.0]
@@ -342,32 +343,27 @@ def _found(name: str, seed: int) -> tuple[Sameness, Robot, Robot]:
     return urdfkin.same(a, b, bounds=False), a, b
 
 
-def _hold(name: str, seed: int, folder: Path) -> None:
+@pytest.mark.filterwarnings("ignore::urdfkin.DegreesWarning")  # a zero moves values beyond the limits
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        *itertools.product(FEW, (0, 1)),
+        *(pytest.param(name, 2, marks=pytest.mark.long) for name in sorted(set(catalogue()) - set(FEW))),
+    ],
+)
+def test_a_map_converts_to_a_model_with_different_names_signs_zeros_and_order(
+    name: str, seed: int, tmp_path: Path
+) -> None:
+    if not pair(name).tree.nq:
+        return
     found, a, b = _found(name, seed)
-    file = folder / "found.toml"
+    file = tmp_path / "found.toml"
     file.write_text(as_toml(found.convention()))
     conversion = a.convention(file)
     q = a.sample(4)
     assert np.array_equal(conversion.to(q), found.to_b(q))
     assert np.allclose(conversion.from_(conversion.to(q)), q, 0, 1e-14)
     assert _excess(found, a, b, conversion) <= 1.0
-
-
-@pytest.mark.filterwarnings("ignore::urdfkin.DegreesWarning")  # a zero moves values beyond the limits
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("name", FEW)
-def test_a_map_converts_to_a_model_with_different_names_signs_zeros_and_order(
-    name: str, seed: int, tmp_path: Path
-) -> None:
-    _hold(name, seed, tmp_path)
-
-
-@pytest.mark.filterwarnings("ignore::urdfkin.DegreesWarning")  # a zero moves values beyond the limits
-@pytest.mark.long
-@pytest.mark.parametrize("name", sorted(set(catalogue()) - set(FEW)))
-def test_a_map_converts_to_a_renamed_and_reordered_model_of_every_robot(name: str, tmp_path: Path) -> None:
-    if pair(name).tree.nq:
-        _hold(name, 2, tmp_path)
 
 
 def _wrong(right: Convention, mistake: str) -> Convention:
@@ -394,10 +390,9 @@ def test_a_mistake_in_a_map_is_detected(name: str, mistake: str) -> None:
 def arm_with(rule_of_a: str = "", rule_of_b: str = "") -> Robot:
     a = joint("a", "revolute", "l0", "l1", more=limit() + rule_of_a)
     b = joint("b", "revolute", "l1", "l2", 'xyz="1 0 0"', "0 1 0", limit() + rule_of_b)
-    return urdfkin.load(urdfs.robot(a, b), verify=False)
+    return built(a, b, verify=False)
 
 
-@pytest.mark.filterwarnings("ignore:.*URDF527")
 def test_a_mimicked_joint_of_one_model_may_be_a_mimic_joint_of_the_other() -> None:
     a, b = arm_with(rule_of_b=mimic("a", 2, 0.1)), arm_with(mimic("b", 0.5, -0.05))
     found = urdfkin.same(a, b, bounds=False)
@@ -419,17 +414,15 @@ def test_a_coordinate_of_only_one_model_is_an_error_that_names_the_joint() -> No
 
 
 def test_a_floating_joint_with_different_frames_in_two_models_is_an_error() -> None:
-    texts = (urdfs.robot(joint("f", "floating", "l0", "l1", f'xyz="{x} 0 0"', "")) for x in (0, 1))
-    a, b = (urdfkin.load(text, verify=False) for text in texts)
+    a, b = (built(joint("f", "floating", "l0", "l1", f'xyz="{x} 0 0"', "")) for x in (0, 1))
     with pytest.raises(InputError, match="the frames of a planar or floating joint in A and B differ"):
         urdfkin.same(a, b, bounds=False).convention()
 
 
 def test_the_command_writes_a_map_that_other_commands_read(tmp_path: Path) -> None:
     a, b = pair("ur5"), loaded(disguised(pair("ur5").tree, 3))
-    files = one, other, found = [str(tmp_path / name) for name in ("a.urdf", "b.urdf", "map.toml")]
-    for file, robot in zip(files, (a, b), strict=False):
-        Path(file).write_text(robot.urdf)
+    one, other = files_of(tmp_path, a.urdf, b.urdf)
+    found = str(tmp_path / "map.toml")
     good("same", one, other, "--boxes", "0", "--write-map", found)
     q, frame = a.sample(1)[0], a.link_names[-1]
     text = ",".join(map(repr, urdfkin.same(a, b, bounds=False).to_b(q).tolist()))
@@ -439,7 +432,7 @@ def test_the_command_writes_a_map_that_other_commands_read(tmp_path: Path) -> No
     assert "q_to = q_from[..., [" in order or "np.array" in order
 
 
-@pytest.mark.parametrize("name", [name for name in BUILT_IN if name != "idyntree"])
+@pytest.mark.parametrize("name", FLOATING)
 def test_a_convention_that_is_written_as_toml_is_read_back(name: str) -> None:
     how = find_convention(name)
     rules = {
