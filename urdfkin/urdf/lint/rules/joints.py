@@ -422,7 +422,7 @@ class _MimicChecker:
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
-            f"{message}but the limits of the mimic joint allow {allowed} for {leader.name!r}",
+            f"{message}but the limits of the mimic joint allow {allowed}",
             limit.element,
             attribute="lower",
             found=f'lower="{limits[0]:g}" upper="{limits[1]:g}"',
