@@ -94,7 +94,7 @@ def test_a_table_like_kinovas_has_kinovas_zeros_and_the_lengths_of_the_urdf() ->
 
 def test_a_reference_table_of_a_different_robot_is_refused() -> None:
     other = table_from_rows([[0.1, 1.0, 0.2, 0.0]] * 6, "standard")
-    with pytest.raises(InputError, match=r"another robot.*use --compare to see the differences"):
+    with pytest.raises(InputError, match=r"a different robot.*use --compare to see the differences"):
         dh_table(elbow(), "tip", like=other)
     with pytest.raises(InputError, match="the table and the path have different joints"):
         dh_table(elbow(), "tip", like=replace(other, rows=other.rows[:3]))
