@@ -4,8 +4,6 @@ An independent source for rates: differences with a step of 1e-18 at 60 digits a
 than a double has, whatever the function is made of.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 from unittest.mock import patch

@@ -1,7 +1,5 @@
 """Smooth motions of three frames and a point, as functions of time at 60 digits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 The code of the function object is replaced, so every reference to the function calls the wrong code.
 """
 
-from __future__ import annotations
-
 import types
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

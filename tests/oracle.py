@@ -4,8 +4,6 @@ The model is built joint by joint from the tree, without a URDF, so the tests do
 writer. Mimic joints are independent joints in the model, and coupled by G.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The blocks of a documentation page, which are run in order, and their outputs."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re

@@ -1,7 +1,5 @@
 """Hypothesis strategies for trees in which consecutive joint axes have special relations."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

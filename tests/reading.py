@@ -1,7 +1,5 @@
 """Functions that read records and trees from texts, import files, and check for None."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 from types import ModuleType

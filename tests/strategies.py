@@ -1,7 +1,5 @@
 """Hypothesis strategies for rotations, and for trees with every joint kind of URDF."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The check of exported files in a library's own environment."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The script that checks all exported forms runs on one robot, and finds planted errors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

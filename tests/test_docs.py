@@ -1,7 +1,5 @@
 """Every command, name, link, number and answer of the pages is correct."""
 
-from __future__ import annotations
-
 import pkgutil
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Repositories of robots use urdfkin through pre-commit and through the GitHub Action, without a network."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 import os

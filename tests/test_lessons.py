@@ -1,7 +1,5 @@
 """The lessons run as notebooks in Jupyter's kernel, with the outputs of the pages."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

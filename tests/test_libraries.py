@@ -1,7 +1,5 @@
 """The table of libraries: its expected poses, its cells, and the page."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The code of the pages runs with the printed output; statements about other libraries are correct."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

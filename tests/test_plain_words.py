@@ -1,7 +1,5 @@
 """Pages, docstrings, comments and messages avoid words that readers did not understand."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Code for Linux has an alternative for other systems; only CI tests macOS."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

@@ -1,7 +1,5 @@
 """The page of questions has correct answers, and every section that a message names exists."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Callable

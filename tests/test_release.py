@@ -1,7 +1,5 @@
 """A release can be built from the checkout, and the pages state truly how to install urdfkin."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Objects are displayed safely in a terminal, a notebook, Markdown and LaTeX, for all names in a file."""
 
-from __future__ import annotations
-
 import html
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The README, the page "Start" and the tour are correct, and a user's first steps work."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Each program on the page about other libraries shows its defect, until a version fixes it."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

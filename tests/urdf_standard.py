@@ -6,8 +6,6 @@ motion. A column of the Jacobian is z x (p - o), and derivatives of the Jacobian
 A difference with a step of 1e-25 is correct to at least 25 digits.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from typing import Any

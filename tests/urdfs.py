@@ -1,7 +1,5 @@
 """Functions that write the XML of small URDFs."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Without Numba, Python numbers give a few configurations the same bits as the kernels."""
 
-from __future__ import annotations
-
 import math
 import os
 import threading

@@ -1,7 +1,5 @@
 """Compilation, memory access, and sine and cosine of the kernels."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import mmap

@@ -1,7 +1,5 @@
 """A prepared frame gives the same result or error as the robot's general implementation."""
 
-from __future__ import annotations
-
 import copy
 import ctypes
 import pickle

@@ -1,7 +1,5 @@
 """A compiled frame has the results of `Robot` within the bound, its errors, and its record of checks."""
 
-from __future__ import annotations
-
 import itertools
 import pickle
 import shutil

@@ -1,7 +1,5 @@
 """CUDA's kernels, run on the processor thread by thread, and compiled by nvcc if it is installed."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

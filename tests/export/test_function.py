@@ -1,7 +1,5 @@
 """Exported expressions and formulas agree with Pinocchio, and contain no operation twice."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Exported files run and compute true values; a wrong file reports its error."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import re

@@ -1,7 +1,5 @@
 """The error bound of an export in single precision holds, and fails without any of its terms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path

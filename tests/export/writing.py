@@ -1,7 +1,5 @@
 """Write exported code into files, and run these files."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The least-squares solver finds the minimum of Rosenbrock's function, and limits its steps."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

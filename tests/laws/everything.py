@@ -1,7 +1,5 @@
 """All quantities of one configuration in each reference, computed in different ways."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from urdfkin import Reference

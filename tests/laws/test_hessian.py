@@ -1,7 +1,5 @@
 """The Hessian is the derivative of the Jacobian with respect to each joint, checked at fifty digits."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identities that hold for any robot, checked without Pinocchio."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An IMU measures acceleration minus gravity, and angular velocity: by laws, and by MuJoCo."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

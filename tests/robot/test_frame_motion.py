@@ -1,7 +1,5 @@
 """The motion of a frame consists of the robot's results, and reports a disagreement with Pinocchio."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The velocities of a line are its derivatives; a table is read exactly or rejected with the place."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compare a robot with Pinocchio directly, because these tests also test urdfkin's oracle."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 Numbers have six digits, like those of CAD exporters, so right angles are only approximate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial

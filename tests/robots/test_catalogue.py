@@ -1,7 +1,5 @@
 """Every robot of the catalogue has the frames, layout, poses and results of Pinocchio."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Tables of the catalogue's robots have Pinocchio's motion and the vendors' cells."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

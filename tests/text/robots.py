@@ -1,7 +1,5 @@
 """The robots of the textbook, as URDFs in urdfkin and as Denavit-Hartenberg tables at 60 digits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """docs/equations.md is complete, current and correct; its LaTeX, and the misprints of the chapter."""
 
-from __future__ import annotations
-
 import importlib
 import re
 from collections.abc import Callable, Iterator

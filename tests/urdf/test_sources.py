@@ -1,7 +1,5 @@
 """A robot is loaded from any text, file, stream or object of another library, or the error has a reason."""
 
-from __future__ import annotations
-
 import importlib
 import io
 import math

@@ -1,7 +1,5 @@
 """A check in parts, or of a sample, has the result of a check of all configurations at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The libraries that check urdfkin: Pinocchio, MuJoCo, and yourdfpy as the second reader."""
 
-from __future__ import annotations
-
 import sys
 import warnings
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A row of the table of quantities is computed, checked, validated, displayed and replayed."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import shlex

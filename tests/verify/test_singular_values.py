@@ -1,7 +1,5 @@
 """Singular values with fifty digits lie within the bounds; a singular Jacobian is explained."""
 
-from __future__ import annotations
-
 import pickle
 from typing import Any
 

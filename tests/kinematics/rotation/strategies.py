@@ -1,7 +1,5 @@
 """Hypothesis strategies for unit vectors, special angles and rotations."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ As a script, this module reads a JSON list of documents from standard input and 
 Each document is read in a forked process, because a document may end the process.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A fix removes its finding, changes no other byte, and does not change the robot."""
 
-from __future__ import annotations
-
 import codecs
 import dataclasses
 import difflib

@@ -1,7 +1,5 @@
 """The pages of the rules are true, robots of the catalogue have no errors, and comments silence findings."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 import warnings

@@ -1,7 +1,5 @@
 """A small arm of which each part can be changed, and cases of changed arms."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 ACCEPT, WARN, REJECT = "accept", "accept-with-warning", "reject"
