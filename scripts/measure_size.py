@@ -57,8 +57,8 @@ def sentences(core: dict[str, int], lean: dict[str, int], extras: dict[str, tupl
         f" {robots / 1e9:.2f} GB for the robots of\nexample-robot-data, {pinocchio / 1e9:.2f} GB for"
         " Pinocchio and its libraries, and the rest mostly for NumPy, Numba and its\ncompiler."
         f" {len(core) - len(lean)} packages ({meshes / 1e6:.0f} MB) come only with yourdfpy, which needs"
-        " `trimesh[easy]`. A job that only\n[checks files](ci.md) needs urdfkin and click,"
-        f" {(own() + core['click']) / 1e6:.0f} MB.\n\n"
+        " `trimesh[easy]`. A job that only\n[checks files](ci.md) needs only urdfkin and click,"
+        f" together {(own() + core['click']) / 1e6:.0f} MB.\n\n"
     )
     rows = [(f"`[{name}]`", count, f"{size / 1e6:.0f} MB") for name, (count, size) in extras.items()]
     return text + table(("extra", "additional packages", "size"), rows)
