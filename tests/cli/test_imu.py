@@ -89,9 +89,8 @@ def test_a_wrong_archive_is_refused_in_one_line(
     assert err.count("\n") == 1
 
 
-def test_an_incomplete_gravity_vector_is_refused_and_an_unverified_imu_exits_with_3() -> None:
+def test_an_incomplete_gravity_vector_is_refused() -> None:
     assert "none for z" in urdfkin("imu ur5 --gravity 0,9.81").err
-    assert urdfkin("imu ur5 --no-verify").code == 3
 
 
 def test_singular_values_print_the_librarys_numbers_in_every_format(tmp_path: Path) -> None:
