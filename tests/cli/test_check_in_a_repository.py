@@ -445,10 +445,9 @@ def test_all_findings_of_a_usd_or_mjcf_file_are_reported_if_a_part_changed(
 @pytest.mark.slow
 def test_all_findings_of_a_xacro_file_are_reported_if_a_possible_include_changed(repository: Path) -> None:
     pytest.importorskip("xacrodoc")
-    macro = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="l" value="{}"/></robot>'
-    include = (
-        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="part.xacro"/>'
-    )
+    robot = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    macro = robot + '<xacro:property name="l" value="{}"/></robot>'
+    include = robot + '<xacro:include filename="part.xacro"/>'
     put("part.xacro", macro.format(2))
     put("whole.urdf.xacro", LONG.replace('<robot name="r">', include).replace("0 0 2", "0 0 ${l}"))
     settings('include = ["*.urdf.xacro"]')

@@ -80,14 +80,11 @@ def test_a_report_rendered_later_equals_the_report_of_validate(tmp_path: Path) -
 def test_report_prints_by_default_with_the_exit_code_of_the_run_and_prints_the_schema(
     good: Path, bad: Path
 ) -> None:
-    done = urdfkin("report", good)
-    assert done.code == 0
-    assert "2 robots" in done.text
-    done = urdfkin("report", bad)
-    assert done.code == 1
-    assert "urdfkin velocity panda --frame" in done.text
-    done = urdfkin("report", "--schema")
-    assert json.loads(done.text)["$id"] == "urn:urdfkin:validation:1"
+    for report, code, words in ((good, 0, "2 robots"), (bad, 1, "urdfkin velocity panda --frame")):
+        done = urdfkin("report", report)
+        assert done.code == code
+        assert words in done.text
+    assert urdfkin("report --schema").data["$id"] == "urn:urdfkin:validation:1"
 
 
 @pytest.mark.slow
@@ -100,7 +97,7 @@ def test_compare_exits_with_1_for_a_regression_or_a_missing_robot(
     assert (tmp_path / "c.md").read_text().startswith("## ❌")
     assert urdfkin("report", "compare", bad, good).code == 1  # the second report lacks a robot
     assert urdfkin("report", "compare", good, good).code == 0
-    found = json.loads(urdfkin("report", "compare", good, bad, "--format", "json").text)
+    found = urdfkin("report", "compare", good, bad, "--format", "json").data
     assert found["schema"] == "urdfkin-comparison/1"
     assert found["verdict"] == "regression"
     assert any(change["regression"] for change in found["changes"])
@@ -132,9 +129,8 @@ def test_an_unwritable_report_leaves_existing_files_unchanged(tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_plot_reports_the_number_of_checked_samples(tmp_path: Path) -> None:
-    done = urdfkin(
-        "plot", "ur5", "--to", "random", "--samples", "11", "--panel", "position", "-o", tmp_path / "a.png"
-    )
+    words = "plot ur5 --to random --samples 11 --panel position -o"
+    done = urdfkin(words, tmp_path / "a.png")
     assert done.code == 0, done.err
     assert "11 samples, verified by Pinocchio" in done.text
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
