@@ -1,8 +1,5 @@
 """`urdfkin info` draws the tree of links; `urdfkin chain` prints the axes and origins of a path."""
 
-import csv
-import io
-
 import numpy as np
 import pytest
 
@@ -139,7 +136,7 @@ def test_the_table_and_the_csv_have_the_same_joints_in_the_order_of_the_path() -
     names = list(library.load("panda").chain("panda_link2", "panda_leftfinger").joint_names)
     words = ["chain", "panda", "--base", "panda_leftfinger", "--tip", "panda_link2"]
     lines = urdfkin(*words).text.splitlines()
-    rows = list(csv.reader(io.StringIO(urdfkin(*words, "--format", "csv").text)))
+    rows = urdfkin(*words, "--format", "csv").rows
     assert [row[1] for row in rows[1:]] == [line.split()[0] for line in lines[3:-2]] == names
     assert all("backwards" in line for line in lines[3:-2])
     assert lines[-1].startswith("Pinocchio 4")

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import urdfkin as library
-from tests.cli.running import good, refused, urdfkin
+from tests.cli.running import good, numbers, refused, urdfkin
 from urdfkin.cli import quantity
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.kinematics import rotation
@@ -36,7 +36,7 @@ def test_rpy_and_quaternion_output_give_the_same_pose_as_the_matrix(written: str
     np.testing.assert_array_equal(found[:, :3], T[:, :3, 3])
     turn = Rotation.from_euler("xyz", found[:, 3:]) if written == "rpy" else Rotation.from_quat(found[:, 3:])
     np.testing.assert_allclose(turn.as_matrix(), T[:, :3, :3], atol=1e-15)
-    rows = list(csv.reader(io.StringIO(urdfkin(f"{line} --format csv --as {written}").text)))
+    rows = urdfkin(f"{line} --format csv --as {written}").rows
     assert rows[0] == ["sample", *done.data["rows"]]
     np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:], found)
 
@@ -64,7 +64,7 @@ def test_a_wrong_conversion_to_rpy_is_a_disagreement(monkeypatch: pytest.MonkeyP
 
 def test_rpy_output_is_correct_in_gimbal_lock() -> None:
     angles = [0.3, 1.5707963267948966, 0.2]
-    pose = ",".join(map(repr, [0, 0, 0, *angles]))
+    pose = numbers([0, 0, 0, *angles])
     done = good(f"placement ur5 --base-placement {pose} --frame base_link --as rpy --format json")
     turn, expected = (Rotation.from_euler("xyz", x) for x in (done.data["result"][0][3:], angles))
     np.testing.assert_allclose(turn.as_matrix(), expected.as_matrix(), atol=1e-15)
@@ -137,7 +137,7 @@ def test_a_batch_of_bases_is_combined_with_one_or_as_many_configurations(tmp_pat
     rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
     path = tmp_path / "base.csv"
     names = ["x", "y", "z", "qx", "qy", "qz", "qw"]
-    path.write_text("\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]))
+    path.write_text("\n".join([",".join(names), *map(numbers, rows)]))
     T = np.tile(np.eye(4), (4, 1, 1))
     T[:, :3, :3], T[:, :3, 3] = Rotation.from_quat(rows[:, 3:]).as_matrix(), rows[:, :3]
     robot = library.load("ur5")

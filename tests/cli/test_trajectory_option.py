@@ -1,7 +1,5 @@
 """`--trajectory FILE`: each row gives the result of the command in that configuration."""
 
-import csv
-import io
 import re
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.cli.running import good, refused
+from tests.cli.running import good, numbers, refused
 from tests.cli.running import urdfkin as run
 from tests.urdfs import joint
 from tests.urdfs import robot as robot_of
@@ -46,7 +44,7 @@ def write(path: Path, robot: Any, motion: dict[str, FloatArray], time: str = "t"
     names |= {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
     heads = [name for x in motion for name in names[x]]
     rows = np.column_stack(list(motion.values())).tolist()
-    path.write_text("\n".join([",".join(heads), *(",".join(map(repr, row)) for row in rows)]))
+    path.write_text("\n".join([",".join(heads), *map(numbers, rows)]))
     return path
 
 
@@ -87,7 +85,7 @@ def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
     assert f" {N} " in done.data["check"]
     results = [key for key in done.data if key in ("result", "singular_values", "manipulability_gradient")]
     for k in (0, 3, N - 1):
-        given = [f"--{x}={','.join(map(repr, motion[x][k].tolist()))}" for x in inputs]
+        given = [f"--{x}={numbers(motion[x][k])}" for x in inputs]
         one = run(*words, *given, "--format", "json")
         for key in results:
             batch, single = done.data[key], one.data[key]
@@ -100,7 +98,7 @@ def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
 def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArray], log: Path) -> None:
     _, *options = COMMANDS.get(command, ["q"])
     words = (command, "panda", "--frame", "panda_hand", *options, "--trajectory", str(log))
-    head, *rows = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
+    head, *rows = run(*words, "--format", "csv").rows
     assert head[0] == "t"
     assert len({*head}) == len(head)
     table = np.array(rows, dtype=float)
@@ -121,7 +119,7 @@ def test_every_sample_is_checked_and_a_breakdown_contains_the_times(
     assert f"{N} velocity results, worst disagreement " in line
     assert "of the bound" in line
     words = ("acceleration", "panda", "--frame", "panda_hand", "--breakdown", "--trajectory", str(log))
-    head, first, *_ = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
+    head, first, *_ = run(*words, "--format", "csv").rows
     assert head[:3] == ["t", "joint", "kind"]
     assert float(first[0]) == motion["t"][0]
 
@@ -164,8 +162,8 @@ def test_singular_values_do_not_depend_on_the_convention_and_the_gradient_follow
     robot = urdfkin.load("a1", verify=False)
     mujoco, q = robot.convention("mujoco"), robot.sample(1, 4)
     words = ("singular-values", "a1", "--frame", "FL_foot", "--rows", "linear", "--format", "json")
-    plain = run(*words, f"--q={','.join(map(repr, q[0].tolist()))}").data
-    text = f"--q={','.join(map(repr, mujoco.to(q)[0].tolist()))}"
+    plain = run(*words, f"--q={numbers(q[0])}").data
+    text = f"--q={numbers(mujoco.to(q)[0])}"
     found = run(*words, text, "--convention", "mujoco").data
     assert found["singular_values"] == plain["singular_values"]
     order = mujoco.rate_permutation
@@ -268,9 +266,9 @@ def test_a_chain_reads_q_in_a_convention_and_names_the_convention() -> None:
     robot = urdfkin.load("a1", verify=False)
     q, mujoco = robot.sample(1, 2)[0], robot.convention("mujoco")
     words = ("chain", "a1", "--base", "trunk", "--tip", "FL_foot")
-    text = ",".join(map(repr, mujoco.to(q).tolist()))
+    text = numbers(mujoco.to(q))
     found = run(*words, "--convention", "mujoco", "--q", text, "--format", "json").data
-    plain = run(*words, "--q", ",".join(map(repr, q.tolist())), "--format", "json").data
+    plain = run(*words, "--q", numbers(q), "--format", "json").data
     assert found["path_q"] == plain["path_q"]
     assert (found["q"], found["convention"]) == (mujoco.to(q).tolist(), "mujoco")
     assert "convention mujoco" in run(*words, "--convention", "mujoco", "--q", text).text.splitlines()[0]

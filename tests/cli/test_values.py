@@ -1,8 +1,5 @@
 """Commands read q, v and a in every form, and print results to the last digit in every format."""
 
-import csv
-import io
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -11,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdfkin as library
-from tests.cli.running import good, process, refused, urdfkin
+from tests.cli.running import Done, good, numbers, process, refused, urdfkin
 from tests.robots.odd_urdfs import urdf_of
 from tests.urdfs import joint
 from tests.urdfs import robot as robot_of
@@ -47,10 +44,10 @@ def expected(quantity: str, n: int, reference: str) -> FloatArray:
     return result
 
 
-def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
+def command(quantity: str, n: int, reference: str, format_: str) -> Done:
     words = [word for letter in QUANTITIES[quantity] for word in (f"--{letter}", f"random:{n}")]
     words += [] if quantity == "placement" else ["--reference", reference]
-    return good(f"{quantity} panda --frame panda_hand --seed 7 --format {format_}", *words).out
+    return good(f"{quantity} panda --frame panda_hand --seed 7 --format {format_}", *words)
 
 
 @pytest.mark.slow
@@ -58,9 +55,9 @@ def command(quantity: str, n: int, reference: str, format_: str) -> bytes:
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_json_csv_and_npy_give_exactly_the_librarys_numbers(quantity: str, n: int) -> None:
     result = expected(quantity, n, "local")
-    assert np.array_equal(np.array(json.loads(command(quantity, n, "local", "json"))["result"]), result)
-    assert np.array_equal(np.load(io.BytesIO(command(quantity, n, "local", "npy"))), result)
-    rows = list(csv.reader(io.StringIO(command(quantity, n, "local", "csv").decode())))
+    assert np.array_equal(command(quantity, n, "local", "json").data["result"], result)
+    assert np.array_equal(command(quantity, n, "local", "npy").array, result)
+    rows = command(quantity, n, "local", "csv").rows
     numbers = np.array([[float(cell) for cell in row if _is_number(cell)] for row in rows[1:]])
     assert np.array_equal(numbers[:, 1:].reshape(result.shape), result)  # the first number is the sample's
 
@@ -77,7 +74,7 @@ def _is_number(cell: str) -> bool:
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.usefixtures("columns")
 def test_the_table_states_the_computed_result_and_the_closeness_of_the_check(quantity: str) -> None:
-    text = command(quantity, 1, "local_world_aligned", "table").decode()
+    text = command(quantity, 1, "local_world_aligned", "table").text
     words = ["panda", "panda_hand", "verified by Pinocchio 4", "eps*scale"]
     words += library.load("panda").rate_names if quantity.startswith("jacobian") else []
     assert [word for word in words if word not in text] == []
@@ -151,7 +148,7 @@ def test_the_json_result_contains_robot_frame_names_inputs_and_check() -> None:
 
 
 def test_joint_values_are_read_as_a_list_by_name_in_degrees_or_with_blanks() -> None:
-    data = urdfkin("placement panda --q", ",".join(map(repr, Q)), "--format", "json").data
+    data = urdfkin("placement panda --q", numbers(Q), "--format", "json").data
     assert data["q"] == [list(Q)]
     assert np.array_equal(data["result"][0], library.load("panda").placement(Q, "panda_hand_tcp"))
     named = good("jacobian panda --q", f"ready,{NAMED}", "--format", "json")
@@ -178,14 +175,14 @@ def test_a_batch_comes_from_a_csv_file_with_or_without_a_header(layout: str, tmp
         text = "\ufeff" + text.replace("\n", "\r\n")
     path.write_text(text, encoding="utf-8", newline="")
     done = good("jacobian panda --q", f"@{path}", "--format", "npy")
-    assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(q, "panda_hand_tcp"))
+    assert np.array_equal(done.array, robot.jacobian(q, "panda_hand_tcp"))
 
 
 def test_a_batch_or_a_robot_is_read_from_standard_input() -> None:
     robot = library.load("ur5")
-    rows = "\n".join(",".join(map(repr, row)) for row in robot.sample(3, 1).tolist())
+    rows = "\n".join(map(numbers, robot.sample(3, 1)))
     done = urdfkin("jacobian ur5 --q @- --format npy", stdin=rows)
-    assert np.array_equal(np.load(io.BytesIO(done.out)), robot.jacobian(robot.sample(3, 1), robot.tip_frame))
+    assert np.array_equal(done.array, robot.jacobian(robot.sample(3, 1), robot.tip_frame))
     done = good("jacobian - --frame tool0 --format json", stdin=robot.urdf)
     assert done.data["source"] == "-"
     assert np.array_equal(done.data["result"][0], robot.jacobian(np.zeros(6), "tool0"))
