@@ -44,7 +44,8 @@ class Done:
     @property
     def array(self) -> FloatArray:
         """Standard output as the array of an .npy file."""
-        return np.load(io.BytesIO(self.out))
+        array: FloatArray = np.load(io.BytesIO(self.out))
+        return array
 
 
 def numbers(values: Iterable[float]) -> str:

@@ -9,7 +9,7 @@ import pytest
 
 from tests.cli import running
 from tests.cli.running import Done
-from tests.report.documents import arms, failing
+from tests.report.documents import arms, failing, saved
 from urdfkin.cli import campaign
 from urdfkin.cli.campaign import Pace, line
 from urdfkin.validation.collector import CampaignProgress
@@ -26,14 +26,12 @@ def urdfkin(*words: str | Path) -> Done:
 
 @pytest.fixture
 def good(tmp_path: Path) -> Path:
-    (path := tmp_path / "good.json").write_text(json.dumps(arms()))
-    return path
+    return saved(tmp_path / "good.json", arms())
 
 
 @pytest.fixture
 def bad(tmp_path: Path) -> Path:
-    (path := tmp_path / "bad.json").write_text(json.dumps(failing()))
-    return path
+    return saved(tmp_path / "bad.json", failing())
 
 
 @pytest.mark.slow
@@ -107,12 +105,10 @@ def test_compare_exits_with_1_for_a_regression_or_a_missing_robot(
 def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     good: Path, tmp_path: Path
 ) -> None:
-    changed = arms()
-    joint: Any = changed["robots"][1]["model"]["joints"][2]  # type: ignore[index]
+    changed: Any = arms()
+    joint = changed["robots"][1]["model"]["joints"][2]
     joint["axis"] = [-x for x in joint["axis"]]
-    new = tmp_path / "new.json"
-    new.write_text(json.dumps(changed))
-    done = urdfkin("report", "compare", good, new)
+    done = urdfkin("report", "compare", good, saved(tmp_path / "new.json", changed))
     assert done.code == 0
     words = " ".join(done.text.split())
     assert f"ur5: joint {joint['name']}, axis: z -> -z, rotated by 3.142 rad" in words

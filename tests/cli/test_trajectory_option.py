@@ -17,6 +17,8 @@ from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import by_command
 
+#: Arrays t, q, v and a
+Motion = dict[str, FloatArray]
 N = 9  # the forward recursion computes eight configurations at a time
 COMMANDS = {
     **{name: [row.inputs] for name, row in by_command().items()},
@@ -27,18 +29,18 @@ COMMANDS = {
 
 
 @pytest.fixture(scope="module")
-def motion() -> dict[str, FloatArray]:
+def motion() -> Motion:
     robot, rng = urdfkin.load("panda"), np.random.default_rng(5)
     v, a = rng.standard_normal((2, N, robot.nv))
     return {"t": np.cumsum(rng.uniform(0.01, 0.1, N)), "q": robot.sample(N, 2), "v": v, "a": a}
 
 
 @pytest.fixture
-def log(motion: dict[str, FloatArray], tmp_path: Path) -> Path:
+def log(motion: Motion, tmp_path: Path) -> Path:
     return write(tmp_path / "log.csv", urdfkin.load("panda"), motion)
 
 
-def write(path: Path, robot: Any, motion: dict[str, FloatArray], time: str = "t") -> Path:
+def write(path: Path, robot: Any, motion: Motion, time: str = "t") -> Path:
     """Write the arrays of a motion as CSV with the names of a robot or of a convention."""
     names = {"t": [time], "q": robot.coordinate_names}
     names |= {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
@@ -76,7 +78,7 @@ def test_every_command_with_joint_values_has_a_convention_and_with_a_batch_a_tra
 
 @pytest.mark.parametrize("command", ["placement", *COMMANDS])
 def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
-    command: str, motion: dict[str, FloatArray], log: Path
+    command: str, motion: Motion, log: Path
 ) -> None:
     inputs, *options = COMMANDS.get(command, ["q"])
     words = (command, "panda", "--frame", "panda_hand", *options)
@@ -95,7 +97,7 @@ def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
 
 
 @pytest.mark.parametrize("command", ["placement", *COMMANDS])
-def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArray], log: Path) -> None:
+def test_csv_has_one_row_for_each_time(command: str, motion: Motion, log: Path) -> None:
     _, *options = COMMANDS.get(command, ["q"])
     words = (command, "panda", "--frame", "panda_hand", *options, "--trajectory", str(log))
     head, *rows = run(*words, "--format", "csv").rows
@@ -112,9 +114,7 @@ def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArra
         assert head[1:3] == ["vx panda_joint1", "vx panda_joint2"]
 
 
-def test_every_sample_is_checked_and_a_breakdown_contains_the_times(
-    log: Path, motion: dict[str, FloatArray]
-) -> None:
+def test_every_sample_is_checked_and_a_breakdown_contains_the_times(log: Path, motion: Motion) -> None:
     line = run("velocity panda --frame panda_hand --trajectory", str(log)).text.splitlines()[-1]
     assert f"{N} velocity results, worst disagreement " in line
     assert "of the bound" in line
@@ -190,7 +190,7 @@ def test_a_placement_needs_no_time_and_does_not_unwrap_angles(tmp_path: Path) ->
 
 
 def test_velocities_of_the_file_are_used_and_computed_derivatives_are_stated(
-    motion: dict[str, FloatArray], tmp_path: Path
+    motion: Motion, tmp_path: Path
 ) -> None:
     path = write(tmp_path / "log.csv", urdfkin.load("panda"), {x: motion[x] for x in "tqv"})
     words = ("panda", "--frame", "panda_hand", "--trajectory", str(path))
@@ -206,7 +206,7 @@ def test_velocities_of_the_file_are_used_and_computed_derivatives_are_stated(
 
 
 def test_a_base_in_the_options_or_in_the_file_moves_the_robot(
-    motion: dict[str, FloatArray], log: Path, tmp_path: Path
+    motion: Motion, log: Path, tmp_path: Path
 ) -> None:
     words = "placement panda --frame panda_hand --format json --trajectory"
     shifted = np.array(run(words, str(log), "--base-placement", "1,2,3,0,0,0").data["result"])

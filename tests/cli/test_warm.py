@@ -57,7 +57,6 @@ def test_after_warm_no_process_is_started_to_compile(monkeypatch: pytest.MonkeyP
     def fail(*_: object, **__: object) -> NoReturn:
         pytest.fail("a process was started")
 
-    assert urdfkin("warm").code == 0
     monkeypatch.setattr(preload, "_compile_elsewhere", fail)
     preload.load_kernels()
 

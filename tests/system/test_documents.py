@@ -13,7 +13,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import urdfkin
-from tests.report.documents import arms, failing, hostile, run_on
+from tests.report.documents import arms, failing, hostile, run_on, saved
 from urdfkin.comparison.certificate import SAME, certificate
 from urdfkin.errors import InputError, SourceError
 from urdfkin.report.compare import COMPARISON, compare
@@ -45,7 +45,7 @@ def _made(name: str) -> str:
     if name == HISTORY.name:
         with TemporaryDirectory() as folder:
             for day in (1, 2):
-                (Path(folder) / f"{day}.json").write_text(json.dumps(run_on(day, arms())))
+                saved(Path(folder) / f"{day}.json", run_on(day, arms()))
             return json.dumps(history([Path(folder)]).as_dict("urdfkin report history"))
     return json.dumps(arms())
 
@@ -220,8 +220,6 @@ def test_a_file_is_read_back_unchanged_and_unknown_entries_are_ignored(tmp_path:
     document: Any = arms()
     document["robots"][0]["checks"][0]["later"] = document["later"] = {"a": 1}
     assert checked(document, "results.json") == arms()
-    path = tmp_path / "results.json"
     with pytest.raises(SourceError, match="cannot be read"):
-        read_document(path)
-    path.write_text(json.dumps(hostile()))
-    assert read_document(path) == hostile()
+        read_document(tmp_path / "results.json")
+    assert read_document(saved(tmp_path / "results.json", hostile())) == hostile()
