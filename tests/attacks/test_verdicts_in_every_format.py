@@ -11,7 +11,7 @@ from rich.console import Console
 
 from tests.reading import present
 from tests.report.documents import arms, failing
-from tests.report.test_junit import read
+from tests.report.test_texts import read
 from tests.urdfs import chain
 from urdfkin.report.html import as_html
 from urdfkin.report.markdown import as_markdown

@@ -1,17 +1,21 @@
 """Run the command `urdfkin` in this process, or in a new process."""
 
+import csv
 import io
 import json
 import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from urdfkin.cli import main
+from urdfkin.model.tree import FloatArray
 from urdfkin.system.processes import own_python
 
 
@@ -31,6 +35,22 @@ class Done:
     def data(self) -> Any:
         """Standard output as JSON, without NaN and Infinity."""
         return json.loads(self.text, parse_constant=_reject)
+
+    @property
+    def rows(self) -> list[list[str]]:
+        """Standard output as the rows of a CSV file."""
+        return [*csv.reader(io.StringIO(self.text))]
+
+    @property
+    def array(self) -> FloatArray:
+        """Standard output as the array of an .npy file."""
+        array: FloatArray = np.load(io.BytesIO(self.out))
+        return array
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Write numbers to the last digit, as one word of a command line."""
+    return ",".join(repr(float(value)) for value in values)
 
 
 def _reject(word: str) -> None:

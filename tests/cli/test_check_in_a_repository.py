@@ -1,4 +1,4 @@
-"""`urdfkin check` in a repository: folders, settings, baselines, changes since a version, fixes."""
+"""`urdfkin check`: formats and options; in a repository, folders, settings, baselines, changes, fixes."""
 
 import json
 import os
@@ -6,11 +6,13 @@ import re
 import subprocess
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote_to_bytes, urlsplit
 
 import pytest
 
-from tests.cli.running import Done, refused, urdfkin
+from tests.cli.running import Done, good, refused, urdfkin
 from tests.urdf.lint.cases import CASES
+from tests.urdfs import chain
 from urdfkin.urdf.lint import check as lint
 
 LONG = """<robot name="r">
@@ -27,7 +29,7 @@ BAD = '<robot name="r"><link name="a"/><link name="b"/></robot>\n'
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Make an empty repository the current folder."""
+    """Make an empty repository the current folder until the end of the test."""
     (tmp_path / ".git").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -51,6 +53,84 @@ def found(*words: str) -> list[tuple[str, str]]:
 
 def settings(text: str) -> None:
     Path("pyproject.toml").write_text(f"[tool.urdfkin]\n{text}\n")
+
+
+# -- exit codes and formats ----------------------------------------------------------------------------
+
+TWICE = '<robot name="r">\n  <link name="a"/>\n  <link name="a"/>\n</robot>\n'
+
+
+@pytest.fixture
+def folder(here: Path) -> None:
+    """Make a folder with a good file, a file with a warning, and a file with an error current."""
+    put("good.urdf", GOOD)
+    put("warned.urdf", '<robot name="">\n  <link name="a"/>\n</robot>\n')
+    put("bad.urdf", TWICE)
+
+
+#: For each line: the exit code, and the start of the output or, after a star, a text in the output
+LINES = {
+    "good.urdf": (0, "no findings in 1 file\n"), "warned.urdf": (0, "*URDF405"),
+    "--strict warned.urdf": (1, "*URDF405 error"),
+    "--ignore URDF402 bad.urdf": (0, "no findings in 1 file\n"), "-": (1, "<stdin>:"),
+    "--format json bad.urdf good.urdf": (1, "*URDF402"), "--format sarif bad.urdf good.urdf": (1, "*URDF402"),
+    "--format github good.urdf": (0, ""), "--max-bytes 10 good.urdf": (1, "*URDF108"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_only_errors_exit_with_1_and_strict_turns_warnings_into_errors(line: str, folder: None) -> None:
+    code, words = LINES[line]
+    done = urdfkin(f"check {line}", stdin=TWICE)
+    assert (done.code, done.err) == (code, "")
+    assert words[1:] in done.text if words.startswith("*") else done.text.startswith(words)
+    if "json" in line or "sarif" in line:
+        assert done.data, "one document"
+
+
+def test_an_error_exits_with_1_and_a_missing_file_or_an_unknown_code_with_2(folder: None) -> None:
+    done = check("good.urdf", "bad.urdf")
+    assert done.code == 1
+    lines = done.text.splitlines()
+    assert lines[0].startswith("bad.urdf:3:9: URDF402 error: link 'a': another link has this name")
+    assert lines[1:3] == ['  3 |   <link name="a"/>', "    |         ^^^^^^^^"]
+    assert lines[3] == "1 error in 2 files"
+    assert lines[4].startswith("run 'urdfkin explain URDF402'")
+    done = check("nowhere.urdf", "bad.urdf")
+    assert done.code == 2
+    assert "URDF402" in done.text
+    assert done.err == "urdfkin: error: nowhere.urdf: no such file; did you mean warned.urdf?\n"
+    assert "did you mean URDF402" in refused("check --ignore URDF4022 bad.urdf")
+
+
+def test_explain_prints_a_page_and_lists_all_codes() -> None:
+    assert good("explain urdf502").text.startswith("URDF502 axis-without-direction (error)")
+    assert urdfkin("explain").text.count("\n") > 60
+    assert urdfkin("explain URDF999").code == 2
+
+
+NAMES = [b"r\xff\xe9.urdf", b"a b:c%41?#\\[].urdf", "ä\u202e.urdf".encode(), b"a\nb.urdf"]
+
+#: A path according to RFC 3986
+PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-F]{2})+")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("absolute", [False, True])
+def test_a_sarif_uri_decodes_to_the_exact_bytes_of_the_file_name(
+    here: Path, name: bytes, absolute: bool
+) -> None:
+    place = here / os.fsdecode(name)
+    place.write_text(TWICE)
+    given = os.fsencode(place) if absolute else name
+    done = urdfkin("check --format sarif", os.fsdecode(given))
+    assert done.code == 1, done.err
+    (result,) = done.data["runs"][0]["results"]
+    parts = urlsplit(result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"])
+    assert PATH.fullmatch(parts.path)
+    assert (parts.scheme, parts.netloc) == ("file" if absolute else "", "")
+    assert (parts.query, parts.fragment) == ("", "")
+    assert unquote_to_bytes(parts.path) == given
 
 
 # -- files ---------------------------------------------------------------------------------------------
@@ -144,13 +224,11 @@ def test_a_comment_silences_a_finding_and_json_contains_the_reason(here: Path) -
 # -- settings ------------------------------------------------------------------------------------------
 
 
-def test_settings_are_read_from_a_parent_folder_and_options_override_settings(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_settings_are_read_from_a_parent_folder_and_options_override_settings(here: Path) -> None:
     put("robots/arm.urdf")
     put("robots/old/arm.urdf", BAD)
     settings('strict = true\nexclude = ["robots/old"]\nselect = ["URDF5"]')
-    monkeypatch.chdir("robots")
+    os.chdir("robots")
     assert found() == [("arm.urdf", "URDF503")]
     assert check().code == 1
     assert check("--select", "URDF2").code == check("--no-strict").code == 0
@@ -159,16 +237,14 @@ def test_settings_are_read_from_a_parent_folder_and_options_override_settings(
     assert check("--config", "other.toml", "arm.urdf").code == 0
 
 
-def test_codes_are_ignored_per_file_and_only_by_settings_of_the_same_repository(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_codes_are_ignored_per_file_and_only_by_settings_of_the_same_repository(here: Path) -> None:
     for name in ("legacy/arm.urdf", "arm.urdf", "inner/arm.urdf"):
         put(name)
     (here / "inner/.git").mkdir(parents=True)
     settings('per-file-ignores = { "legacy/*" = ["URDF5"] }')
     assert found() == [("arm.urdf", "URDF503"), ("inner/arm.urdf", "URDF503")]
     settings('ignore = ["URDF503"]')
-    monkeypatch.chdir("inner")  # inside another repository
+    os.chdir("inner")  # inside another repository
     assert found() == [("arm.urdf", "URDF503")]
     Path("pyproject.toml").write_text("[tool.other]\nignor = 1\n")
     assert found() == [("arm.urdf", "URDF503")]
@@ -209,15 +285,11 @@ def test_findings_in_a_baseline_do_not_fail_the_check_and_new_findings_do(here: 
     arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # a finding of a changed element is new
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
     arm.write_text(GOOD)
-    assert (
-        "(already known: 1, in the baseline but already fixed: 1; write the baseline again)"
-        in check("--baseline", "known.json").text
-    )
+    known = "already known: 1, in the baseline but already fixed: 1; write the baseline again"
+    assert f"({known})" in check("--baseline", "known.json").text
 
 
-def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_selects_the_baseline(
-    here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_selects_the_baseline(here: Path) -> None:
     joint = '<joint name="j" type="fixed"><parent link="a"/><child link="b"/><a/>{}</joint>'
     text = f'<robot name="r"><link name="a"/><link name="b"/>{joint}</robot>'
     put("arm.urdf", text.format(""))
@@ -227,7 +299,7 @@ def test_a_second_finding_of_a_known_kind_is_new_and_a_setting_selects_the_basel
     put("robots/arm.urdf")
     check("--write-baseline", "known.json")
     settings('baseline = "known.json"')
-    monkeypatch.chdir("robots")
+    os.chdir("robots")
     assert found() == found(str(here)) == []
 
 
@@ -299,10 +371,10 @@ def test_only_findings_that_are_new_since_a_branch_are_reported(repository: Path
 
 
 def test_changes_are_found_from_a_subfolder_and_for_a_file_outside_the_repository(
-    repository: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+    repository: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     (repository / "below").mkdir()
-    monkeypatch.chdir("below")
+    os.chdir("below")
     other = tmp_path_factory.mktemp("other") / "arm.urdf"
     other.write_text(LONG.replace('"r"', '"other"'))
     assert found("--changed-since", "main", "../arm.urdf", str(other)) == [(str(other), "URDF503")]
@@ -373,10 +445,9 @@ def test_all_findings_of_a_usd_or_mjcf_file_are_reported_if_a_part_changed(
 @pytest.mark.slow
 def test_all_findings_of_a_xacro_file_are_reported_if_a_possible_include_changed(repository: Path) -> None:
     pytest.importorskip("xacrodoc")
-    macro = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="l" value="{}"/></robot>'
-    include = (
-        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="part.xacro"/>'
-    )
+    robot = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    macro = robot + '<xacro:property name="l" value="{}"/></robot>'
+    include = robot + '<xacro:include filename="part.xacro"/>'
     put("part.xacro", macro.format(2))
     put("whole.urdf.xacro", LONG.replace('<robot name="r">', include).replace("0 0 2", "0 0 ${l}"))
     settings('include = ["*.urdf.xacro"]')
@@ -502,13 +573,11 @@ def test_git_applies_the_patch_of_diff_with_the_result_of_fix(here: Path, lines:
 
 
 @pytest.mark.parametrize("lines", ["line feeds", "a bidi mark nearby"])
-def test_a_patch_printed_in_a_subfolder_of_a_repository_is_applied_in_the_subfolder(
-    here: Path, monkeypatch: pytest.MonkeyPatch, lines: str
-) -> None:
+def test_a_patch_printed_in_a_subfolder_is_applied_in_the_subfolder(here: Path, lines: str) -> None:
     git("init", "-q")
     arm = put("robots/arm.urdf")
     arm.write_bytes(ODD_LINES[lines].encode())
-    monkeypatch.chdir("robots")
+    os.chdir("robots")
     apply(check("--diff", arm.name).out)
     assert b"0 0 1" in Path(arm.name).read_bytes()
 
@@ -529,12 +598,8 @@ def test_fixes_that_rotate_a_joint_need_unsafe_fixes(here: Path) -> None:
 
 
 def test_github_output_has_errors_first_and_one_line_for_many_findings_of_a_kind(here: Path) -> None:
-    joints = "".join(
-        f'<link name="l{k}"/><joint name="j{k}" type="continuous"><parent link="a"/><child link="l{k}"/>'
-        f'<axis xyz="0 0 2"/></joint>\n'
-        for k in range(30)
-    )
-    put("arm.urdf", f'<robot name="r"><link name="a"/>\n{joints}<link name="stray"/></robot>')
+    text = chain([""] * 30, origin="", axis="0 0 2").replace("</robot>", '<link name="stray"/></robot>')
+    put("arm.urdf", text.replace("<joint", "\n<joint"))
     text = check("--format", "github").text
     words = [line.split(" ")[0] for line in text.splitlines()]
     assert words == sorted(words, key=["::error", "::warning", "::notice"].index)

@@ -8,17 +8,13 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.cli.running import good, python, refused
+from tests.cli.running import good, numbers, python, refused
 from tests.cli.running import urdfkin as run
 from urdfkin.model.conventions import BUILT_IN
 from urdfkin.verify.quantities import by_command
 
 OF_FRAMES = [name for name, row in by_command().items() if row.referred]
 DOG = ("a1", "--root-joint", "floating", "--frame", "FL_foot", "--convention")
-
-
-def _text(values: np.ndarray) -> str:
-    return ",".join(map(repr, values.tolist()))
 
 
 @pytest.mark.parametrize("name", ["mujoco", "drake", "isaaclab", "pinocchio"])
@@ -29,7 +25,7 @@ def test_a_result_equals_the_result_of_the_robot_in_the_convention(command: str,
     row, rng = by_command()[command], np.random.default_rng(3)
     ours = robot.sample(1, 3)[0], rng.standard_normal(robot.nv), rng.standard_normal(robot.nv)
     values = dict(zip("qva", other.conversion.to(*ours), strict=True))
-    given = [word for letter in row.inputs for word in (f"--{letter}={_text(values[letter])}",)]
+    given = [word for letter in row.inputs for word in (f"--{letter}={numbers(values[letter])}",)]
     done = good(command, *DOG, name, *given, "--format", "json")
     expected = getattr(other, row.method)(*(values[letter] for letter in row.inputs), "FL_foot")
     assert np.allclose(done.data["result"][0], expected, 0, 1e-12)
@@ -42,7 +38,7 @@ def test_a_result_equals_the_result_of_the_robot_in_the_convention(command: str,
 def test_a_placement_reads_q_in_the_convention_and_wxyz_has_the_scalar_first() -> None:
     robot = urdfkin.load("a1", root_joint="floating", verify=False)
     q = robot.sample(1, 3)[0]
-    text = _text(robot.convention("mujoco").to(q))
+    text = numbers(robot.convention("mujoco").to(q))
     done = run("placement", *DOG, "mujoco", "--q", text, "--format", "json")
     assert np.allclose(done.data["result"][0], robot.placement(q, "FL_foot"), 0, 1e-14)
     assert "convention mujoco" in run("placement", *DOG, "mujoco", "--q", text).text

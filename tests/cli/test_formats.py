@@ -77,8 +77,14 @@ def test_the_check_is_part_of_json_and_is_printed_on_stderr_for_csv() -> None:
     assert done.data["check"].startswith("Pinocchio")
     done = urdfkin("chain ur5 --format csv")
     assert done.err.startswith("Pinocchio")
-    done = urdfkin("chain ur5 --no-verify --format json")
-    assert (done.code, done.data["verified"]) == (3, False)
+
+
+@pytest.mark.parametrize("line", ["jacobian panda", "imu ur5", "chain ur5", "dh ur5 --base base --tip tool0"])
+def test_an_unverified_result_is_marked_and_exits_with_3(line: str) -> None:
+    done = urdfkin(f"{line} --no-verify")
+    assert (done.code, "NOT VERIFIED" in done.text) == (3, True)
+    if not line.startswith("dh"):
+        assert urdfkin(f"{line} --no-verify --format json").data["verified"] is False
 
 
 def test_an_entry_for_a_printed_format_replaces_the_document() -> None:

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import urdfkin as library
-from tests.cli.running import good, refused, urdfkin
+from tests.cli.running import good, numbers, refused, urdfkin
 from urdfkin.cli import quantity
 from urdfkin.cli.quantity import REPRESENTATIONS
 from urdfkin.kinematics import rotation
@@ -25,21 +25,18 @@ MOVED = "0,0,1,0,0,0.5235987755982988"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("written", ["rpy", "quaternion"])
-@pytest.mark.parametrize("relative_to", [None, "forearm_link"])
-def test_rpy_and_quaternion_output_give_the_same_pose_as_the_matrix(
-    written: str, relative_to: str | None
-) -> None:
-    words = [] if relative_to is None else ["--relative-to", relative_to]
-    ask = ["placement", "ur5", "--q", "random:3", *words, "--format", "json"]
-    T = np.array(urdfkin(*ask).data["result"])
-    done = urdfkin(*ask, "--as", written)
+@pytest.mark.parametrize("relative_to", ["", "forearm_link"])
+def test_rpy_and_quaternion_output_give_the_same_pose_as_the_matrix(written: str, relative_to: str) -> None:
+    line = "placement ur5 --q random:3" + f" --relative-to {relative_to}" * bool(relative_to)
+    T = np.array(urdfkin(f"{line} --format json").data["result"])
+    done = urdfkin(f"{line} --format json --as {written}")
     found = np.array(done.data["result"])
     assert done.data["verified"] is True
-    assert done.data.get("relative_to") == relative_to
+    assert done.data.get("relative_to", "") == relative_to
     np.testing.assert_array_equal(found[:, :3], T[:, :3, 3])
     turn = Rotation.from_euler("xyz", found[:, 3:]) if written == "rpy" else Rotation.from_quat(found[:, 3:])
     np.testing.assert_allclose(turn.as_matrix(), T[:, :3, :3], atol=1e-15)
-    rows = list(csv.reader(io.StringIO(urdfkin(*ask[:-1], "csv", "--as", written).text)))
+    rows = urdfkin(f"{line} --format csv --as {written}").rows
     assert rows[0] == ["sample", *done.data["rows"]]
     np.testing.assert_array_equal(np.array(rows[1:], dtype=float)[:, 1:], found)
 
@@ -67,7 +64,7 @@ def test_a_wrong_conversion_to_rpy_is_a_disagreement(monkeypatch: pytest.MonkeyP
 
 def test_rpy_output_is_correct_in_gimbal_lock() -> None:
     angles = [0.3, 1.5707963267948966, 0.2]
-    pose = ",".join(map(repr, [0, 0, 0, *angles]))
+    pose = numbers([0, 0, 0, *angles])
     done = good(f"placement ur5 --base-placement {pose} --frame base_link --as rpy --format json")
     turn, expected = (Rotation.from_euler("xyz", x) for x in (done.data["result"][0][3:], angles))
     np.testing.assert_allclose(turn.as_matrix(), expected.as_matrix(), atol=1e-15)
@@ -140,7 +137,7 @@ def test_a_batch_of_bases_is_combined_with_one_or_as_many_configurations(tmp_pat
     rows[:, 3:] /= np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)
     path = tmp_path / "base.csv"
     names = ["x", "y", "z", "qx", "qy", "qz", "qw"]
-    path.write_text("\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]))
+    path.write_text("\n".join([",".join(names), *map(numbers, rows)]))
     T = np.tile(np.eye(4), (4, 1, 1))
     T[:, :3, :3], T[:, :3, 3] = Rotation.from_quat(rows[:, 3:]).as_matrix(), rows[:, :3]
     robot = library.load("ur5")
@@ -148,20 +145,19 @@ def test_a_batch_of_bases_is_combined_with_one_or_as_many_configurations(tmp_pat
         done = good("placement ur5 --q", q, "--base-placement", f"@{path}", "--format", "json")
         expected: FloatArray = robot.placement(done.data["q"], "tool0", base=BaseMotion(T))
         np.testing.assert_allclose(done.data["result"], expected, atol=1e-14)
-    assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in refused(
-        "placement ur5 --q random:3 --base-placement", f"@{path}"
-    )
+    err = refused("placement ur5 --q random:3 --base-placement", f"@{path}")
+    assert "batches of q, v, a and the base motion have different lengths: found 3, 3, 3, 4, 1, 1" in err
 
 
-# -- the parts of an acceleration, and the rate of the Jacobian ------------------------------------
+# -- the parts of an acceleration ---------------------------------------------------------------------
 
-POLAR = ["polar", "--q", "0.3,0.7", "--v", "1,2", "--a", "0.5,-1"]
+POLAR = "acceleration polar --q 0.3,0.7 --v 1,2 --a 0.5,-1 --breakdown"
 KINDS = ["transverse", "centripetal", "coriolis", "sliding"]
 
 
 @pytest.mark.slow
 def test_the_parts_of_the_polar_robots_acceleration_are_shown_with_their_sum() -> None:
-    result = good("acceleration", *POLAR, "--breakdown")
+    result = good(POLAR)
     rows = [line.split() for line in result.text.splitlines() if line.strip().startswith(("joint_", "sum"))]
     kinds = ["joint_1 transverse", "joint_1 centripetal", "joint_2 coriolis", "joint_2 sliding"]
     assert [" ".join(row[:2]) for row in rows[:-1]] == kinds
@@ -172,24 +168,13 @@ def test_the_parts_of_the_polar_robots_acceleration_are_shown_with_their_sum() -
 
 @pytest.mark.slow
 def test_the_parts_of_an_acceleration_in_json_and_csv_sum_to_the_acceleration() -> None:
-    data = good("acceleration", *POLAR, "--breakdown", "--format", "json").data
+    data = good(f"{POLAR} --format json").data
     terms = np.array(data["terms"])
     assert terms.shape == (1, 2, 4, 6)
     assert (data["kinds"], data["verified"]) == (KINDS, True)
     assert np.array_equal(np.array(data["base"]) + terms.sum(axis=2).sum(axis=1), data["total"])
     expected = library.load("polar").acceleration([0.3, 0.7], [1.0, 2.0], [0.5, -1.0], "slider")
     assert np.abs(data["total"][0] - expected).max() <= 1e-14
-    rows = list(
-        csv.DictReader(io.StringIO(urdfkin("acceleration", *POLAR, "--breakdown", "--format", "csv").text))
-    )
+    rows = list(csv.DictReader(io.StringIO(urdfkin(f"{POLAR} --format csv").text)))
     assert [row["kind"] for row in rows] == [*KINDS, ""]
     assert float(rows[-1]["vx"]) == pytest.approx(sum(float(row["vx"]) for row in rows[:-1]), abs=1e-14)
-
-
-@pytest.mark.slow
-def test_the_command_jacobian_rate_gives_the_librarys_result() -> None:
-    data = good("jacobian-rate", *POLAR[:5], "--format", "json").data
-    assert np.array_equal(
-        data["result"][0], library.load("polar").jacobian_rate([0.3, 0.7], [1.0, 2.0], "slider")
-    )
-    assert data["v"] == [[1.0, 2.0]]

@@ -1,6 +1,7 @@
-"""`urdfkin validate` and `urdfkin report` write reports in every format."""
+"""`urdfkin validate` and `urdfkin report` write reports in every format, and show progress."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,10 @@ import pytest
 
 from tests.cli import running
 from tests.cli.running import Done
-from tests.report.documents import arms, failing
+from tests.report.documents import arms, failing, saved
+from urdfkin.cli import campaign
+from urdfkin.cli.campaign import Pace, line
+from urdfkin.validation.collector import CampaignProgress
 
 
 @pytest.fixture(autouse=True)
@@ -22,14 +26,12 @@ def urdfkin(*words: str | Path) -> Done:
 
 @pytest.fixture
 def good(tmp_path: Path) -> Path:
-    (path := tmp_path / "good.json").write_text(json.dumps(arms()))
-    return path
+    return saved(tmp_path / "good.json", arms())
 
 
 @pytest.fixture
 def bad(tmp_path: Path) -> Path:
-    (path := tmp_path / "bad.json").write_text(json.dumps(failing()))
-    return path
+    return saved(tmp_path / "bad.json", failing())
 
 
 @pytest.mark.slow
@@ -76,14 +78,11 @@ def test_a_report_rendered_later_equals_the_report_of_validate(tmp_path: Path) -
 def test_report_prints_by_default_with_the_exit_code_of_the_run_and_prints_the_schema(
     good: Path, bad: Path
 ) -> None:
-    done = urdfkin("report", good)
-    assert done.code == 0
-    assert "2 robots" in done.text
-    done = urdfkin("report", bad)
-    assert done.code == 1
-    assert "urdfkin velocity panda --frame" in done.text
-    done = urdfkin("report", "--schema")
-    assert json.loads(done.text)["$id"] == "urn:urdfkin:validation:1"
+    for report, code, words in ((good, 0, "2 robots"), (bad, 1, "urdfkin velocity panda --frame")):
+        done = urdfkin("report", report)
+        assert done.code == code
+        assert words in done.text
+    assert urdfkin("report --schema").data["$id"] == "urn:urdfkin:validation:1"
 
 
 @pytest.mark.slow
@@ -96,7 +95,7 @@ def test_compare_exits_with_1_for_a_regression_or_a_missing_robot(
     assert (tmp_path / "c.md").read_text().startswith("## ❌")
     assert urdfkin("report", "compare", bad, good).code == 1  # the second report lacks a robot
     assert urdfkin("report", "compare", good, good).code == 0
-    found = json.loads(urdfkin("report", "compare", good, bad, "--format", "json").text)
+    found = urdfkin("report", "compare", good, bad, "--format", "json").data
     assert found["schema"] == "urdfkin-comparison/1"
     assert found["verdict"] == "regression"
     assert any(change["regression"] for change in found["changes"])
@@ -106,12 +105,10 @@ def test_compare_exits_with_1_for_a_regression_or_a_missing_robot(
 def test_compare_lists_a_changed_axis_and_states_that_changes_alone_exit_with_0(
     good: Path, tmp_path: Path
 ) -> None:
-    changed = arms()
-    joint: Any = changed["robots"][1]["model"]["joints"][2]  # type: ignore[index]
+    changed: Any = arms()
+    joint = changed["robots"][1]["model"]["joints"][2]
     joint["axis"] = [-x for x in joint["axis"]]
-    new = tmp_path / "new.json"
-    new.write_text(json.dumps(changed))
-    done = urdfkin("report", "compare", good, new)
+    done = urdfkin("report", "compare", good, saved(tmp_path / "new.json", changed))
     assert done.code == 0
     words = " ".join(done.text.split())
     assert f"ur5: joint {joint['name']}, axis: z -> -z, rotated by 3.142 rad" in words
@@ -128,9 +125,67 @@ def test_an_unwritable_report_leaves_existing_files_unchanged(tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_plot_reports_the_number_of_checked_samples(tmp_path: Path) -> None:
-    done = urdfkin(
-        "plot", "ur5", "--to", "random", "--samples", "11", "--panel", "position", "-o", tmp_path / "a.png"
-    )
+    words = "plot ur5 --to random --samples 11 --panel position -o"
+    done = urdfkin(words, tmp_path / "a.png")
     assert done.code == 0, done.err
     assert "11 samples, verified by Pinocchio" in done.text
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+# -- progress ----------------------------------------------------------------------------------------
+
+STANDING = CampaignProgress(
+    robots_done=2, robots=68, chunks_done=30, chunks=544, chunks_kept=10, failures=0, label="panda"
+)
+
+
+@pytest.mark.parametrize("compiling", [0.0, 90.0])
+def test_stored_chunks_and_compilation_do_not_change_the_reported_speed(compiling: float) -> None:
+    now = [100.0]
+    pace = Pace(lambda: now[0])
+    now[0] += compiling
+    assert pace.of(replace(STANDING, chunks_done=10)) == (None, None)
+    now[0] += 5.0
+    assert pace.of(STANDING) == (4.0, 128.5)
+    assert line(STANDING, pace) == (
+        "2 of 68 robots, 30 of 544 chunks (10 from an earlier run); 4 chunks/s, 2 min 8 s left, none"
+        " failed; panda"
+    )
+    assert "3 failed" in line(replace(STANDING, failures=3), pace)
+
+
+def test_json_progress_is_printed_from_the_start_to_the_last_chunk() -> None:
+    def states(robots: str) -> list[dict[str, Any]]:
+        err = urdfkin(f"validate {robots} --samples 50 --json-progress").err
+        return [json.loads(text) for text in err.splitlines() if text.startswith("{")]
+
+    first, *_, last = states("planar_two_link nosuch")
+    assert last["chunks_done"] == last["chunks"] == 4
+    assert (last["robots_done"], last["failures"], last["seconds_left"]) == (2, 1, 0.0)
+    assert set(first) == {*STANDING.__slots__, "chunks_per_second", "seconds_left"}
+    first, *_ = states("planar_two_link")
+    assert (first["chunks_done"], first["chunks"], first["label"]) == (0, 2, "planar_two_link")
+    assert first["chunks_per_second"] is None
+
+
+def test_a_log_gets_progress_lines_at_intervals_and_none_for_a_short_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert "chunks" not in urdfkin("validate planar_two_link --samples 50").err
+    monkeypatch.setattr(campaign, "_LINES", 0.0)
+    done = urdfkin("validate planar_two_link --samples 50")
+    assert "urdfkin: 1 of 1 robots, 2 of 2 chunks; " in done.err
+    assert done.err.endswith("left, none failed; planar_two_link\n")
+
+
+@pytest.mark.slow
+def test_a_shard_reports_the_result_and_the_next_command(tmp_path: Path) -> None:
+    where = str(tmp_path / "s")
+    words = ("validate", "planar_two_link", "double_pendulum", "--samples", "0", "--store", where)
+    done = urdfkin(*words, "--shard", "2/2")
+    assert done.code == 0, done.err
+    assert f"shard 2/2 of {where}: 1 robot, " in done.text
+    assert "next: run `urdfkin report merge" in done.text
+    assert urdfkin("report", where).code == 130
+    assert urdfkin(*words, "--shard", "1/2").code == 0
+    assert urdfkin("report", where).code == 0

@@ -1,7 +1,5 @@
 """`--trajectory FILE`: each row gives the result of the command in that configuration."""
 
-import csv
-import io
 import re
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from tests.cli.running import good, refused
+from tests.cli.running import good, numbers, refused
 from tests.cli.running import urdfkin as run
 from tests.urdfs import joint
 from tests.urdfs import robot as robot_of
@@ -19,6 +17,8 @@ from urdfkin.cli import cli
 from urdfkin.model.tree import FloatArray
 from urdfkin.verify.quantities import by_command
 
+#: Arrays t, q, v and a
+Motion = dict[str, FloatArray]
 N = 9  # the forward recursion computes eight configurations at a time
 COMMANDS = {
     **{name: [row.inputs] for name, row in by_command().items()},
@@ -29,24 +29,24 @@ COMMANDS = {
 
 
 @pytest.fixture(scope="module")
-def motion() -> dict[str, FloatArray]:
+def motion() -> Motion:
     robot, rng = urdfkin.load("panda"), np.random.default_rng(5)
     v, a = rng.standard_normal((2, N, robot.nv))
     return {"t": np.cumsum(rng.uniform(0.01, 0.1, N)), "q": robot.sample(N, 2), "v": v, "a": a}
 
 
 @pytest.fixture
-def log(motion: dict[str, FloatArray], tmp_path: Path) -> Path:
+def log(motion: Motion, tmp_path: Path) -> Path:
     return write(tmp_path / "log.csv", urdfkin.load("panda"), motion)
 
 
-def write(path: Path, robot: Any, motion: dict[str, FloatArray], time: str = "t") -> Path:
+def write(path: Path, robot: Any, motion: Motion, time: str = "t") -> Path:
     """Write the arrays of a motion as CSV with the names of a robot or of a convention."""
     names = {"t": [time], "q": robot.coordinate_names}
     names |= {x: [f"{x}:{name}" for name in robot.rate_names] for x in "va"}
     heads = [name for x in motion for name in names[x]]
     rows = np.column_stack(list(motion.values())).tolist()
-    path.write_text("\n".join([",".join(heads), *(",".join(map(repr, row)) for row in rows)]))
+    path.write_text("\n".join([",".join(heads), *map(numbers, rows)]))
     return path
 
 
@@ -78,7 +78,7 @@ def test_every_command_with_joint_values_has_a_convention_and_with_a_batch_a_tra
 
 @pytest.mark.parametrize("command", ["placement", *COMMANDS])
 def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
-    command: str, motion: dict[str, FloatArray], log: Path
+    command: str, motion: Motion, log: Path
 ) -> None:
     inputs, *options = COMMANDS.get(command, ["q"])
     words = (command, "panda", "--frame", "panda_hand", *options)
@@ -87,7 +87,7 @@ def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
     assert f" {N} " in done.data["check"]
     results = [key for key in done.data if key in ("result", "singular_values", "manipulability_gradient")]
     for k in (0, 3, N - 1):
-        given = [f"--{x}={','.join(map(repr, motion[x][k].tolist()))}" for x in inputs]
+        given = [f"--{x}={numbers(motion[x][k])}" for x in inputs]
         one = run(*words, *given, "--format", "json")
         for key in results:
             batch, single = done.data[key], one.data[key]
@@ -97,10 +97,10 @@ def test_each_row_is_bitwise_equal_to_the_result_of_the_single_command(
 
 
 @pytest.mark.parametrize("command", ["placement", *COMMANDS])
-def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArray], log: Path) -> None:
+def test_csv_has_one_row_for_each_time(command: str, motion: Motion, log: Path) -> None:
     _, *options = COMMANDS.get(command, ["q"])
     words = (command, "panda", "--frame", "panda_hand", *options, "--trajectory", str(log))
-    head, *rows = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
+    head, *rows = run(*words, "--format", "csv").rows
     assert head[0] == "t"
     assert len({*head}) == len(head)
     table = np.array(rows, dtype=float)
@@ -114,14 +114,12 @@ def test_csv_has_one_row_for_each_time(command: str, motion: dict[str, FloatArra
         assert head[1:3] == ["vx panda_joint1", "vx panda_joint2"]
 
 
-def test_every_sample_is_checked_and_a_breakdown_contains_the_times(
-    log: Path, motion: dict[str, FloatArray]
-) -> None:
+def test_every_sample_is_checked_and_a_breakdown_contains_the_times(log: Path, motion: Motion) -> None:
     line = run("velocity panda --frame panda_hand --trajectory", str(log)).text.splitlines()[-1]
     assert f"{N} velocity results, worst disagreement " in line
     assert "of the bound" in line
     words = ("acceleration", "panda", "--frame", "panda_hand", "--breakdown", "--trajectory", str(log))
-    head, first, *_ = csv.reader(io.StringIO(run(*words, "--format", "csv").text))
+    head, first, *_ = run(*words, "--format", "csv").rows
     assert head[:3] == ["t", "joint", "kind"]
     assert float(first[0]) == motion["t"][0]
 
@@ -164,8 +162,8 @@ def test_singular_values_do_not_depend_on_the_convention_and_the_gradient_follow
     robot = urdfkin.load("a1", verify=False)
     mujoco, q = robot.convention("mujoco"), robot.sample(1, 4)
     words = ("singular-values", "a1", "--frame", "FL_foot", "--rows", "linear", "--format", "json")
-    plain = run(*words, f"--q={','.join(map(repr, q[0].tolist()))}").data
-    text = f"--q={','.join(map(repr, mujoco.to(q)[0].tolist()))}"
+    plain = run(*words, f"--q={numbers(q[0])}").data
+    text = f"--q={numbers(mujoco.to(q)[0])}"
     found = run(*words, text, "--convention", "mujoco").data
     assert found["singular_values"] == plain["singular_values"]
     order = mujoco.rate_permutation
@@ -192,7 +190,7 @@ def test_a_placement_needs_no_time_and_does_not_unwrap_angles(tmp_path: Path) ->
 
 
 def test_velocities_of_the_file_are_used_and_computed_derivatives_are_stated(
-    motion: dict[str, FloatArray], tmp_path: Path
+    motion: Motion, tmp_path: Path
 ) -> None:
     path = write(tmp_path / "log.csv", urdfkin.load("panda"), {x: motion[x] for x in "tqv"})
     words = ("panda", "--frame", "panda_hand", "--trajectory", str(path))
@@ -208,7 +206,7 @@ def test_velocities_of_the_file_are_used_and_computed_derivatives_are_stated(
 
 
 def test_a_base_in_the_options_or_in_the_file_moves_the_robot(
-    motion: dict[str, FloatArray], log: Path, tmp_path: Path
+    motion: Motion, log: Path, tmp_path: Path
 ) -> None:
     words = "placement panda --frame panda_hand --format json --trajectory"
     shifted = np.array(run(words, str(log), "--base-placement", "1,2,3,0,0,0").data["result"])
@@ -268,9 +266,9 @@ def test_a_chain_reads_q_in_a_convention_and_names_the_convention() -> None:
     robot = urdfkin.load("a1", verify=False)
     q, mujoco = robot.sample(1, 2)[0], robot.convention("mujoco")
     words = ("chain", "a1", "--base", "trunk", "--tip", "FL_foot")
-    text = ",".join(map(repr, mujoco.to(q).tolist()))
+    text = numbers(mujoco.to(q))
     found = run(*words, "--convention", "mujoco", "--q", text, "--format", "json").data
-    plain = run(*words, "--q", ",".join(map(repr, q.tolist())), "--format", "json").data
+    plain = run(*words, "--q", numbers(q), "--format", "json").data
     assert found["path_q"] == plain["path_q"]
     assert (found["q"], found["convention"]) == (mujoco.to(q).tolist(), "mujoco")
     assert "convention mujoco" in run(*words, "--convention", "mujoco", "--q", text).text.splitlines()[0]

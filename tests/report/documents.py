@@ -4,6 +4,7 @@ import copy
 import json
 import math
 from functools import cache
+from pathlib import Path
 from typing import cast
 
 from tests.reading import present
@@ -27,6 +28,12 @@ HOSTILE_URDF = robot(
 @cache
 def _run(robots: tuple[str, ...], samples: int) -> str:
     return json.dumps(validate([*robots], samples=samples).as_dict(), allow_nan=False)
+
+
+def saved(path: Path, document: Document) -> Path:
+    """Write a report to a file, and return the path."""
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
 
 
 def arms() -> Document:

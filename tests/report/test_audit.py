@@ -1,6 +1,5 @@
 """Accessibility, keyboard control and printing of pages; `scripts/audit_pages.py` has more pages."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -14,7 +13,7 @@ from scripts import audit_pages
 from scripts.audit_pages import Page, as_pdf, axe_script, html_checker, html_errors, look, walk
 from tests.reading import present
 from tests.report.browser import Browser, opened
-from tests.report.documents import arms, failing, hostile, months_runs
+from tests.report.documents import arms, failing, hostile, months_runs, saved
 from urdfkin.report.history import as_html as history_page
 from urdfkin.report.history import history
 from urdfkin.report.html import as_html
@@ -34,7 +33,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Page]:
     texts = {"arms": as_html(document), "failing": as_html(failing()), "hostile": as_html(hostile())}
     (folder / "runs").mkdir()
     for i, report in enumerate([*months_runs(), hostile()]):
-        (folder / "runs" / f"{i}.json").write_text(json.dumps(report))
+        saved(folder / "runs" / f"{i}.json", report)
     texts["history"] = history_page(history([folder / "runs"]))
     texts["same"] = audit_pages.comparison("ur5_limited", 1e-3)
     for name, text in texts.items():

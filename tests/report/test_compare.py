@@ -131,10 +131,9 @@ def test_a_wider_bound_and_tables_no_longer_compared_are_regressions() -> None:
     check = new["robots"][0]["checks"][1]
     check["bound"][1] *= 3.0
     old_words, new_words = (f"{d['robots'][0]['checks'][1]['bound'][1]:g} eps*scale" for d in (arms(), new))
-    found = [str(change) for change in compare(arms(), new).regressions]
-    assert len(found) == 1
-    assert old_words in found[0]
-    assert found[0].endswith(new_words)
+    (found,) = map(str, compare(arms(), new).regressions)
+    assert old_words in found
+    assert found.endswith(new_words)
     assert compare(new, arms()).exit_code == 0
     new["robots"][0]["joints"].append("another")
     assert not any("bound" in str(change) for change in compare(arms(), new).regressions)

@@ -8,24 +8,18 @@ import pytest
 
 from tests.cli.running import good, refused, urdfkin
 from tests.markup import Page
-from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile, months_runs, run_on
+from tests.report.documents import HOSTILE_ROBOT, arms, failing, hostile, months_runs, run_on, saved
 from urdfkin.errors import InputError
 from urdfkin.report import history as module
 from urdfkin.report.history import as_html, changes, document, history, marks
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.document import Document
-
-
-def put(path: Path, report: Document) -> Path:
-    path.write_text(json.dumps(report), encoding="utf-8")
-    return path
 
 
 @pytest.fixture
 def month(tmp_path: Path) -> Path:
     """A folder with eight reports; the order of the names is opposite to the order of the runs."""
     for i, report in enumerate(reversed(months_runs())):
-        put(tmp_path / f"{i}.json", report)
+        saved(tmp_path / f"{i}.json", report)
     return tmp_path
 
 
@@ -34,7 +28,7 @@ def test_runs_are_ordered_by_start_and_a_copy_counts_once(month: Path) -> None:
     assert [run["started"][8:10] for run in found.runs] == [f"{day:02}" for day in range(1, 9)]
     assert [Path(run["file"]).stem for run in found.runs] == list("76543210")
     assert [run["verdict"] for run in found.runs] == ["verified"] * 4 + ["disagrees"] + ["verified"] * 3
-    put(month / "latest.json", months_runs()[-1])
+    saved(month / "latest.json", months_runs()[-1])
     found = history([month])
     assert len(found.runs) == 8
     assert [one["reason"] for one in found.repeated] == [f"the same run as {month / '0.json'}"]
@@ -81,7 +75,7 @@ def test_a_terminal_shows_the_latest_runs_and_changes_or_all(
 def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> None:
     before, after = run_on(1, arms()), run_on(2, arms())
     after["robots"][0]["source"] = "robots/panda.urdf"
-    found = history([put(tmp_path / "a.json", before), put(tmp_path / "b.json", after)])
+    found = history([saved(tmp_path / "a.json", before), saved(tmp_path / "b.json", after)])
     assert [point["source"] for point in found.robots["robots/panda.urdf"]] == ["panda", "robots/panda.urdf"]
     assert "panda" not in found.robots
     page = as_html(found)
@@ -91,7 +85,7 @@ def test_a_renamed_file_continues_the_history_of_its_robot(tmp_path: Path) -> No
 @pytest.mark.slow
 def test_a_store_counts_as_a_run_in_the_history(tmp_path: Path) -> None:
     validate("planar_two_link", samples=2, store=tmp_path / "nightly" / "store")
-    put(tmp_path / "nightly" / "a.json", run_on(1, arms()))
+    saved(tmp_path / "nightly" / "a.json", run_on(1, arms()))
     found = history([tmp_path / "nightly"])
     assert {run["file"] for run in found.runs} == {str(tmp_path / "nightly" / x) for x in ("store", "a.json")}
     assert found.exit_code == 0
@@ -103,7 +97,7 @@ def test_unusable_files_are_listed_and_the_other_files_are_used(month: Path) -> 
     (month / "other.json").write_text('{"schema": "other/1"}')
     edited = arms()
     edited["robots"][0]["failed"] = 7
-    put(month / "edited.json", edited)
+    saved(month / "edited.json", edited)
     done = urdfkin("report history", str(month))
     assert done.code == 2
     for name, reason in (
@@ -140,7 +134,9 @@ def test_a_history_without_a_report_is_an_error_with_the_remedy(tmp_path: Path) 
 def test_the_page_has_no_script_no_address_and_no_hostile_element(tmp_path: Path) -> None:
     reports = [run_on(1, hostile()), run_on(2, hostile())]
     reports[1]["robots"][1]["source"] = '"><img src=x onerror=hacked()>'
-    page = as_html(history([put(tmp_path / f"{i}.json", one) for i, one in enumerate(reports)]), "<b>command")
+    page = as_html(
+        history([saved(tmp_path / f"{i}.json", one) for i, one in enumerate(reports)]), "<b>command"
+    )
     elements = Page(page).elements
     assert {tag for tag, _ in elements}.isdisjoint({"script", "img", "iframe", "object", "form", "base"})
     addresses = [attributes.get(name) for _, attributes in elements for name in ("href", "src", "action")]
@@ -151,7 +147,10 @@ def test_the_page_has_no_script_no_address_and_no_hostile_element(tmp_path: Path
 
 
 def test_the_suffix_selects_the_page_whose_colour_is_that_of_the_latest_verdict(tmp_path: Path) -> None:
-    good, bad = put(tmp_path / "a.json", run_on(1, arms())), put(tmp_path / "b.json", run_on(2, failing()))
+    good, bad = (
+        saved(tmp_path / "a.json", run_on(1, arms())),
+        saved(tmp_path / "b.json", run_on(2, failing())),
+    )
     pages = []
     for name, words in (("bad", [good, bad]), ("good", [good])):
         path = tmp_path / f"{name}.html"

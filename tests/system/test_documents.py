@@ -1,25 +1,32 @@
 """Documents share one header; schemas are generated from the types that check documents from files."""
 
+import copy
 import json
+from dataclasses import replace
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from jsonschema import Draft202012Validator
 
 import urdfkin
-from tests.report.documents import arms, run_on
+from tests.report.documents import arms, failing, hostile, run_on, saved
 from urdfkin.comparison.certificate import SAME, certificate
-from urdfkin.errors import InputError
+from urdfkin.errors import InputError, SourceError
 from urdfkin.report.compare import COMPARISON, compare
 from urdfkin.report.history import HISTORY, history
+from urdfkin.report.reading import checked, read_document
 from urdfkin.system.documents import DocumentKind, Header, as_data, plain
+from urdfkin.validation.accuracy import accuracy_study
+from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import VALIDATION
 from urdfkin.verify.certificate import CERTIFICATE
 
 LAYOUTS: list[DocumentKind[Any]] = [VALIDATION, COMPARISON, HISTORY, SAME, CERTIFICATE]
+of_every_layout = pytest.mark.parametrize("layout", LAYOUTS, ids=attrgetter("name"))
 
 
 @cache
@@ -38,7 +45,7 @@ def _made(name: str) -> str:
     if name == HISTORY.name:
         with TemporaryDirectory() as folder:
             for day in (1, 2):
-                (Path(folder) / f"{day}.json").write_text(json.dumps(run_on(day, arms())))
+                saved(Path(folder) / f"{day}.json", run_on(day, arms()))
             return json.dumps(history([Path(folder)]).as_dict("urdfkin report history"))
     return json.dumps(arms())
 
@@ -47,22 +54,23 @@ def made(layout: DocumentKind[Any]) -> Any:
     return json.loads(_made(layout.name))
 
 
-def ids(layout: DocumentKind[Any]) -> str:
-    return layout.name
+def errors(schema: dict[str, Any], document: object) -> list[str]:
+    found = Draft202012Validator(schema).iter_errors(document)
+    return [f"{error.json_path}: {error.message}" for error in found]
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+@of_every_layout
 def test_each_document_conforms_to_the_generated_schema_and_is_read_back_unchanged(
     layout: DocumentKind[Any], tmp_path: Path
 ) -> None:
     schema = json.loads(layout.schema_text())
     Draft202012Validator.check_schema(schema)
-    assert [e.message for e in Draft202012Validator(schema).iter_errors(made(layout))] == []
+    assert errors(schema, made(layout)) == []
     (tmp_path / "document.json").write_text(json.dumps(made(layout)))
     assert layout.read(tmp_path / "document.json") == made(layout)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+@of_every_layout
 def test_each_document_begins_with_the_same_header(layout: DocumentKind[Any]) -> None:
     header = ["schema", "versions", "sha256", "verdict", "command"]
     assert list(Header.__annotations__) == header
@@ -71,7 +79,7 @@ def test_each_document_begins_with_the_same_header(layout: DocumentKind[Any]) ->
     assert all(len(digest) == 64 for digest in made(layout)["sha256"])
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+@of_every_layout
 def test_every_entry_of_a_schema_is_described(layout: DocumentKind[Any]) -> None:
     schema = layout.schema()
     for part in (schema, *schema["$defs"].values()):
@@ -80,7 +88,7 @@ def test_every_entry_of_a_schema_is_described(layout: DocumentKind[Any]) -> None
             assert "description" in entry or "$ref" in entry or name in ("metres", "radians"), name
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+@of_every_layout
 @pytest.mark.parametrize(
     ("entry", "value", "said"),
     [
@@ -103,7 +111,7 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
     assert not schema.is_valid(made(layout) | {entry: value})
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+@of_every_layout
 def test_a_wrong_document_type_and_an_unknown_version_are_different_errors(layout: DocumentKind[Any]) -> None:
     family, _, version = layout.name.rpartition("/")
     with pytest.raises(InputError, match=f"unknown version of the layout {family}.*reads version {version}:"):
@@ -114,7 +122,7 @@ def test_a_wrong_document_type_and_an_unknown_version_are_different_errors(layou
             layout.checked(data, "a.json")
 
 
-@pytest.mark.parametrize("layout", [COMPARISON, HISTORY, SAME, CERTIFICATE], ids=ids)
+@pytest.mark.parametrize("layout", [COMPARISON, HISTORY, SAME, CERTIFICATE], ids=attrgetter("name"))
 def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: DocumentKind[Any]) -> None:
     with pytest.raises(InputError, match=r"found \$: unknown entry 'more'"):
         layout.checked(made(layout) | {"more": 1}, "a.json")
@@ -131,7 +139,7 @@ def test_an_unknown_entry_at_any_depth_is_refused() -> None:
 @pytest.mark.parametrize(
     "text", ["NaN", "-Infinity", "1e999", "[" * 100_000, "1" + "0" * 5000, "{", "", "\udc80", '"\x00']
 )
-@pytest.mark.parametrize("layout", LAYOUTS, ids=ids)
+@of_every_layout
 def test_a_file_that_is_not_json_is_refused(layout: DocumentKind[Any], text: str, tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
@@ -142,3 +150,76 @@ def test_a_file_that_is_not_json_is_refused(layout: DocumentKind[Any], text: str
 def test_serialized_data_has_no_infinity_and_preserves_names_that_are_not_valid_text() -> None:
     assert plain({"a": (float("inf"), float("nan"), -0.0, "\udc80")}) == {"a": [None, None, -0.0, "\udc80"]}
     assert as_data({"a": float("inf")}) == {"a": float("inf")}
+
+
+# -- reports of a validation --------------------------------------------------------------------------
+
+REFUSED = b'<?xml version="1.0"?><robot name="r"><link name="a"/><joint name="j" type="bent"/></robot>'
+
+
+def refused() -> Any:
+    document: Any = validate(REFUSED, samples=1).as_dict()
+    robot = document["robots"][0]
+    assert robot["verdict"] == "bad input"
+    assert robot["model"] is None
+    assert {finding["severity"] for finding in robot["findings"]} >= {"error"}
+    return document
+
+
+def studied() -> Any:
+    report = replace(
+        validate("panda", samples=0), studies=(accuracy_study(urdfkin.load("panda"), samples=1),)
+    )
+    document: Any = report.as_dict()
+    assert len(document["robots"][0]["accuracy"]["lines"]) > 5
+    return document
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [arms, failing, hostile, refused, studied])
+def test_every_report_conforms_to_the_schema(make: Any) -> None:
+    assert errors(VALIDATION.schema(), make()) == []
+
+
+@pytest.mark.slow
+def test_the_schema_describes_every_entry() -> None:
+    strict = copy.deepcopy(VALIDATION.schema())
+    for part in [strict, *strict["$defs"].values()]:
+        if part.get("properties") and "additionalProperties" not in part:
+            part["additionalProperties"] = False
+    for document in (arms(), hostile()):
+        assert errors(strict, document) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda d: d.pop("seed"),
+        lambda d: d["robots"][0].pop("verdict"),
+        lambda d: d["robots"][0]["checks"][0].update(results="many"),
+        lambda d: d["robots"][0].update(verdict="fine"),
+        lambda d: d["robots"][0]["model"]["joints"][0].update(placement=[[1.0]]),
+        lambda d: d["robots"][0]["model"].update(sha256="0123"),
+        lambda d: d["robots"][0]["checks"][0].update(worst=10**400),
+        lambda d: d["robots"][0]["checks"][0].update(results=True),
+        lambda d: d["robots"][0]["checks"][0].update(worst=-1.0),
+        lambda d: d["robots"][0]["chains"][0]["standard"]["rows"][0].update(sense=2),
+        lambda d: d["versions"].update(urdfkin=1),
+        lambda d: d.update(verdict="fine"),
+    ],
+)
+def test_a_document_with_a_wrong_entry_is_refused(spoil: Any) -> None:
+    document = cast("dict[str, Any]", arms())
+    spoil(document)
+    with pytest.raises(InputError, match=r"does not conform to the layout urdfkin-validation/1: found \$"):
+        checked(document, "results.json")
+
+
+def test_a_file_is_read_back_unchanged_and_unknown_entries_are_ignored(tmp_path: Path) -> None:
+    document: Any = arms()
+    document["robots"][0]["checks"][0]["later"] = document["later"] = {"a": 1}
+    assert checked(document, "results.json") == arms()
+    with pytest.raises(SourceError, match="cannot be read"):
+        read_document(tmp_path / "results.json")
+    assert read_document(saved(tmp_path / "results.json", hostile())) == hostile()

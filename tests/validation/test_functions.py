@@ -16,7 +16,7 @@ import pytest
 import urdfkin
 from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
-from tests.report.test_junit import junit_of
+from tests.report.test_texts import junit_of
 from tests.robots.odd_urdfs import random_tree
 from tests.urdfs import joint
 from tests.urdfs import robot as robot_text

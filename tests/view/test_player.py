@@ -1,7 +1,6 @@
 """The viewer plays the samples of a trajectory, checks each sample, and saves pictures and motions."""
 
 import io
-import re
 import struct
 import time
 from collections.abc import Iterator
@@ -11,13 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import urdfkin
-from tests.attacks.test_viewer_server import free_port
 from tests.report.browser import opened, require_chromium
-from tests.view.test_viewer import _PRESS, _until
+from tests.view.test_viewer import _PRESS, _until, shown_robot, without_shapes
 from urdfkin.robot.trajectory import line
 from urdfkin.view.player import Player, as_gif, as_png
-from urdfkin.view.server import new_server
 from urdfkin.view.viewer import Viewer
 
 viser = pytest.importorskip("viser")
@@ -25,58 +21,60 @@ viser = pytest.importorskip("viser")
 
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[Viewer]:
-    bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("ur5").urdf, flags=re.DOTALL)
-    robot = urdfkin.load(bare)
-    server = new_server(port=free_port())
-    yield Viewer(server, robot, None, line(robot, np.zeros(6), np.full(6, 0.8), 0.4, 9))
-    server.stop()
+    robot = without_shapes("ur5")
+    motion = line(robot, np.zeros(6), np.full(6, 0.8), 0.4, 9)
+    with shown_robot(robot, trajectory=motion) as viewer:
+        yield viewer
 
 
+@pytest.fixture
 def player(viewer: Viewer) -> Player:
     assert viewer.player is not None
     return viewer.player
 
 
-def test_the_time_slider_selects_the_nearest_sample_and_shows_checked_results(viewer: Viewer) -> None:
-    x = player(viewer).trajectory
-    player(viewer).time.value = float(x.t[5]) + 0.01
-    assert player(viewer).sample == 5
+def test_the_time_slider_selects_the_nearest_sample_and_shows_checked_results(
+    viewer: Viewer, player: Player
+) -> None:
+    x = player.trajectory
+    player.time.value = float(x.t[5]) + 0.01
+    assert player.sample == 5
     for shown, given in ((viewer.q, x.q[5]), (viewer.v, x.v[5]), (viewer.a, x.a[5])):
         np.testing.assert_array_equal(shown, given)
     expected = viewer.robot.acceleration(x.q[5], x.v[5], x.a[5], viewer.frame.value)
     np.testing.assert_array_equal(viewer.motion.acceleration[0], expected)
     assert "verified" in viewer.words.content
-    assert "sample 6 of 9" in player(viewer).words.content
+    assert "sample 6 of 9" in player.words.content
     np.testing.assert_allclose(viewer.sliders.handles[0].value, np.rad2deg(x.q[5, 0]), rtol=1e-14)
 
 
 @pytest.mark.slow
-def test_the_player_plays_to_the_end_at_the_chosen_speed_and_a_pause_holds_the_sample(viewer: Viewer) -> None:
-    player(viewer).show(0)
-    player(viewer).speed.value = "0.5"
+def test_the_player_plays_to_the_end_at_the_chosen_speed_and_a_pause_holds_the_sample(player: Player) -> None:
+    player.show(0)
+    player.speed.value = "0.5"
     begin = time.perf_counter()
-    player(viewer).play()
-    assert player(viewer).button.label == "pause"
-    assert _until(lambda: player(viewer).button.label == "play")
-    assert player(viewer).sample == 8
+    player.play()
+    assert player.button.label == "pause"
+    assert _until(lambda: player.button.label == "play")
+    assert player.sample == 8
     assert time.perf_counter() - begin > 0.7, "0.4 s at half the speed"
-    player(viewer).speed.value = "1"
-    player(viewer).show(0)
-    player(viewer).speed.value = "0.1"
-    player(viewer).play()
-    assert _until(lambda: player(viewer).sample > 0)
-    player(viewer).pause()
+    player.speed.value = "1"
+    player.show(0)
+    player.speed.value = "0.1"
+    player.play()
+    assert _until(lambda: player.sample > 0)
+    player.pause()
     time.sleep(0.2)
-    kept = player(viewer).sample
+    kept = player.sample
     time.sleep(0.6)
-    assert player(viewer).sample == kept < 8
-    player(viewer).speed.value = "1"
+    assert player.sample == kept < 8
+    player.speed.value = "1"
 
 
-def test_the_whole_trajectory_is_checked_for_each_frame(viewer: Viewer) -> None:
-    assert "9 samples, verified by Pinocchio" in player(viewer).words.content
+def test_the_whole_trajectory_is_checked_for_each_frame(viewer: Viewer, player: Player) -> None:
+    assert "9 samples, verified by Pinocchio" in player.words.content
     viewer.frame.value = "forearm_link"
-    assert "9 samples, verified by Pinocchio" in player(viewer).words.content
+    assert "9 samples, verified by Pinocchio" in player.words.content
 
 
 def test_a_saved_gif_has_all_frames_and_a_saved_png_is_opaque() -> None:

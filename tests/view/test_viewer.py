@@ -39,6 +39,11 @@ from urdfkin.view.viewer import (
 viser = pytest.importorskip("viser")
 
 
+def without_shapes(name: str) -> urdfkin.Robot:
+    """Return a robot that a browser draws fast, although it draws in software."""
+    return urdfkin.load(re.sub(r"<visual>.*?</visual>", "", urdfkin.load(name).urdf, flags=re.DOTALL))
+
+
 @contextmanager
 def shown_robot(robot: urdfkin.Robot, **how: Any) -> Iterator[Viewer]:
     server = new_server(port=free_port())
@@ -374,9 +379,7 @@ def _until(holds: Callable[[], bool]) -> bool:
 def test_in_a_browser_each_slider_equals_q_and_a_key_changes_only_one_coordinate(
     chromium: Browser, width: int
 ) -> None:
-    # The robot has no shapes, because a browser draws them slowly in software.
-    bare = re.sub(r"<visual>.*?</visual>", "", urdfkin.load("panda").urdf, flags=re.DOTALL)
-    with shown_robot(urdfkin.load(bare)) as viewer:
+    with shown_robot(without_shapes("panda")) as viewer:
         n = len(viewer.sliders.rows)
 
         def equal() -> bool:
