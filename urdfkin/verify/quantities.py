@@ -273,7 +273,7 @@ ANALYTICAL_JACOBIAN = replace(
 ACCELERATION_BREAKDOWN = replace(
     ACCELERATION,
     name="acceleration breakdown",
-    title="acceleration by its parts",
+    title="acceleration breakdown by joint",
     equations=("7.125", "7.130"),
     compute=lazy_import("urdfkin.compiled.breakdown:acceleration_breakdown"),
     recursive=False,
