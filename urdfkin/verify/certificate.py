@@ -92,6 +92,8 @@ class CertificateLine:
 
 
 class LineEntry(TypedDict):
+    """The line about one quantity in the JSON file of a certificate."""
+
     quantity: Annotated[str, says("Name of the quantity.")]
     checked: Annotated[Count, says("Number of results that the oracle confirmed.")]
     worst: Annotated[
