@@ -79,6 +79,8 @@ class AccuracyLine:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyStudy:
+    """Result of the accuracy study of one robot, with one line for each quantity and reference frame."""
+
     robot: str
     samples: int
     seed: int
