@@ -1,16 +1,18 @@
 """Bounds on the difference between two correct computations of a quantity.
 
-A result is accepted if each of its numbers differs from the oracle's number by at most
+Each number of a result is compared with the oracle's number. The result is accepted if no difference exceeds
 
     k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
-terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. If
-large terms cancel, the two sums are small, but their difference is still proportional to the scale.
+terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. Large
+terms may cancel, so that both sums are small. The bound on their rounding errors is still proportional to the
+scale.
 
-*k* counts the rounding errors, to first order in eps (`urdfkin.kinematics.roundings`). Each joint on the path
-adds a fixed number of rounding errors. A joint also rotates the vectors of the joints after it, but a
-rotation does not amplify errors. The error therefore grows linearly with the number of joints.
+*Number k.* The number k is the allowed number of rounding errors, to first order in eps
+(`urdfkin.kinematics.roundings`). Each joint on the path adds a fixed number of rounding errors. A joint also
+rotates the vectors of the joints after it, but a rotation does not amplify errors. The error therefore grows
+linearly with the number of joints.
 
 *Factors.* Each term of a quantity is a product of rotated vectors. Each vector is a factor with its own
 rounding error:
@@ -27,12 +29,12 @@ rounding error:
 The reference frames LOCAL and WORLD need one more factor. For LOCAL, this factor is a rotation into the
 frame's axes. For WORLD, this factor is a cross product with the frame's position p.
 
-Measured differences are a fraction of an eps for each joint, because rounding errors rarely add up in the
-worst way. Reports state differences in multiples of eps * scale, so that differences of small and large
-robots can be compared.
+For each joint, measured differences are below eps * scale, because rounding errors rarely all have the same
+sign. Reports give each difference as a multiple of eps * scale. These multiples can be compared between small
+and large robots.
 
-*Magnitudes.* `magnitudes` evaluates eq. 7.58 and 7.127 to 7.130 with the lengths of vectors instead of the
-vectors (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
+*Magnitudes.* `magnitudes` replaces each vector by its length and evaluates the equations 7.58 and 7.127 to
+7.130 (`urdfkin.kinematics.number_kinds`). No term is then negative, so no intermediate value exceeds the
 result. Eq. 7.129 contains the term v_i w_{i-1} x z, but Pinocchio computes v_i w_i x z. The two terms differ
 by the cross product v_i^2 z x z, which is 0 except for rounding errors. The rounding errors of this cross
 product are large for fast joints with an oblique axis. The bound on the angular acceleration alpha therefore
@@ -78,9 +80,9 @@ class Magnitudes:
         vel: (n, frames) linear velocity, m/s.
         alpha: (n, frames) angular acceleration, rad/s^2.
         acc: (n, frames) linear acceleration, m/s^2.
-        roundings: (n, frames) upper bound on the number of rounding errors in one rotated vector (a factor).
-            The bound counts all URDF joints on the path, a rotated base as one joint, and one additional
-            joint as a margin.
+        roundings: (n, frames) upper bound on the error of one rotated vector, in eps of the vector's length.
+            Each factor of a term is a rotated vector. The bound counts all URDF joints on the path, and one
+            additional joint as a margin. A base with a rotation counts as one more joint.
     """
 
     p: FloatArray
@@ -171,7 +173,7 @@ class _MovingJoint(NamedTuple):
 
 
 class _End(NamedTuple):
-    """A frame, its last moving joint `step`, and the path length (m) between the two."""
+    """A frame, the last moving joint `step` before the frame, and the path length (m) from joint to frame."""
 
     step: int
     frame: int
@@ -265,7 +267,9 @@ _BEYOND = np.errstate(over="ignore", under="ignore", invalid="ignore")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The bound k * eps * scale of a quantity; `k` and `scale` can be broadcast to the shape of the results.
+    """The bound k * eps * scale on the difference between two computations of a quantity.
+
+    `k` and `scale` can be broadcast to the shape of the results.
 
     Attributes:
         scale: Upper bound on the sum of the absolute values of the terms of a number, in the unit of this
@@ -288,7 +292,10 @@ def result_k(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
 
 
 def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Reference = _ALIGNED) -> Bound:
-    """Return the bound with `k` = `factors` * `size.roundings`; LOCAL and WORLD add one factor."""
+    """Return the bound with k = factors * `size.roundings`.
+
+    The reference frames LOCAL and WORLD need one factor more than `factors`.
+    """
     factors += reference is not _ALIGNED
     k = factors * size.roundings
     return Bound(scale, k.reshape(*k.shape, *[1] * (scale.ndim - 2)))
@@ -296,14 +303,16 @@ def bound_of(scale: FloatArray, factors: int, size: Magnitudes, reference: Refer
 
 @_BEYOND
 def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
-    """Return the magnitudes for a comparison of urdfkin with MuJoCo.
+    """Return the upper bounds on terms (`Magnitudes`) for a comparison of urdfkin with MuJoCo.
+
+    `size` contains the upper bounds for a comparison with Pinocchio.
 
     MuJoCo computes velocities, accelerations and Jacobian columns at a centre of mass.
     `urdfkin.verify.mujoco` places the centre of mass at the root. At the end, MuJoCo converts the results to
     the frame's origin. The distance of a joint or the frame from the centre of mass is at most the length p
-    of the path. Lever arms are therefore at most 2 p long. The conversion to the centre of mass and back is a
-    cross product with a lever arm. This cross product at most doubles the number of factors in a term. The
-    bound allows `MUJOCO` rounding errors for each joint instead of `ROUNDINGS`.
+    of the path. Lever arms are therefore at most 2 p long. A conversion to or from the centre of mass adds a
+    cross product with a lever arm. This cross product at most doubles the number of factors in a term. For
+    each joint, the bound allows `MUJOCO` = 30 instead of `ROUNDINGS` = 24 rounding errors.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -324,8 +333,9 @@ class DecimalErrors(NamedTuple):
         angles: (n,) sum of the angle errors of all joints on the path, in multiples of eps rad.
         rules: Number of mimic rules of the joints on the path. For a joint that mimics a mimic joint, the
             rules of both joints count.
-        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. A length is positive if offsets in
-            a chain of mimic rules cancel, because the rounding errors of the offsets do not cancel.
+        lengths: (steps + 1,) lengths to add to `CompiledTree.lengths`, m. If terms in a chain of mimic rules
+            cancel each other, their rounding errors do not cancel. The added length of a prismatic mimic
+            joint is then positive.
     """
 
     angles: FloatArray
@@ -336,14 +346,14 @@ class DecimalErrors(NamedTuple):
 def true_value_magnitudes(
     plan: CompiledTree, q: FloatArray, v: FloatArray | None, a: FloatArray | None, errors: DecimalErrors
 ) -> Magnitudes:
-    """Return the magnitudes for a comparison of one program's results with the true values.
+    """Return the upper bounds on terms (`Magnitudes`) for a comparison of one program with the true values.
 
     The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
     values are rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One
-    program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The remaining
-    7.2 cover the conversion of decimals to doubles: half an eps each for the offset, the axis and the true
-    value. The error of the axis counts twice, because two rotations use the axis. Two kinds of numbers need
-    additional roundings:
+    program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The difference
+    of 7.2 rounding errors is available for the conversion of decimals to doubles. The offset, the axis and
+    the true value have an error of half an eps each. The error of the axis counts twice, because two
+    rotations use the axis. The conversion of two kinds of numbers causes larger errors:
 
     - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
       rotate by at most (|roll| + |pitch| + |yaw|) / 2 eps.
@@ -356,7 +366,7 @@ def true_value_magnitudes(
     For a joint that mimics a joint with the value X', X is |m| X' + |c|. A program may combine the r rules to
     one rule M q + C. The combined rule requires r - 1 additions for C, and one addition of M q and C. No sum
     exceeds X, so the combined rule adds an error of at most (r - 1) / 2 X eps. All other rounding errors are
-    those of the separate rules.
+    the same as in a program that applies the r rules one after the other.
 
     *Revolute mimic joint.* An error of the joint's value rotates all later vectors of the path. An angle
     error of 1 eps rad changes a vector by at most eps times the length of the vector.
@@ -364,10 +374,11 @@ def true_value_magnitudes(
     *Prismatic mimic joint.* Each term of X is rounded at most 3 r times. The displacement therefore has an
     error of at most 3/2 r X eps, with separate rules and with a combined rule. If the offsets of a chain
     cancel each other, |M q| + |C| is far below X. The function therefore uses X as the length of the
-    displacement. Then 3/2 eps for each rule are enough. The same error bound holds for the velocity and the
-    acceleration of the joint, which are rounded less often.
+    displacement. With this length, the bound allows an error of 3/2 eps for each rule. The velocity and the
+    acceleration of the joint have the same error bound, because they are rounded less often.
 
-    `plan` is the compiled tree of one frame. `errors` belongs to the path of this frame and to q (n, nq).
+    `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
+    path to this frame, for q (n, nq).
     """
     size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
     more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
@@ -398,9 +409,10 @@ def mjcf_placement_bound(bound: Bound, lengths: FloatArray, angles: FloatArray) 
     *Angles.* MuJoCo rotates a hinge by the rounded angle q - ref. urdfkin rotates the hinge by ref and by q
     separately. The rounding error of q - ref is at most (eps/2) (|q| + |ref|) rad. This angle error rotates
     all bodies after the hinge. An entry of a rotation matrix changes by at most the angle error. A coordinate
-    of a position changes by at most the angle error times the length of the path. The scale is multiplied by
-    1 + `angles` / k. This factor allows twice the change of first order, and therefore also covers the terms
-    of second order.
+    of a position changes by at most the angle error times the length of the path. To first order, the numbers
+    therefore change by at most `angles` * eps/2 * scale. The function multiplies the scale by 1 + `angles` /
+    k, so the bound increases by `angles` * eps * scale. This increase is twice the change of first order, and
+    therefore also covers the terms of second order.
 
     `bound` is the bound of the tree's placements (n, frames, 4, 4). `lengths` (n, frames) is the sum of the
     lengths (m) of the vectors `pos` and `ref` on the path to a frame. `angles` (n, frames) is the sum of |q|
@@ -466,8 +478,10 @@ def _in_six_rows(linear: FloatArray, angular: FloatArray) -> FloatArray:
 def jacobian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) -> FloatArray:
     """Return the scale of the bound on Jacobians, (n, frames, 6, nv).
 
-    In the linear rows, the scale of a revolute joint's column is the length of the path. The scale of a
-    prismatic joint's column is 1. For joints that are not on the path, the scale is 0.
+    A revolute joint's column is [z x d; z]. The scale is the length of the path in the linear rows, and 1 in
+    the angular rows. A prismatic joint's column is [z; 0]. The scale is 1 in the linear rows, and 0 in the
+    angular rows. For a joint that is not on the path, the scale is 0. The scale of a mimic joint is
+    multiplied by |multiplier|, and is added to the scale of the mimicked joint.
     """
     turning, sliding = column_weights(plan)
     linear, angular = eq.turning_column(turning, size.p[..., None])
@@ -493,11 +507,11 @@ def jacobian_rate_scale(plan: CompiledTree, size: Magnitudes, reference: Referen
     return _in_six_rows(linear, angular)
 
 
-#: Pinocchio's derivative of Jacobian column i by joint j is a sum of products (linear rows).
-#: The first pair applies if joint j is joint i or nearer to the root than joint i.
-#: The second pair applies to all other joints j.
-#: The first number of a pair counts the products z x (z x d) for two revolute joints.
-#: The second number of a pair counts the products z x z for a revolute and a prismatic joint.
+#: In the linear rows, Pinocchio's derivative of Jacobian column i by joint j is a sum of cross products.
+#: The first pair is for a joint j that is joint i, or is nearer to the root than joint i.
+#: The second pair is for all other joints j.
+#: The first number of a pair is the number of products z x (z x d), if both joints are revolute.
+#: The second number is the number of products z x z, if one joint is revolute and the other is prismatic.
 _PAIR_TERMS: dict[Reference, tuple[tuple[float, float], tuple[float, float]]] = {
     Reference.LOCAL_WORLD_ALIGNED: ((5.0, 2.0), (2.0, 1.0)),
     Reference.WORLD: ((2.0, 1.0), (0.0, 0.0)),
@@ -510,19 +524,20 @@ def hessian_scale(plan: CompiledTree, size: Magnitudes, reference: Reference) ->
     """Return the scale of the bound on Hessians, (n, frames, 6, nv, nv).
 
     An entry of the Hessian depends on a pair of Jacobian columns. The column of a mimic joint is added to the
-    column of the mimicked joint. An entry, and the scale of the entry, can therefore be a sum over several
-    pairs. A lever arm d is never longer than the path.
+    column of the mimicked joint. An entry can therefore be a sum over several pairs. The scale of this entry
+    is the sum of the scales of the pairs. A lever arm d is never longer than the path.
 
     Pinocchio computes each entry from two Jacobian columns c = [z x d; z] at the world origin. `_PAIR_TERMS`
     contains the numbers of products that these steps add:
 
     - two for c_1 x c_2, whose linear rows are w_1 x v_2 + v_1 x w_2
-    - one to move the result to the frame's origin p: p x (w_1 x w_2)
-    - two to move a column to p before the product: (v - p x w) x w
+    - one for the conversion of the result to the frame's origin p: p x (w_1 x w_2)
+    - two for the conversion of a column to p before the product: (v - p x w) x w.
 
-    urdfkin computes the single product z x (z x d), or the two products of c_1 x c_2. In LOCAL, urdfkin first
-    rotates the two columns by R. Each of the two products then has the five factors R, z, R, z and d. The
-    bound allows three products of four factors each (12 in total), which covers the 10 factors of urdfkin.
+    In the linear rows, urdfkin computes one product z x (z x d), or the two products of c_1 x c_2. In LOCAL,
+    urdfkin first rotates the two columns by R. Each of the two products then has the five factors R, z, R, z
+    and d. The bound allows three products of four factors each (12 in total). This number covers the 10
+    factors of urdfkin.
     """
     shape = len(plan.frames), plan.nv, plan.nv
     turning, mixed, angular = np.zeros(shape), np.zeros(shape), np.zeros(shape)
@@ -567,9 +582,9 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     The bound on the velocity Jacobian is 2 delta, because a Jacobian has two factors. The scale is therefore
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
-    eps, and products and quotients about 10 eps. The bound includes these 13 eps, because
-    `Magnitudes.roundings` counts one joint more than the path contains. The additional joint counts at least
-    `ROUNDINGS` = 24 rounding errors.
+    eps, and products and quotients about 10 eps. `Magnitudes.roundings` counts one joint more than the path
+    contains. For this additional joint, the bound allows at least `ROUNDINGS` = 24 eps, so the bound covers
+    the 13 eps.
 
     `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
     """
@@ -599,8 +614,8 @@ def quaternion_jacobian_bound(bound: Bound) -> Bound:
 def sign_limit(bound: Bound, leading: tuple[int, ...]) -> FloatArray:
     """Return the value of |qw| below which rounding can change the sign of a quaternion's qw.
 
-    Let delta be the error of R, as in `quaternion_jacobian_bound`. The limit 1.5 k eps is 3 delta, which is
-    larger than the error of qw, 2.3 delta.
+    Let delta be the error of R, as in `quaternion_jacobian_bound`. The limit 1.5 k eps equals 3 delta. The
+    error of qw is at most 2.3 delta, so the limit is larger than this error.
     """
     return 1.5 * EPS * result_k(bound, leading)
 

@@ -7,8 +7,8 @@
 | IMU reading | acceleration, placement and velocity |
 
 urdfkin includes gravity in an IMU reading as an acceleration of the base. `check_imu` subtracts gravity from
-the oracle's result, in the sensor's axes. The two computations use different steps, so an error in the sign
-of gravity or in the order of the steps causes a disagreement.
+the oracle's result, in the sensor's axes. urdfkin and `check_imu` therefore use gravity in different ways. A
+wrong sign of gravity, or a wrong order of the steps, causes a disagreement.
 """
 
 from __future__ import annotations
@@ -73,8 +73,9 @@ def check_relative_placement(
     | position | sum | (2 k_a + k_b) (s_a + s_b) |
     | rotation R_a^T R_b | R_a and R_b | k_a + k_b |
 
-    The difference p_b - p_a and the products add about 5 eps. The bound includes these 5 eps already, because
-    k_a and k_b each count one joint more than the path contains.
+    The difference p_b - p_a and the products add about 5 eps. Each of k_a and k_b counts one joint more than
+    the path contains. For this additional joint, the bound allows at least 24 eps, so the bound covers the 5
+    eps.
     """
     other = cast("str", x.options["relative_to"])
     T = oracle.placements(x.query._replace(frames=[*x.query.frames, other]))

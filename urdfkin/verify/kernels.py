@@ -70,7 +70,7 @@ def _largest(ours, theirs, scale, i, k):
 
 @helper()
 def _is_in_threes(scale, k):
-    """Return whether the scales of the three linear rows are equal, and those of the three angular rows."""
+    """Return whether the three linear rows of `scale[k]` are equal, and the three angular rows are equal."""
     width = scale.shape[1] // 6
     equal = scale.shape[1] == 6 * width
     for first in range(0, 6 * width, max(3 * width, 1)):
@@ -81,9 +81,10 @@ def _is_in_threes(scale, k):
 
 @helper()
 def _divide_threes(ours, theirs, unit, width, units):
-    """Write the largest difference of every three numbers with a common scale to `units`.
+    """For each column of three rows, write the largest difference between `ours` and `theirs` to `units`.
 
-    The difference is in multiples of eps * scale, and may be NaN or inf.
+    The three rows have the same scale. The differences are divided by `unit`, which is eps * scale; a
+    quotient may be NaN or inf.
     """
     for j in range(width):
         x = abs(ours[j] - theirs[j])
@@ -112,10 +113,10 @@ def _most(x, count):
 def worst(ours, theirs, scale, out, out_bits, unit, units, bits):
     """Write the largest difference in each row, in units of eps * scale, to `out`; for inf or NaN, write inf.
 
-    The rows of `scale` are repeated if `scale` has fewer rows than `out`. Only then, the kernel uses `unit`
-    (the size of `scale`) and `units` (one row) as working memory. `out_bits` and `bits` are views of `out`
-    and `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum of
-    doubles.
+    The rows of `scale` are repeated if `scale` has fewer rows than `out`. Only in this case does the kernel
+    use `unit` (the size of `scale`) and `units` (one row) as working memory. `out_bits` and `bits` are views
+    of `out` and `units` as integers. The compiler can vectorize the maximum of integers, but not the maximum
+    of doubles.
     """
     known = in_threes = len(scale) < len(out)
     for k in range(len(scale)):
@@ -157,7 +158,8 @@ def coupling(full, columns, index, factor, out):
 # -- lengths for error bounds ---------------------------------------------------------------------------
 
 _TURN, _SLIDE = int(JointMotion.TURN), int(JointMotion.SLIDE)
-#: Number of values in the state of a link, and in `free` for each planar or floating joint.
+#: Number of bounds (p, w, vel, alpha, acc) for each link.
+#: `free` contains the same number of lengths for each planar or floating joint.
 _STATE = _FREE = 5
 
 
@@ -207,7 +209,10 @@ def _of_row(x, row, at):
 
 @helper()
 def _read(x, first, m, at, factor, to):
-    """Write factor * |x[k, at]| to `to` for m rows from k = `first`; a single row of `x` is repeated."""
+    """Write factor * |x[k, at]| to `to`, for the m rows k = first, first + 1, and so on.
+
+    If `x` has only one row, this row is used m times.
+    """
     step = 1 if len(x) > 1 else 0
     for i in range(m):
         to[i] = _product(factor, abs(x[(first + i) * step, at]))

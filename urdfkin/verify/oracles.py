@@ -23,7 +23,8 @@ class OracleLibrary:
     """An oracle: a library that reads the URDF text and computes the quantities that urdfkin computes.
 
     `oracle` is a function (text, tree, mimic=, moving_base=, root_joint=, lock=) that returns the model of a
-    robot. `size` converts the `Magnitudes` of a comparison with Pinocchio to those for this library.
+    robot. `size` is a function that converts error bounds. The argument of `size` contains the `Magnitudes`
+    for a comparison with Pinocchio. The result contains the `Magnitudes` for a comparison with this library.
     """
 
     name: OracleName

@@ -25,9 +25,9 @@ from urdfkin.errors.display import Displayable, TextDocument, six_digits
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree
 
-#: The search finds minimal dependent sets of up to this number of columns.
+#: The search finds minimal sets of linearly dependent columns, with up to this number of columns.
 _LARGEST_SET = 4
-#: The search for minimal dependent sets is skipped for a Jacobian with more columns than this number.
+#: The search is skipped for a Jacobian with more columns than this number.
 _MOST_COLUMNS = 16
 #: Relative rounding error of a singular value decomposition, divided by eps and by (rows + columns).
 _ROUNDINGS = 16.0
@@ -200,7 +200,7 @@ class _Explanation:
             yield f"{len(motions)} independent joint motions of {joints} do not move {self._columns.frame}."
 
     def _dependent_sets(self) -> Iterator[tuple[int, ...]]:
-        """Yield each minimal dependent set, as indices among the joints that move the frame."""
+        """Yield each minimal set of linearly dependent columns, as column indices of `self._A`."""
         if self._A.shape[1] > _MOST_COLUMNS:
             return
         found: list[set[int]] = []

@@ -29,7 +29,8 @@ from urdfkin.verify.oracle import BaseNumbers
 
 _RECURSION = Recursion(equations)
 
-#: Axis in the child link of each joint velocity, and whether the joint velocity is angular.
+#: For each velocity of a joint: index of the velocity's axis in the child link (0: x), and whether the
+#: velocity is angular.
 _FREE_AXES = {
     JointKind.PLANAR: ((0, False), (1, False), (2, True)),
     JointKind.FLOATING: tuple((k, turns) for turns in (False, True) for k in range(3)),
@@ -37,7 +38,10 @@ _FREE_AXES = {
 
 
 def on_base(base: BaseNumbers) -> State:
-    """Convert the base's motion to the root link's state, with the rotation nearest to the given matrix."""
+    """Return the base's motion as the position, velocity and acceleration of the root link.
+
+    The base's rotation matrix is replaced by the nearest rotation.
+    """
 
     def vector(x: FloatArray) -> Vector:
         return exact(x[0]), exact(x[1]), exact(x[2])
@@ -67,7 +71,8 @@ def move(
 ) -> ExactMotion:
     """Return the motion of the links that `joints` connect, in one sample; without `base`, the root is fixed.
 
-    In `joints`, a result of `read_exact`, each joint comes after the joints between the joint and the root.
+    `joints` is a result of `read_exact`. The order is from the root outwards: a joint comes after its parent
+    joint.
     """
     q, v, a = (list(map(exact, numbers)) for numbers in (q, v, a))
     states = {0: base or State()}
