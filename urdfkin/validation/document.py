@@ -174,7 +174,7 @@ class Chain(TypedDict):
 
 
 class ReportedErrors(TypedDict):
-    """Errors of one library relative to values with fifty digits, in eps * scale."""
+    """Errors of one library: differences from values with fifty digits, in eps * scale."""
 
     worst: Annotated[float, says("Largest error.")]
     typical: Annotated[float, says("Root mean square of the errors.")]
@@ -197,7 +197,7 @@ class ReportedAccuracyLine(TypedDict):
 
 
 class ReportedAccuracy(TypedDict):
-    """Result of the accuracy study: errors of urdfkin and Pinocchio relative to values with fifty digits."""
+    """Result of the accuracy study: differences of urdfkin and Pinocchio from values with fifty digits."""
 
     robot: Annotated[str, says("The robot's name.")]
     samples: Annotated[Count, says("Number of configurations in the accuracy study.")]
@@ -221,7 +221,7 @@ class Case(TypedDict):
 
 
 class ReportedOraclePair(TypedDict):
-    """Comparison of urdfkin or Pinocchio with the second oracle."""
+    """Comparison of one library, urdfkin or Pinocchio, with the second oracle."""
 
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     worst: Units
@@ -237,7 +237,7 @@ class Alone(TypedDict):
 
 
 class SecondOracle(TypedDict):
-    """Comparison of the same results with a second oracle. Without a second oracle, this entry is missing."""
+    """Comparison with a second oracle (a third library). Without a second oracle, this entry is missing."""
 
     by: Annotated[str, says("Name of the second oracle: mujoco.")]
     urdfkin: ReportedOraclePair
@@ -345,7 +345,8 @@ class ReportedRobot(TypedDict):
 class Document(Header):
     """The output of `urdfkin validate --json`.
 
-    Entries may be added to a version of the layout. Removed entries and changed meanings need a new version.
+    A release may add entries without a new version of the layout. If a release removes an entry or changes
+    the meaning of an entry, the layout gets a new version.
     """
 
     started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]
