@@ -79,8 +79,8 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
     values = path.coupling.values(path.coupling.select(verifier.tree, q))
     off = np.abs(base @ found.placement(values) - tip)[:, :3]
     return (
-        f"base . F(sign q - offset) . tool differs from Pinocchio by at most {off[..., 3].max():.2e} m"
-        f" and {off[..., :3].max():.2e} rad on {len(q)} samples"
+        "the OPW solver's tip pose base . F(sign q - offset) . tool differs from Pinocchio by at most"
+        f" {off[..., 3].max():.2e} m and {off[..., :3].max():.2e} rad on {len(q)} samples"
     )
 
 
