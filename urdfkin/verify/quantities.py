@@ -63,8 +63,8 @@ class Quantity:
             `against` is not None, the checks use `against` instead of `ask` and `scale`.
         exact: Function (motion, link, reference) that returns intervals around the true values.
         recursive: True if the forward recursion computes the quantity for any list of frames.
-        validated: True if `validate`, the accuracy study and plots include the quantity. False for the
-            Hessian, which has nv times as many numbers as a Jacobian.
+        validated: True if `validate`, the accuracy study and plots include the quantity. They
+            do not include the Hessian, because a Hessian has nv times as many numbers as a Jacobian.
         referred: True if the quantity depends on a reference frame.
         of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
         head: Heading of the column in reports; several quantities may share a column.
