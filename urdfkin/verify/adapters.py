@@ -395,8 +395,8 @@ def read_newton(path: str) -> Reading:
 class Library:
     """A library that reads robot files.
 
-    `package` is the name for pip, and `forms` lists the file formats that the adapter `read` accepts.
-    `single` is True if the library computes in single precision.
+    `package` is the name of the package that pip installs. `forms` lists the file formats that `read`
+    accepts. `single` is True if the library computes in single precision.
     """
 
     title: str

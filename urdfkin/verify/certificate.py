@@ -251,8 +251,8 @@ class Account:
     Attributes:
         unchecked: Number of results that the oracle could not check, or that `verify="sample"` left out.
         turned_off: Number of results of calls with verify=False.
-        counters: A pair (array, index) for each fast evaluator without checks. The number of results of this
-            evaluator is array[index].
+        counters: A pair (array, index) for each compiled function that computes results without checks.
+            The function counts its results in array[index].
     """
 
     checked: BatchComparison = field(default_factory=BatchComparison)

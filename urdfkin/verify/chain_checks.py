@@ -33,9 +33,9 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     the parent link, Pinocchio's frame does not include the motion.
 
     Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
-    computes along the chain, which is a part of the two paths. The bound counts all joints of both paths. The
-    length in the bound is the distance of the first frame from the root plus the length of the chain, with
-    prismatic displacements.
+    computes along the chain, which is a part of the two paths. The bound allows for the rounding errors of
+    all joints on both paths of Pinocchio. The length in the bound is the distance of the first frame from the
+    root plus the length of the chain, with prismatic displacements.
     """
     if verifier.cannot() is not None:
         return None
@@ -79,8 +79,8 @@ def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
     values = path.coupling.values(path.coupling.select(verifier.tree, q))
     off = np.abs(base @ found.placement(values) - tip)[:, :3]
     return (
-        f"base . F(sign q - offset) . tool differs from Pinocchio by at most {off[..., 3].max():.2e} m"
-        f" and {off[..., :3].max():.2e} rad on {len(q)} samples"
+        "the OPW solver's tip pose base . F(sign q - offset) . tool differs from Pinocchio by at most"
+        f" {off[..., 3].max():.2e} m and {off[..., :3].max():.2e} rad on {len(q)} samples"
     )
 
 
@@ -92,7 +92,8 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
     path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
-    # Pinocchio computes base and tip relative to the root; the product computes the tip relative to the base.
+    # Pinocchio computes the placements of the base and the tip relative to the root.
+    # The product of exponentials is the placement of the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
     unit = EPS * (of_joints(joints) + size) + left_out(path)

@@ -30,7 +30,7 @@ class BatchComparison:
     Attributes:
         worst: Largest difference of two numbers, in multiples of eps * scale.
         share: Largest ratio of a difference to its bound; a ratio above 1 is a failure.
-        index: Indices in the batch of the result with the ratio `share`.
+        index: Index in each batch axis of the result with the largest ratio.
     """
 
     results: int = 0
@@ -39,7 +39,10 @@ class BatchComparison:
     index: tuple[int, ...] = ()
 
     def __add__(self, other: BatchComparison) -> BatchComparison:
-        """Combine two batches; `index` comes from the batch with the larger `share`, where NaN is largest."""
+        """Combine the comparisons of two batches.
+
+        `index` comes from the batch with the larger `share`. NaN counts as larger than any number.
+        """
         second_is_larger = other.share > self.share or (np.isnan(other.share) and not np.isnan(self.share))
         first, second = (other, self) if second_is_larger else (self, other)
         return BatchComparison(
@@ -59,7 +62,10 @@ def compare(ours: FloatArray, theirs: FloatArray, bound: Bound, axes: int) -> Ba
 
 
 def comparison_of(units: FloatArray, bound: Bound) -> BatchComparison:
-    """Compare differences `units`, in multiples of eps * scale, with the bound of each result."""
+    """Compare the difference of each result with the bound of the result.
+
+    `units` contains one difference for each result, in multiples of eps * scale.
+    """
     if not units.size:
         return BatchComparison()
     share = units / result_k(bound, units.shape)
@@ -100,7 +106,7 @@ def worst_of_each(ours: FloatArray, theirs: FloatArray, scale: FloatArray, axes:
     else:
         worst = units = unit = np.empty(n)
         bits = out_bits = _NO_BITS
-        # If several results share a row of the scale, the kernel needs scratch memory.
+        # If several results have the same row of the scale, the kernel needs arrays for intermediate values.
         if len(size) < n:
             unit, units, out_bits = np.empty(size.size), np.zeros(numbers), worst.view(np.int64)
             bits = units.view(np.int64)

@@ -37,9 +37,9 @@ _SAMPLES = 8
 
 
 def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
-    """Compare a robot with its source, a Pinocchio model or a RobotWrapper; return the result as text.
+    """Compare a robot with the Pinocchio model (or RobotWrapper) from which the robot was made.
 
-    Raises OracleError if a placement differs by more than the bound.
+    Returns a line of text with the result. Raises OracleError if a placement differs by more than the bound.
     """
     model, tree = getattr(source, "model", source), verifier.tree
     if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv.
@@ -95,7 +95,7 @@ def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArra
 
 
 def check_table_source(verifier: Verifier, table: DHTable) -> None:
-    """Compare Pinocchio's placements of the tip with those of the table, the source of the robot."""
+    """Compare Pinocchio's placements of the tip with the placements from the robot's table."""
     if verifier.cannot() is not None:
         return
     q = sample(verifier.tree, _SAMPLES, np.random.default_rng(0))

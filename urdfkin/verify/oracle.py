@@ -1,9 +1,9 @@
-"""Base class of the oracles Pinocchio and MuJoCo, and conversion of a call's arguments for an oracle.
+"""Base class of the oracles Pinocchio and MuJoCo.
 
-An oracle is a library whose results urdfkin compares with its own results. This module converts the arguments
-of a call for the oracle. Except for units and named poses, this conversion shares no code with the conversion
-for urdfkin's own computation. A wrong broadcast, order or name in one conversion therefore causes a
-disagreement.
+An oracle is a library whose results urdfkin compares with its own results. This module also converts the
+user's arguments into the form that an oracle receives. Except for units and named poses, this conversion
+shares no code with the conversion for urdfkin's own computation. A wrong broadcast, order or name in one
+conversion therefore causes a disagreement.
 
 | Subject | In this module | In urdfkin's own computation |
 |---|---|---|
@@ -97,7 +97,8 @@ def locked_by_rules(lock: Mapping[str, float], rules: Mapping[str, Mimic]) -> di
     return {**lock, **moved}
 
 
-#: Number of coordinates in urdfkin, by a joint's size (nq, nv) in Pinocchio.
+#: Sizes (nq, nv) of joints in Pinocchio.
+#: `_COORDINATES` maps each size to the joint's number of coordinates in urdfkin.
 _CONTINUOUS, _PLANAR, _FLOATING = (2, 1), (4, 3), (7, 6)
 _COORDINATES = {(1, 1): 1, _CONTINUOUS: 1, _PLANAR: 3, _FLOATING: 7}
 
@@ -213,7 +214,8 @@ class Frames:
     """An oracle's frames by name.
 
     `bodies` and `joints` map names to frame indices. `parents` maps the frame of a link to the frame of the
-    link's parent joint. A missing entry in `parents` means that both frames have the same index.
+    link's parent joint. If a link has no entry in `parents`, the link's frame and the joint's frame have the
+    same index.
     """
 
     def __init__(
@@ -254,7 +256,10 @@ class Frames:
 
 
 def frames_of(model: Any, pin: Any, *, stands_on_world: bool) -> Frames:
-    """Return the frames of a Pinocchio model; with `stands_on_world`, frame 0 is the link `WORLD`."""
+    """Return the frames of a Pinocchio model.
+
+    If `stands_on_world` is True, the frames include Pinocchio's world (index 0) as the link `WORLD`.
+    """
     bodies, joints = dict[str, int](), dict[str, int]()
     for index, frame in enumerate(model.frames):
         if index:  # Frame 0 is the world.
@@ -402,11 +407,14 @@ class BaseRows(NamedTuple):
 
 
 class QueryBatch(NamedTuple):
-    """The arguments of a call for an oracle, with one batch axis: q (n, nq), v and a (n, nv) in `inputs`.
+    """The arguments that an oracle receives for n configurations.
 
-    If `joints` is True, `frames` contains `JointFrame` objects, and Pinocchio uses its functions for joints.
-    If `divided` is True, `frames` is a section of a longer list. Pinocchio then uses its function for several
-    frames, even for one frame. Pinocchio's function for a single frame may round differently.
+    `inputs` contains q (n, nq), or q and v (n, nv), or q, v and a (n, nv). If `joints` is True, `frames`
+    contains `JointFrame` objects, and Pinocchio uses its functions for joints.
+
+    If `divided` is True, `frames` is a part of a longer list of frames. Pinocchio's function for a single
+    frame may round differently from its function for several frames. Therefore, Pinocchio uses the function
+    for several frames even if `frames` contains one frame.
     """
 
     frames: Sequence[str]
@@ -430,10 +438,10 @@ class QueryBatch(NamedTuple):
 
 
 class OracleQuery:
-    """The arguments of one call, before an oracle receives them.
+    """The user's arguments of one call, which `rows` converts for an oracle.
 
-    `named` contains the user's argument for each input that contains names, and None for other inputs.
-    `joints` lists name and number of joint velocities of each joint with coordinates.
+    `named` has an entry for each input: the user's text or mapping with names, or None for an array.
+    `joints` lists the name and the number of joint velocities of each joint that has coordinates.
     """
 
     def __init__(
@@ -500,7 +508,11 @@ class OracleQuery:
         return QueryBatch(self.frames, tuple(map(pick, self._inputs)), self.reference, base)
 
     def flat(self, result: FloatArray, axes: int) -> FloatArray:
-        """Reshape results with `axes` axes each to (n, frames, ...); raise OracleError for other shapes."""
+        """Return `result` in the shape (n, frames, ...).
+
+        `axes` is the number of axes of the result for one configuration and one frame. Raises OracleError if
+        the shape of `result` does not match the arguments.
+        """
         own, several = result.shape[result.ndim - axes :], () if self._is_one else (len(self.frames),)
         if result.shape != (*self.shape, *several, *own):
             raise OracleError(
@@ -521,12 +533,12 @@ def mimic_rules(text: str, joints: Sequence[str], robot: str) -> dict[str, Mimic
 class Oracle:
     """A library's results for one robot, in urdfkin's layout of q, v and Jacobian columns.
 
-    A subclass builds the library's model in `__init__`. From `tree`, an oracle takes no geometry, only names
-    and sizes. Results have the shape (n, frames, ...).
+    A subclass builds the library's model in `__init__`. An oracle takes only names and sizes from `tree`, no
+    geometry. Results have the shape (n, frames, ...).
 
     `moving_base` connects the world and the root by a free-flyer. `root_joint` is the kind of a root joint
-    that the tree contains, but not the text. `lock` contains the values (rad or m) of locked joints.
-    `new_data` returns a new data structure of the library, for one thread.
+    that the tree contains and the text does not contain. `lock` contains the values (rad or m) of locked
+    joints. `new_data` returns a new data structure of the library, for one thread.
 
     Raises OracleError if the library does not accept the text, or reads other joints from the text.
     """
@@ -613,8 +625,8 @@ def coupled(full: FloatArray, columns: IntArray, index: IntArray, factor: FloatA
     """Return the product J_full G (..., nv), the Jacobian columns for urdfkin's joint velocities v.
 
     Column i of J_full is multiplied by `factor[i]`, an element of G, and added to column `index[i]` of the
-    product. Only the columns of J_full in `columns` are added, in this order. The kernel and NumPy return
-    identical results.
+    product. The function adds only the columns of J_full that `columns` lists, in the order of `columns`. The
+    kernel and NumPy return identical results.
     """
     rows = np.ascontiguousarray(full).reshape(math.prod(full.shape[:-1]), full.shape[-1])
     if (kernel := preload.kernel("coupling", home=KERNELS)) is None:

@@ -47,23 +47,24 @@ _bound = lazy_import("urdfkin.verify.bounds:bound_of")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Quantity:
-    """A quantity, such as the velocity of a frame: a row of the table.
+    """A row of the table: the data of one quantity, for example the velocity of a frame.
 
     Attributes:
         inputs: The inputs of the quantity: "q", "qv" or "qva".
         shape: Shape of one result; "nv" stands for the robot's number of joint velocities.
         compute: Function (plan, *inputs, reference, base=, out=, threads=) that returns urdfkin's results (n,
-            frames, ...). If `recursive` is False, the function has other arguments.
+            frames, ...). If `recursive` is False, the arguments of `compute` may differ.
         ask: Function (oracle, query) that returns the oracle's results (n, frames, ...).
         blocks: Generator (oracle, query) of the oracle's results in blocks of configurations.
         scale: Function (plan, magnitudes, reference) that returns the scale of the bound.
-        factors: Number of factors in the bound (`urdfkin.verify.bounds`) for LOCAL_WORLD_ALIGNED.
-        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound; used
-            instead of `ask` and `scale`.
+        factors: Largest number of factors in a term of the quantity, for LOCAL_WORLD_ALIGNED
+            (`urdfkin.verify.bounds`).
+        against: Function (oracle, part, ours, by) that returns the oracle's results and the bound. If
+            `against` is not None, the checks use `against` instead of `ask` and `scale`.
         exact: Function (motion, link, reference) that returns intervals around the true values.
-        recursive: True if the forward recursion computes the quantity for any frames.
-        validated: True if `validate`, the accuracy study and plots include the quantity. False for the
-            Hessian, which has nv times as many numbers as a Jacobian.
+        recursive: True if the forward recursion computes the quantity for any list of frames.
+        validated: True if `validate`, the accuracy study and plots include the quantity. They
+            do not include the Hessian, because a Hessian has nv times as many numbers as a Jacobian.
         referred: True if the quantity depends on a reference frame.
         of: Objects for which a validation compares the quantity: "frames", "joints" or "columns".
         head: Heading of the column in reports; several quantities may share a column.

@@ -52,8 +52,9 @@ _VELOCITY_EFFORT = ("velocity", "effort")
 class SecondReading:
     """Result of the comparison with yourdfpy's tree.
 
-    `joints` counts fixed joints too. `differences` result from an unknown error of urdfkin or of yourdfpy,
-    and `known` from known faults of yourdfpy. `unread` is the reason why yourdfpy cannot read the text.
+    `joints` is the number of joints, fixed joints included. `differences` lists the differences that no known
+    fault of yourdfpy explains. `known` lists known faults of yourdfpy, each with the names of the affected
+    joints. `unread` is the reason why there is no comparison.
     """
 
     by: str
@@ -68,11 +69,11 @@ def second_reading(
 ) -> SecondReading:
     """Compare yourdfpy's tree of a URDF text with urdfkin's tree.
 
-    Without `mimic`, the mimic rules are not compared. `root_joint` states that `load` has added the first
-    joint and link of the tree, which are not in the text.
+    If `mimic` is False, the mimic rules are not compared. If `root_joint` is True, `load` has added the first
+    joint and the first link of the tree. These two are not in the text.
     """
     by = f"yourdfpy {installed_version('yourdfpy') or 'not installed'}"
-    # yourdfpy would read the files that a document type declaration names.
+    # A document type declaration can name other files, and yourdfpy would read these files.
     if "<!DOCTYPE" in text:
         return SecondReading(by, unread="the file has a document type declaration")
     try:
@@ -122,7 +123,11 @@ def read(text: str) -> yourdf.Robot:
 def _differences(
     ours: tuple[Joint, str, str], theirs: yourdf.Joint, rule: Mimic | None, *, mimic: bool
 ) -> Iterator[tuple[str, str]]:
-    """Yield each difference of a joint and the known fault of yourdfpy behind it, or an empty string."""
+    """Yield two texts for each difference between urdfkin's joint and yourdfpy's joint.
+
+    The first text describes the difference. The second text names a known fault of yourdfpy that explains the
+    difference; the second text is empty if the function finds no such fault.
+    """
     joint, parent, child = ours
     if theirs.type != joint.kind.value:
         yield f"type {theirs.type}, not {joint.kind.value}", ""

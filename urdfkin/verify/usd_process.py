@@ -66,7 +66,8 @@ def _second_reading(read: Usd) -> dict[str, Any]:
         parsed = load(read.stage, ["/"])
     for paths, descriptions in parsed.values():
         for path, one in zip(paths, descriptions, strict=True):
-            # A joint with PhysicsArticulationRootAPI also has an articulation's description: skip it.
+            # For a joint with PhysicsArticulationRootAPI, OpenUSD also describes an articulation.
+            # The function skips the description of the articulation.
             if str(path) in read.joints and isinstance(one, physics.JointDesc):
                 found[str(path)] = _described(physics, one, read)
     return {path: [ours.as_list(), found.get(path)] for path, ours in read.joints.items()}

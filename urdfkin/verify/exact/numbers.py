@@ -30,18 +30,19 @@ from urdfkin.system.locks import lock_over_forks
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.verify.bounds import DecimalErrors
 
-#: Number of digits in the accuracy study, enough to measure the rounding errors of doubles (16 digits).
+#: Least number of decimal digits in the accuracy study.
+#: A double has about 16 digits, so 50 digits are enough to measure the rounding errors of doubles.
 DIGITS = 50
-#: Twice the 15 decimal digits of a double.
+#: Number of digits before the additional digit for each joint: twice the 15 decimal digits of a double.
 _TWO_DOUBLES = 30
 #: Number of bits for each decimal digit of an interval.
 _BITS = math.log2(10.0)
-#: Number of bits in addition to the bits of an interval's decimal digits. 15 digits then have 55 bits.
+#: Number of bits to add to the bits of an interval's decimal digits, so that 15 digits have 50 + 5 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _MORE_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.
 _SIGNIFICANT = 17
-#: Number of digits of an exact decimal before it is rounded.
+#: Number of digits for the conversion of a midpoint to a decimal, before the decimal is rounded to 17 digits.
 _ALL_DIGITS = 200
 #: Number of additional bits in Newton's iteration.
 _SPARE = 30
@@ -52,8 +53,8 @@ _ONE_THREAD = lock_over_forks()
 def enough_digits(joints: int) -> int:
     """Return a number of digits for which intervals are narrower than the last digit of a double.
 
-    Each joint on the path to the frame adds one digit. One digit is enough, because a joint with an oblique
-    axis loses only about a third of a digit.
+    Each joint on the path to the frame adds one digit. One digit is enough for the growth of the intervals: a
+    joint with an oblique axis makes the intervals only about twice as wide.
     """
     return _TWO_DOUBLES + joints
 
@@ -62,7 +63,8 @@ def enough_digits(joints: int) -> int:
 def precision(digits: int) -> Iterator[None]:
     """Set the number of decimal digits of intervals in a `with` block.
 
-    Arb has one precision for the whole process, so only one thread at a time can be in such a block.
+    Arb has one precision for the whole process. A lock therefore allows only one thread at a time to run such
+    a block.
     """
     with _ONE_THREAD, ctx.workprec(math.ceil(digits * _BITS) + _MORE_BITS):
         yield
@@ -115,7 +117,10 @@ def decimal(x: Number, negligible: float) -> str | None:
 
 
 class NumberType(NamedTuple):
-    """Functions for one type of number, such as intervals; `number` converts a decimal or a double."""
+    """Conversion, sine and cosine, and square root for one type of number, such as intervals.
+
+    `number` converts the text of a decimal, or a double, to the type.
+    """
 
     number: Callable[[str | float], Number]
     sine_cosine: Callable[[Number], tuple[Number, Number]]
@@ -203,14 +208,17 @@ class ExactJoint:
 def read_exact(
     text: str, tree: KinematicTree, among: Iterable[int] | None = None, kind: NumberType = BALLS
 ) -> dict[int, ExactJoint]:
-    """Return the exact constants of the joints with the indices `among` (None: all), by index."""
+    """Return a dictionary from a joint's index to the joint's numbers in the URDF text, not rounded.
+
+    `among` contains the indices of the joints; None means all joints.
+    """
     exact_text = _ExactText(text, kind)
     indices = range(len(tree.joints)) if among is None else among
     return {i: exact_text.joint_of(tree.joints[i], tree.name) for i in indices}
 
 
 def conversion(text: str, tree: KinematicTree, path: Sequence[int], q: FloatArray) -> DecimalErrors:
-    """Return the errors of converting the decimals of a path's joints to doubles, for q (n, nq)."""
+    """Return the errors of the conversion of decimals to doubles, for the joints on a path and q (n, nq)."""
     return _ExactText(text).conversion(tree, path, q)
 
 
@@ -307,7 +315,10 @@ class _ExactText:
         return DecimalErrors(angles, rules, np.array(lengths))
 
     def value(self, name: str, at: Mapping[str, Any]) -> _ValueBound:
-        """Return bounds on a joint's value and its rounding error; `at`: the independent joints' values."""
+        """Return bounds on a joint's value and on the rounding error of this value.
+
+        `at` maps the names of the independent joints to the values of these joints.
+        """
         rule = self.elements[name].find("mimic")
         if rule is None or name in at:
             return _ValueBound(abs(at[name]), 0.0, 0.0, 0)
@@ -323,7 +334,8 @@ class _ValueBound(NamedTuple):
     Attributes:
         moved: |M q|.
         offset: Sum of the absolute values of the terms of C; C has one term for each mimic rule.
-        error: Rounding error of the value, in eps, if a program applies the rules one after the other.
+        error: Bound on the rounding error of the value, in eps, for a program that applies the mimic rules
+            one after the other.
         rules: Number of mimic rules.
     """
 
