@@ -17,7 +17,7 @@ class BaseMotion:
     """Motion of the robot's root link relative to the world; the textbook numbers the world frame -1.
 
     Every field may have leading batch axes, which broadcast with the batch axes of the configuration. The
-    fields store the numbers without changes, because Pinocchio receives the same numbers in a comparison.
+    fields store exactly the given numbers, because a comparison with Pinocchio starts from the same numbers.
 
     Attributes:
         placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded, even to one digit; the

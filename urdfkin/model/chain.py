@@ -72,7 +72,7 @@ class FrameChain(Displayable):
         joints: The moving joints in path order.
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
         lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
-            an upper bound on the distance from joint k's origin to the next origin, for any rotations.
+            an upper bound on the length of the translation in A_k, for any rotations of the fixed joints.
         folded: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed joints.
 
     >>> import urdfkin
@@ -271,7 +271,10 @@ def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint,
 
 
 def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the constant poses before and after a joint's motion about or along z, in path order."""
+    """Return the constant pose before a joint's motion and the constant pose after the motion.
+
+    The joint moves about or along z. The direction of the path determines the order.
+    """
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
     align = pose(axis_aligning(-joint.axis if backwards else joint.axis))

@@ -1,8 +1,8 @@
 """The linear map from the coordinates of a path to the values of all joints on the path, with mimic joints.
 
 The coordinates of a path are its independent joints, in path order. A mimic joint has no coordinate: its
-value is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if this joint
-is not on the path itself.
+value is `multiplier * q_mimicked + offset`. The mimicked joint is a coordinate of the path even if the path
+does not contain the mimicked joint.
 """
 
 from __future__ import annotations

@@ -27,7 +27,9 @@ FloatArray = inputs.FloatArray
 
 
 class FrameName(str):
-    """`link:NAME` or `joint:NAME`: the link or joint NAME, even if another frame is named `link:NAME`.
+    """The name of a frame with a prefix, `link:NAME` or `joint:NAME`.
+
+    A `FrameName` means the link or joint NAME, even if another link or joint has the name `link:NAME`.
 
     >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
     ('link:hand', 'hand')
@@ -143,7 +145,7 @@ class Joint:
             child link's frame is the joint frame after the motion.
         axis: (3,) unit axis in the joint frame; (1, 0, 0) if the kind has no axis.
         tilt: Angle (rad) between the joint's axis in Pinocchio and `axis` (URDF514), usually 0. No result of
-            urdfkin uses this angle, but it may increase the differences from Pinocchio.
+            urdfkin uses this angle, but the angle may increase the differences between urdfkin and Pinocchio.
         lock: The original joint and its value, if the user fixed a moving joint of the URDF; else None.
     """
 
@@ -234,7 +236,7 @@ class KinematicTree:
     Attributes:
         name: The robot's name.
         links: Link names; `links[0]` is the root and `links[i + 1]` the child of `joints[i]`.
-        joints: Every joint, fixed ones too; the parent link of a joint always comes before its child link.
+        joints: All joints, including fixed joints; a joint's parent link always precedes its child link.
         poses: Named poses, each with values for some of the joints. Named poses do not affect the motion.
 
     A wrong order of the joints, a repeated name or an invalid mimic rule raises InputError.
@@ -307,7 +309,10 @@ class KinematicTree:
 
     @cached_property
     def plausible_angles(self) -> FloatArray:
-        """Lower and upper ends (2, nq) of plausible angles, rad; infinite for all other coordinates."""
+        """Smallest and largest plausible angles (2, nq) of revolute joints with limits, rad.
+
+        The entries of all other coordinates are infinite.
+        """
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):

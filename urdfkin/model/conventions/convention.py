@@ -128,7 +128,7 @@ def _built_in() -> dict[str, Convention]:
     }
 
 
-#: Names of the built-in conventions in the order of tables; a test compares them with conventions.toml.
+#: Names of the built-in conventions, in the order of conventions.toml. A test compares the two orders.
 BUILT_IN = (
     "urdfkin", "pinocchio", "urdf", "mujoco", "drake", "idyntree", "rtb", "kdl", "isaaclab", "isaaclab3",
     "isaacgym", "newton", "newton-usd", "usd", "ros", "alphabetical",
@@ -250,7 +250,10 @@ def as_toml(how: Convention) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Return a text as a quoted TOML string, with JSON's escapes and an escape of DEL."""
+    """Return a text as a quoted TOML string, with the escapes of JSON.
+
+    TOML also requires an escape for the character DEL.
+    """
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -258,7 +261,7 @@ def _quoted(text: str) -> str:
 
 _IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
-#: In an encoded name, a base-62 digit of at least this value is followed by another digit of the same number.
+#: The last base-62 digit of an encoded number is less than this value. No other digit is less than the value.
 _CONTINUES = 31
 
 
@@ -301,10 +304,12 @@ def identifier(name: str) -> str:
 def transcoded(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
-    The result consists of "tn__", the allowed characters of the name, "_", and a number in base 62 for each
-    other character, sorted by code point. As in Punycode, the number d n + p encodes a character and its
-    position p in the name: d is the character's code point minus that of the previous character, and n is the
-    number of possible positions. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
+    The result begins with "tn__" and the allowed characters of the name. If there are allowed characters, "_"
+    follows. Each other character then adds a number in base 62. These characters are sorted by code point.
+
+    As in Punycode, the number is d n + p. The difference d is the character's code point minus the code point
+    of the previous character. p is the character's position among the characters that are already encoded. n
+    is the number of possible positions. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
     proposals/transcoding_invalid_identifiers.
 
     >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")

@@ -25,7 +25,7 @@ from urdfkin.model.conventions.convention import Convention, JointRule, demand_u
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import plain_xml
 
-#: Largest difference (rad or m) between the value of a mimic joint and its mimic rule.
+#: Largest allowed difference (rad or m) between a mimic joint's value and the value from its mimic rule.
 _MIMIC_TOLERANCE = 1e-9
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
@@ -34,8 +34,8 @@ _SWAPPED = [3, 4, 5, 0, 1, 2]
 class _TargetNumber:
     """One number of the target program's q or v: `factor * x[at] + zero`, where x is urdfkin's q or v.
 
-    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `copy` marks a number of a
-    mimic joint, which has no number in urdfkin.
+    `part` is "cos" or "sin" if the target program stores an angle as two numbers. `copy` is true for a
+    number of a mimic joint. The q and v of urdfkin contain no number for a mimic joint.
     """
 
     name: str
@@ -143,7 +143,10 @@ class Conversion:
         return self.tree.joint_index(joint)
 
     def _follows(self, i: int) -> bool:
-        """Return whether a joint's value determines a coordinate; false for a mimic multiplier of 0."""
+        """Return whether a joint's value determines a coordinate.
+
+        The value of a mimic joint with multiplier 0 does not determine the mimicked joint's coordinate.
+        """
         rule = self.tree.joints[i].mimic
         return rule is None or rule.multiplier != 0.0
 
@@ -155,7 +158,7 @@ class Conversion:
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
-        # A root joint that urdfkin added is not in the file; -1 puts this joint first.
+        # The file does not contain a root joint that urdfkin added; the place -1 puts this joint first.
         place = [written.get(name, -1) for name in names]
         if order == "name":
             return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
@@ -512,7 +515,7 @@ class Conversion:
     def matrix(self, q: Given | None = None) -> FloatArray:
         """Return the matrix M (..., program's nv, nv) with v_tool = M v.
 
-        M may depend on q; if q is then missing, InputError is raised.
+        If M depends on q, a call without q raises InputError.
         """
         M = np.zeros((self.nv, self.tree.nv))
         M[np.arange(self.nv), self._v_index] = self._v_factor
@@ -541,7 +544,8 @@ class Conversion:
     def inverse_matrix(self, q: Given | None = None) -> FloatArray:
         """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
 
-        If several numbers of v_tool belong to one number of v, the columns of all but one of them are 0.
+        Several numbers of v_tool may depend on the same number of v. Then M^-1 uses one number of v_tool, and
+        the columns of the other numbers are 0.
         """
         if not self._blocks:
             found = np.zeros((self.tree.nv, self.nv))
@@ -574,7 +578,6 @@ class Conversion:
         return self._rows(A, -A @ skew(block.point), unit * turn)
 
     def _rows(self, A: FloatArray, arm: FloatArray, turn: FloatArray) -> FloatArray:
-        """Return the matrix [[A, arm], [0, turn]], with its rows in the target program's order."""
         B = np.zeros((*A.shape[:-2], 6, 6))
         B[..., :3, :3], B[..., :3, 3:], B[..., 3:, 3:] = A, arm, turn
         return B if self.convention.base_v == "linear first" else B[..., _SWAPPED, :]
@@ -653,9 +656,9 @@ class Conversion:
     ) -> FloatArray:
         """Convert a quantity, such as a velocity or Jacobian, to the target program's rows and columns.
 
-        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. The function `jacobian` is called
-        only for a time derivative of the Jacobian or a Hessian. A placement is returned unchanged, and an
-        undefined conversion raises InputError.
+        `ours` is q, or q and v, or q, v and a, in urdfkin's convention. The method calls `jacobian`
+        only to convert a Hessian or the time derivative of a Jacobian. A placement is returned unchanged, and
+        an undefined conversion raises InputError.
         """
         if quantity == "placement":
             return result
@@ -709,9 +712,9 @@ class Reordering:
 
 
 def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
-    """Return the formula that converts "q" or "v" between two conventions; None if there is no formula.
+    """Return the `Reordering` that converts "q" or "v" between two conventions; None if none exists.
 
-    There is no formula between an angle and its cosine and sine, or between velocities in different frames.
+    A `Reordering` cannot convert an angle to its cosine and sine, or a velocity to a different frame.
 
     >>> import urdfkin
     >>> robot = urdfkin.load("a1", verify=False)
@@ -748,9 +751,10 @@ def reordering(what: str, start: Conversion, end: Conversion) -> Reordering | No
 
 
 def _sources(numbers: Sequence[_TargetNumber], count: int) -> list[int]:
-    """For each entry of urdfkin's vector, return the index of the number that determines the entry.
+    """For each entry of urdfkin's q or v, return the index of a number of the target program.
 
-    A mimic joint's number is used only if no other number is available.
+    The entry is computed from this number. A number of a mimic joint is used only if there is no
+    other number.
     """
     return [
         min((k for k, x in enumerate(numbers) if x.at == at and x.factor), key=lambda k: numbers[k].copy)
@@ -775,5 +779,5 @@ def _with(array: FloatArray, where: slice, part: FloatArray) -> FloatArray:
 
 
 def _for_frames(M: FloatArray, ndim: int) -> FloatArray:
-    """Insert an axis for frames into M (..., k, l) if the Jacobian contains several frames."""
+    """Insert an axis into M (..., k, l) if a Jacobian with `ndim` axes has an axis for several frames."""
     return M[..., np.newaxis, :, :] if M.ndim > 2 and ndim == M.ndim + 1 else M

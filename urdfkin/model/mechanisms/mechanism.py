@@ -1,14 +1,14 @@
 """Describe a robot by its rigid bodies and joint screws in the zero configuration, and align two such robots.
 
 By the product of exponentials, a link's pose is exp(S_1 t_1) ... exp(S_n t_n) H. The unit screws S_i and the
-pose H are those of the zero configuration, in one common frame. This product does not contain the links
-between the joints, so links that are fixed to each other may be merged or split. Any body may be the root. If
-the path from the root leads through a joint from its child link to its parent link, the joint's screw is
-reversed.
+pose H are those of the zero configuration, in one common frame. The links between the joints do not occur in
+this product. If links that are fixed to each other are merged or split, the product stays the same. Any body
+may be the root. If the path from the root leads through a joint from its child link to its parent link, the
+joint's screw is reversed.
 
-**Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define the
-joint's frame differently, and also the frame of the body after the joint. Let the constant rigid motions M
-and N describe these two differences. A and B move in the same way if
+**Planar and floating joints.** The coordinates of such a joint describe a pose P. A and B may define
+different frames for the joint, and different frames for the body after the joint. Let the constant rigid
+motions M and N describe these two differences. A and B move in the same way if
 
     P_b = M P_a N,      or P_b = M P_a^-1 N if the joint is reversed in one model.
 
@@ -20,9 +20,10 @@ plane over.
 **Alignment.** The matcher starts from a body of A that corresponds to a body of B. A rigid motion G moves a
 body of A to the corresponding body of B, both in the zero configuration. A joint of A with the screw S and
 the value t moves the bodies after it by exp(S t). The matched joint of B moves the corresponding bodies by
-exp(S' t'). S' and t' are first converted to the positive direction and the zero of A's joint. If the axis of
-a joint and the body after it have the same poses in A and B, G is the same before and after the joint. If the
-poses differ, a constant rigid motion L describes the change of G. The link poses of A and B are then
+exp(S' t'). S' and t' are first converted to the positive direction and the zero of A's joint. If G also moves
+A's joint axis to B's joint axis, the bodies before and after the joint have the same G. If the axis and the
+bodies after the joint differ, a constant rigid motion L describes the change of G. If only the axis differs,
+S' differs from S. The link poses of A and B are then
 
     T_A = exp(S_1 t_1) ... exp(S_n t_n) H,      T_B = L_1 exp(S'_1 t'_1) ... L_n exp(S'_n t'_n) L H.
 
@@ -75,8 +76,8 @@ def screw_motion(screw: Screw, value: float, *, turns: bool) -> FloatArray:
 def smallest_motion(start: Screw, end: Screw, *, turns: bool) -> tuple[FloatArray, float, float]:
     """Return the smallest motion from one joint axis to another, its tilt (rad) and its shift (m).
 
-    The motion contains no rotation about the axis and no shift along the axis, because they only change the
-    joint's zero. The axis of a prismatic joint has only a direction, so the shift is 0.
+    The motion contains no rotation about the axis and no shift along the axis, because neither changes the
+    axis. The axis of a prismatic joint has only a direction, so the shift is 0.
     """
     R, tilt = smallest_rotation(start.direction, end.direction)
     across = np.zeros(3)
@@ -130,8 +131,9 @@ _Z = np.array([0.0, 0.0, 1.0])
 class JointTransform:
     """The conversion of a planar or floating joint: P_b = before P_a behind.
 
-    `before` and `behind` are the rigid motions M and N (4, 4) of the module docstring. If the joint is
-    reversed in one model (`back`), the conversion is P_b = before P_a^-1 behind.
+    `before` and `behind` are the rigid motions M and N (4, 4) of the module docstring. The joint's parent
+    body in A may correspond to the joint's child body in B. Then `back` is true, and the conversion is P_b =
+    before P_a^-1 behind.
     """
 
     before: FloatArray
@@ -357,11 +359,12 @@ class Mechanism:
 
     @cached_property
     def rounding(self) -> float:
-        """Rounding error of poses that are read from a file (rad, and as a fraction of `size`).
+        """Rounding error (rad) of the rotations of poses that are read from a file.
 
-        The parser and the writer of the file round each joint's constant transform and axis. A program that
-        merges fixed joints rounds less often, because the program rounds only the product of the joints'
-        transforms. The error includes the small tilts of Pinocchio's axes (URDF514).
+        This error times `size` is the rounding error (m) of the positions. The parser and the writer of
+        the file round each joint's constant transform and axis. A program that merges fixed joints rounds
+        less often, because the program rounds only the product of the joints' transforms. The error includes
+        the small tilts of Pinocchio's axes (URDF514).
         """
         joints = max(self.depths) + 1
         return EPS * ((CONSTANT + WRITTEN + AXES) * joints) + 2.0 * sum(j.tilt for j in self.tree.joints)
@@ -390,7 +393,7 @@ def size_of(a: Mechanism, b: Mechanism) -> float:
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:
-    """Return the angle (rad) between two axes, and the distance (m) of the point of `s` from the line `t`.
+    """Return the angle (rad) between two axes, and the distance (m) from `s.point` to the line `t`.
 
     Axes with opposite directions count as parallel. If `placed` is false, the distance is 0.
     """
@@ -418,9 +421,12 @@ class MatchedJoints:
         previous: Index of the previous joint pair on the path from the base; -1 for the first pair.
         sense: +1 or -1, the factor in the formula of `offset`.
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
-        before: (4, 4) rigid motion L before B's joint (module docstring), in A's zero configuration.
-        axis: Screw of A's joint in the zero configuration, for the motion of the body farther from the base.
-        other: Screw of B's joint, with the sign convention of `axis`; `axis` itself if the screws agree.
+        before: (4, 4) rigid motion L at the joint (module docstring), in A's root frame and zero
+            configuration.
+        axis: Screw S of A's joint in the zero configuration: exp(S t) moves the body farther from the base.
+            If A's joint is fixed, `axis` is the screw of B's joint.
+        other: Screw S' of B's joint (module docstring), with the positive direction of `axis`. It is equal to
+            `axis` unless only the joint axes of A and B differ.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
         unlike: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds differ;
@@ -455,7 +461,8 @@ class FramePair:
     Attributes:
         previous: Index of the last joint pair on the path to the links; -1 if no joint moves the links.
         home: (4, 4) pose of A's link in the zero configuration.
-        end: (4, 4) rigid motion L after the last joint (module docstring), in A's zero configuration.
+        end: (4, 4) rigid motion L after the last joint (module docstring), in A's root frame and zero
+            configuration.
         tilt: Angle (rad) between the frames of the two links.
         shift: Distance (m) between the origins of these two frames.
         tool: (4, 4) pose of B's link in the frame of A's link if the links are different end-effector
@@ -472,7 +479,10 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return a copy that treats the links as different end-effector frames, not as a difference."""
+        """Return a copy in which the two links are different end-effector frames.
+
+        The copy stores the pose of B's link relative to A's link in `tool`, and reports no difference.
+        """
         tool = inverse(self.home) @ self.end @ self.home
         return replace(self, end=IDENTITY, tilt=0.0, shift=0.0, tool=tool)
 
@@ -522,7 +532,11 @@ class Alignment:
 
     @property
     def inner_differences(self) -> tuple[float, float]:
-        """Smallest and largest nonzero difference (m) of matched axes and matched links with child joints."""
+        """Smallest and largest nonzero difference (m) of matched joints and matched links; 0 if none differ.
+
+        A pair of links counts only if one of the two links has a child joint. Angles are multiplied by
+        `size_of`.
+        """
         carry = [{joint.parent for joint in m.tree.joints} for m in (self.a, self.b)]
         frames = [frame for frame in self.frames if frame.a in carry[0] or frame.b in carry[1]]
         size = size_of(self.a, self.b)
@@ -546,10 +560,10 @@ class Alignment:
         )
 
     def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
-        """Yield two joint pairs (a, b) and (c, d) for which (a, d) and (c, b) are possible too.
+        """Yield joint pairs (a, b) and (c, d) if the matcher could also pair a with d and c with b.
 
-        The names of a and c occur neither in B nor in `given`. Each of the two pairs differs, or a joint or
-        link after the pair differs.
+        The names of a and c occur neither in B nor in `given`. For each of the two pairs, A and B differ at
+        this pair, or at a joint or link after this pair.
         """
         known_names = {joint.name for joint in self.b.tree.joints} | set(given)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
@@ -591,13 +605,13 @@ class Alignment:
 
     @property
     def deepest(self) -> int:
-        """One more than the number of joint pairs on the longest path."""
+        """Largest number of joint pairs on a path from the base, plus 1."""
         return 1 + max((len(self.indices(i)) for i in range(len(self.steps))), default=0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignmentChoices:
-    """The choices of an alignment, such as the pose of B's root and the zero offset of each joint.
+    """Prescribed values for an alignment, such as the pose of B's root and the zero offset of each joint.
 
     Attributes:
         base: Links of A and B at which the search starts; None if the search chooses its first bodies.
@@ -613,7 +627,7 @@ class AlignmentChoices:
     orders: tuple[tuple[str, ...], ...] = ()
 
 
-#: The choices for a comparison without changes: equal root poses, and equal coordinates for each joint.
+#: Prescribed values without changes: A and B have equal root poses, and equal coordinates for each joint.
 AS_WRITTEN = AlignmentChoices()
 
 
@@ -635,14 +649,14 @@ class LinearFunction:
 
 @dataclass(frozen=True, slots=True)
 class MatchedValues:
-    """The values of two matched joints, with the positive direction and the zero of A's joint."""
+    """The values of two matched joints; B's value is converted to the direction and zero of A's joint."""
 
     a: LinearFunction
     b: LinearFunction
-    #: The value of B's joint as B's URDF defines the value: sense * b + offset.
+    #: The value of B's joint in B's URDF, without the conversion: sense * b + offset.
     written: LinearFunction
-    #: Amount (rad or m) by which the difference of the constants exceeds the rounding error of one joint.
-    #: The amount is 0 if the functions of A and B differ by more than rounding.
+    #: Difference (rad or m) of the constants of A and B, minus the rounding error of one joint; at least 0.
+    #: The value is 0 if the functions of A and B differ by more than rounding.
     rounding: float = 0.0
 
     @property
@@ -658,9 +672,10 @@ class Variables:
     """The values of all matched joints as linear functions of some variables, and the variables' ranges.
 
     Attributes:
-        pairs: The joint values of each joint pair; None for planar and floating joints.
+        pairs: The joint values of each joint pair; None for planar and floating joints, and for a pair of
+            different kinds.
         ranges: Range of each variable, rad or m; infinite without a limit.
-        rules: Indices of the joint pairs with different mimic rules; a joint may be independent in one model.
+        rules: Indices of the joint pairs with different mimic rules; one joint of a pair may be independent.
         leaders: Each coordinate of B as a linear function of a variable, by the joint's name in B.
     """
 
@@ -756,10 +771,10 @@ class _VariablesBuilder:
     def _alike(self, a: LinearFunction, b: LinearFunction) -> bool:
         """Return whether two linear functions differ by rounding only.
 
-        The constants depend on zero offsets, which urdfkin computes from poses. In a pose, the rounding
-        errors of all joints of the path add up, so the tolerance for the constants is the sum of these
-        errors. The slopes do not depend on zero offsets, so the tolerance for the slopes is the rounding
-        error of one joint.
+        The constants depend on zero offsets, which urdfkin computes from poses. The rounding error of a pose
+        is the sum of the errors of all joints on the path. The tolerance for the constants is this sum for
+        the longest path. The slopes do not depend on zero offsets, so the tolerance for the slopes is the
+        rounding error of one joint.
         """
         same = a.variable == b.variable or not (a.slope or b.slope)
         one = self._one_step(a)
@@ -788,7 +803,7 @@ class _VariablesBuilder:
         for step, pair in zip(self.alignment.steps, pairs, strict=True):
             for k, j in enumerate((step.a, step.b)):
                 joint = self.trees[k].joints[j]
-                if pair is None:  # joints of different kinds have separate coordinates
+                if pair is None:  # joints of different kinds do not share a variable
                     if step.unlike and joint.nq == 1:
                         own[f"{'ab'[k]}:{joint.name}"] = limits(joint)
                     continue
