@@ -44,7 +44,7 @@ def header(table: DHTable) -> list[str]:
         f"q = ({', '.join(table.joint_names)})",
     ]
     if table.snap is not None and table.snap.changes:
-        lines.append(f"angles snapped: the tip moves by at most {table.snap.metres:.3g} m")
+        lines.append(f"the rounding of angles moves the tip by at most {table.snap.metres:.3g} m")
     return [plain(line) for line in lines]
 
 
