@@ -273,5 +273,5 @@ def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None
     subject = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
     return (
         f"{subject} like the effect of rounded angles in the file ({cell} of {joint}: {size:.2g} {unit}):"
-        f" --snap {best:.0e} reduces their number to {counts[best] or 'zero'}, and prints the effect on the tip"
+        f" --snap {best:.0e} reduces their number to {counts[best] or 'zero'} and shows the effect on the tip"
     )
