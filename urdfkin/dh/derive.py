@@ -217,7 +217,7 @@ def _frame_zero(A: FloatArray, reach: float, noise: PoseTolerance) -> tuple[Floa
     base[:3, 3] = p - offset * z
     if tilt_of(A) <= noise.radians:
         z = np.array([0.0, 0.0, math.copysign(1.0, z[2])])
-    # Projection e - (e . z) z of the base's x axis e, without cancellation for z close to e.
+    # x is e - (e . z) z for the base's x axis e. This form has no cancellation if z is close to e.
     x = np.array([z[1] ** 2 + z[2] ** 2, -z[0] * z[1], -z[0] * z[2]])
     # If z_0 is nearly along the base's x axis, x_0 is the projection of the base's y axis.
     if np.linalg.norm(x) < NEARLY_PARALLEL:
@@ -315,7 +315,10 @@ def _needs_reversal(step: AxisTransform, theta: float, sign: str) -> bool:
 
 
 def _representable(A: FloatArray, choices: Choices, noise: PoseTolerance) -> bool:
-    """Whether A is Rz Tz Tx Rx (standard) or Rz Tz (modified), so that the table needs no tool."""
+    """Whether the last row can contain the transform A, so that the table needs no tool.
+
+    A standard table ends with Rz Tz Tx Rx, and a modified table ends with Rz Tz.
+    """
     if choices.last == "flange":
         return False
     x_along_z, lateral = abs(A[2, 0]), abs(A[0, 0] * A[1, 3] - A[1, 0] * A[0, 3])
@@ -330,7 +333,7 @@ def _last(
 ) -> tuple[float, float, AxisTransform, FloatArray]:
     """Return theta and d of the last row, its other cells, and the tool.
 
-    `A` is the tip's pose in the last joint's frame, shifted along z to the origin O_{n-1}.
+    `A` is the tip's pose in a frame with the axes of the last joint's frame and the origin O_{n-1}.
     """
     if _representable(A, choices, noise):
         phi = math.atan2(A[1, 0], A[0, 0])

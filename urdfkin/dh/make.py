@@ -24,14 +24,17 @@ from urdfkin.model.tree import KinematicTree
 
 #: Tables with a larger difference of cells (rad, or relative to the reach) describe different robots.
 _SAME_ROBOT = 0.1
-#: Largest difference at which zero positions (rad), and entries of rotations, are treated as equal.
+#: Two cells theta (rad), or two entries of rotation matrices, count as equal up to this difference.
 _SAME_ZERO = 1e-2
 #: Largest difference at which two cells are treated as equal (rad, or relative to the reach).
 _ROUNDING = 1e-12
 
 
 def derive_like(chain: FrameChain, choices: Choices, reference: DHTable) -> DHTable:
-    """Return a chain's table with the frames of a reference; `choices.flip` comes from `reversed_like`."""
+    """Return a chain's table with the frames of a reference table.
+
+    `choices.flip` must be the result of `reversed_like`.
+    """
     standard = replace(choices, convention=DHConvention.STANDARD)
     return to_convention(derive(chain, standard, to_convention(reference, "standard")), choices.convention)
 
@@ -103,7 +106,9 @@ def dh_table(
     slide: str = "drawn",
     like: DHTable | None = None,
 ) -> DHTable:
-    """Return the Denavit-Hartenberg table of the path between two frames, exact to rounding.
+    """Return the Denavit-Hartenberg table of the path between two frames of a robot.
+
+    If `snap` is 0, the table gives the URDF's tip pose up to rounding errors.
 
     Args:
         tree: The robot.
@@ -113,24 +118,27 @@ def dh_table(
         near_parallel: "hayati" gives nearly parallel axes a fifth parameter beta; "strict" uses only the four
             parameters, and may give offsets of kilometres.
         snap: Tolerance in radians. An angle that differs by at most this tolerance from a multiple of 15
-            degrees becomes that multiple. The table's attribute `snap` reports the effect. With 0, all
-            angles are exact.
+            degrees becomes that multiple. The table's attribute `snap` reports the effect. If `snap` is 0,
+            no angle is changed.
         last: "tip": the last row ends at the tip if four parameters suffice for this. "flange": the tool
             contains the transform from the last axis to the tip.
-        parallel_offset: For consecutive parallel axes. "last" or "first": this row contains the sum of the
-            offsets along the axes. "each": every row contains the offset of its own link.
+        parallel_offset: Rule for the rows of consecutive parallel axes. "last" or "first": the last or the
+            first of these rows contains the sum of the offsets along the axes. "each": every row contains
+            the offset of its own link.
         flip: Names of joints whose positive direction is reversed. The attribute `sense` of their rows is -1.
         first: "base": the base is the identity if d_1 and theta_1 can contain the transform to the first
             axis. "joint": the base contains this transform, and d_1 and theta_1 are zero (Craig's frame 0).
         sign: Rule for the direction of x. "theta": |theta| is at most a right angle. "a": the cell a is not
             negative. "alpha": the cell alpha is not negative.
         slide: Position of the axis of each prismatic joint; the joint itself defines only the axis's
-            direction. "drawn": the axis passes through the joint's origin in the URDF. "minimal": the axis
-            passes through the origin of the next revolute joint, so that a is 0.
-        like: A published table. The result copies the table's positive joint directions, directions of x,
-            offsets along parallel axes, and zero positions of the first and the last joint. All other numbers
-            come from the URDF. With `like`, the arguments `flip`, `first`, `last`, `sign` and
-            `parallel_offset` are ignored.
+            direction. "drawn": the axis passes through the joint's origin in the URDF, unless a shift avoids
+            a base, a tool or a distant common normal. "minimal": the axis passes through the origin of the
+            next joint, or of the previous joint, if that joint is revolute. The length a between
+            these two axes is then 0.
+        like: A published table. The result has the published table's positive joint directions and
+            directions of x. It also has the published table's offsets along parallel axes, and its zero
+            positions of the first and the last joint. All other numbers come from the URDF. With `like`, the
+            arguments `flip`, `first`, `last`, `sign` and `parallel_offset` are ignored.
 
     Raises:
         UnknownNameError: a frame or a joint does not exist.

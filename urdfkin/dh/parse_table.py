@@ -72,7 +72,7 @@ def from_sheet(text: str) -> dict[str, Any]:
             break
     else:
         raise _no_header(lines)
-    # The title of a robot with the name "robot" begins with "robot:", like a line that states a property.
+    # If a robot has the name "robot", its title begins with "robot:" and looks like a setting.
     without_title = [line for line in grid.around if not _TITLE.search(line)]
     data = _settings(without_title, _CSV_SETTING if form is _separated else _SETTING)
     if "convention" not in data and (convention := _convention(grid)):
@@ -290,7 +290,7 @@ def _pose(end: str, lines: list[str]) -> list[list[float]] | None:
 
 
 def _rigid(rows: list[list[float]], end: str) -> list[list[float]]:
-    """Replace a rotation by the nearest exact rotation if they differ only by rounding in the text."""
+    """Replace a rotation matrix of rounded numbers by the nearest exact rotation matrix."""
     pose = np.array(rows)
     if not np.isfinite(pose).all():  # LAPACK may run forever for an infinite matrix.
         raise InputError(f"the {end} must be a matrix of finite numbers", where=end, found=safe_repr(rows))
@@ -349,7 +349,10 @@ def _unescaped(name: str) -> str:
 
 
 def _nested(row: dict[str, Any]) -> dict[str, Any]:
-    """Group mimic rule and limits into mappings; without a mimic rule, add `offset` to theta or d."""
+    """Move the cells of the mimic rule, and the cells of the limits, into mappings of their own.
+
+    If the row has no mimic rule, the cell `offset` is added to theta or d.
+    """
     mimic: dict[str, Any] = {key: row.pop(key) for key in ("leader", "multiplier") if key in row}
     if mimic and "offset" in row:
         mimic["offset"] = row.pop("offset")
@@ -361,9 +364,10 @@ def _nested(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _interpret_variables(data: dict[str, Any], coordinates: list[str]) -> None:
-    """Make a mimic rule from each variable q1, q2, ... that belongs to another row.
+    """Replace the variable of another joint, such as q1 in row 2, by a mimic rule.
 
-    `coordinates` contains the joints with the variables q1, q2, ...; [] means the joints of the rows.
+    `coordinates` contains the names of the joints with the variables q1, q2, ... in this order. If it is
+    empty, q1, q2, ... are the variables of rows 1, 2, ...
     """
     rows = data["rows"]
     joints = [row.get("joint", f"joint_{i + 1}") for i, row in enumerate(rows)]
@@ -422,7 +426,10 @@ def read_table(path: str | os.PathLike[str]) -> DHTable:
 
 
 def read_table_or_screws(path: str | os.PathLike[str]) -> DHTable | ProductOfExponentials:
-    """Read a table, or screws if the file contains the key M; errors as for `read_table`."""
+    """Read a table, or read screws if the file contains the key M.
+
+    The function raises the same errors as `read_table`.
+    """
     data = read_mapping(path)
     return _with_place(screws_of_mapping, data, str(path)) if "M" in data else table_of(data, str(path))
 

@@ -74,10 +74,10 @@ def _printed_pose(T: FloatArray, digits: int) -> FloatArray:
 
 
 def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
-    """Return the sum of the largest tip errors (m) that the rounding of each number can cause.
+    """Return a bound (m) of the tip error that the rounded numbers of a printed table cause together.
 
-    The rounding error of an angle moves the tip by at most this error times `lever`, the largest distance
-    from the row's frame to the tip.
+    The rounding error of an angle moves the tip by at most this error times `lever`. The length `lever` is an
+    upper bound of the distance from the row's frame to the tip.
     """
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))

@@ -42,7 +42,7 @@ from urdfkin.model.tree import (
     pose,
 )
 
-#: Tolerance of handwritten screws: the axis has length 1, and the pitch (m/rad) is 0.
+#: Largest deviation of a handwritten axis from length 1, of a pitch (m/rad) from 0, and of M from a rotation.
 _WRITTEN = 1e-4
 _FORMULA = "T(q) = exp([S1] q1) ... exp([Sn] qn) M = M exp([B1] q1) ... exp([Bn] qn), screws (w, v)"
 

@@ -1,6 +1,7 @@
 """Snap angles to multiples of 15 degrees, and compute the effect on the tip.
 
-Three kinds of angles are snapped:
+To snap an angle is to replace it by the nearest multiple of 15 degrees, if their difference is at most a
+tolerance. Three kinds of angles are snapped:
 
 1. roll, pitch and yaw of each joint's origin in the URDF;
 2. the tilt between consecutive axes, and the rotations about these axes;
@@ -41,7 +42,7 @@ LARGEST_TOLERANCE = math.pi / 36.0
 SAMPLES = 500
 #: Assumed range (rad or metres) of a mimicked joint that is not on the path.
 _UNKNOWN_RANGE = (-1.0, 1.0)
-#: Largest deviation (rad, or relative to the span) of a noisy cell.
+#: Largest deviation of a cell that `noisy_cells` returns (rad, or relative to the table's span).
 _LARGEST_NOISE = 1e-4
 _HINT_TOLERANCES = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4)
 
@@ -58,7 +59,7 @@ def check_tolerance(snap: float) -> float:
 def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
-    """Return the snapped chain, and the changes, each with the index of its constant pose."""
+    """Return the chain with snapped angles, and each change with the index of the changed constant pose."""
     exact = chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
     path = chain(snapped_tree, tip, base)
@@ -158,7 +159,11 @@ def _round_rotation(R: FloatArray, tolerance: float) -> FloatArray:
 
 
 def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
-    """Snap the angles of a pose's rotation Rz(phi) Rx(tilt) Rz(psi); also return the angle of the change."""
+    """Write a pose's rotation as Rz(phi) Rx(tilt) Rz(psi), and snap phi, tilt and psi.
+
+    Return the new pose, and the angle (rad) between the old and the new rotation. The angle
+    is 0 if the rotations differ only by rounding.
+    """
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
@@ -219,7 +224,10 @@ def _change(exact: FrameChain, k: int, what: str, angle: float) -> SnapChange:
 
 
 def row_of_constant(table: DHTable, k: int) -> int:
-    """Return the row that contains the chain's constant A_k; -1 is the base, n is the tool."""
+    """Return the index of the row that contains the chain's constant pose A_k.
+
+    The index -1 means the base, and the index n means the tool.
+    """
     n = len(table.rows)
     if k == 0:
         return -1
@@ -265,5 +273,5 @@ def snap_hint(table: DHTable, snapped: Callable[[float], DHTable]) -> str | None
     subject = f"{len(noisy)} cells look" if len(noisy) > 1 else "a cell looks"
     return (
         f"{subject} like the effect of rounded angles in the file ({cell} of {joint}: {size:.2g} {unit}):"
-        f" with --snap {best:.0e}, {counts[best] or 'none'} of them remain; the effect on the tip is printed"
+        f" --snap {best:.0e} reduces their number to {counts[best] or 'zero'} and shows the effect on the tip"
     )

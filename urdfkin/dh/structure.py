@@ -188,7 +188,10 @@ def _arm_kinds(
 
 
 def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ...]) -> list[str]:
-    """Return the known closed-form solutions; an approximate property makes a solution approximate."""
+    """Return the known closed-form solutions of an arm.
+
+    If the arm has a required property only approximately, the solution is approximate too.
+    """
     names = {kind.name for kind in kinds}
     spherical = names & {"spherical wrist", "spherical shoulder"}
     if letters == "R" * 7 and len(spherical) == 2:
@@ -344,7 +347,10 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield OPW tables with the approximate lengths of the arm, for all signs of a1, a2 and b."""
+    """Yield an OPW table for each choice of the signs of a1, a2 and b.
+
+    The lengths in the tables are approximately the arm's lengths.
+    """
     rows = derive(path, Choices(last="flange")).rows
     tip = float(np.linalg.norm(path.T_last_tip[:3, 3])) or 1.0
     a1, c2, a2 = (abs(row.a) for row in rows[:3])
@@ -360,7 +366,10 @@ def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
 
 
 def _parameters(table: DHTable) -> Opw:
-    """Read the OPW parameters from a table with the frames of an OPW table."""
+    """Read the OPW parameters from a table.
+
+    `table` must be a result of `derive_like` with an OPW table as the reference.
+    """
     rows = table.rows
     lengths = {"a1": rows[0].a, "a2": rows[2].a, "b": rows[1].d + rows[2].d}
     lengths |= {"c1": rows[0].d, "c2": rows[1].a, "c3": rows[3].d, "c4": rows[5].d}
@@ -372,8 +381,9 @@ def _parameters(table: DHTable) -> Opw:
 def axes_and_vectors(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the unit axes H (n, 3), and the vectors P (n + 1, 3) in metres; all joints must be revolute.
 
-    The first vector begins at the base, and the last vector ends at the tip. The vector between two axes with
-    a common point in `_points` is exactly zero; solvers detect an intersection by this zero.
+    The first vector begins at the base, and the last vector ends at the tip. If two
+    consecutive axes have the same point in `_points`, the vector between them is exactly zero. Solvers use
+    this zero vector to detect that the axes intersect.
     """
     points = np.vstack([np.zeros(3), _points(screws), screws.M[:3, 3]])
     return screws.space[:, :3], np.diff(points, axis=0)

@@ -2,7 +2,7 @@
 
 A table represents a product of two kinds of transforms (section 7.5 of the textbook):
 
-    S = Rz(theta) Tz(d)              about and along a joint's axis
+    S = Rz(theta) Tz(d)              rotation about a joint's axis, and translation along this axis
     X = Tx(a) Rx(alpha) Ry(beta)     from one axis to the next; beta = 0 except in a Hayati row
 
 The two conventions group these transforms differently into rows:
@@ -200,12 +200,12 @@ def is_identity(T: FloatArray) -> bool:
 
 
 def angle_difference(first: float, second: float) -> float:
-    """Return first - second without full turns, in [-pi, pi]."""
+    """Return first - second (rad) modulo 2 pi, in [-pi, pi]."""
     return math.remainder(first - second, 2.0 * math.pi)
 
 
 def wrapped(angle: float) -> float:
-    """Return the equivalent angle in (-pi, pi]; an angle within rounding of -pi becomes pi.
+    """Return the equivalent angle in (-pi, pi]; an angle that is -pi up to rounding becomes pi.
 
     >>> wrapped(-math.pi) == math.pi, wrapped(7.0) == 7.0 - 2 * math.pi
     (True, True)
@@ -215,7 +215,7 @@ def wrapped(angle: float) -> float:
 
 
 def cleaned_angle(angle: float) -> float:
-    """Wrap an angle into (-pi, pi], and remove the rounding error of a multiple of pi/12."""
+    """Wrap an angle into (-pi, pi]; a multiple of pi/12 with a rounding error becomes exact."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
     return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
@@ -242,9 +242,11 @@ class SnapChange:
     """One angle that was rounded to a multiple of 15 degrees; the rounding rotates the rest of the chain.
 
     Attributes:
-        row: Index of the row, from 0; -1 is the base, and the number of rows is the tool.
+        row: Index of the changed row, from 0. The index -1 means the base, and the index n means the tool of
+            a table with n rows.
         angle: Angle (rad) of this rotation.
-        lever: Largest distance (m) from the rotation's centre to the tip, with prismatic joints at zero.
+        lever: Upper bound (m) of the distance from the rotation's centre to the tip, with prismatic joints at
+            zero.
         sliders: Prismatic joints between the centre and the tip; their travel increases the distance.
     """
 
@@ -265,13 +267,13 @@ class SnapReport:
     """All snapped angles of a table, and their effect on the tip.
 
     Each change rotates the rest of the chain about a joint's origin. The tip moves by at most the angle times
-    its distance from this origin. The sum of these bounds holds for all angles.
+    its distance from this origin. The sum of these bounds is a bound for all changes together.
 
     Attributes:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
-        metres: Guaranteed bound of the tip's displacement (metres), with prismatic joints within their
-            limits, or within 1 m of zero without limits.
+        metres: Guaranteed bound of the tip's displacement (metres). The bound holds if each prismatic joint
+            is within its limits, or within 1 m of zero if the joint has no limits.
         radians: Guaranteed bound of the tip's rotation (radians).
         per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
         measured_metres: Largest displacement of the tip in sampled configurations (metres).
@@ -290,7 +292,7 @@ class SnapReport:
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """Sorted indices of the changed rows, as in `SnapChange`."""
+        """Sorted indices of the rows with changed angles; `SnapChange.row` explains the indices -1 and n."""
         return tuple(sorted({change.row for change in self.changes}))
 
     def bound(self, values: Mapping[str, FloatArray]) -> FloatArray:

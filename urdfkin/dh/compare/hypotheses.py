@@ -2,7 +2,8 @@
 
 An interpretation of a table consists of a convention, units and column names. Each interpretation gives the
 robot a different shape: distances and angles between consecutive axes, and offsets along these axes.
-`diagnose` fits only the few interpretations with a shape close to the URDF's shape.
+`diagnose` ranks the interpretations by the difference of the shapes from the URDF's shape, and by the number
+of changes of the file's interpretation. It fits at most three interpretations.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from urdfkin.model.tree import FloatArray
 _MOST_FITS = 3
 #: Tilt (rad) below which two axes are treated as parallel.
 _PARALLEL = 2e-2
-#: Penalty for each change of the file's interpretation, as a fraction of the smallest shape difference.
+#: Each change of the file's interpretation costs this fraction of the smallest difference of shapes.
 _DIFFERENCE_COST = 0.1
-#: Largest tip error of a better interpretation, as a fraction of the original tip error and of the reach.
+#: A better interpretation has at most this fraction of the stated tip error, and of the reach, as tip error.
 _BETTER = 0.05
 #: `diagnose` ignores all other keys of a row, such as limits and mimic rules.
 _CELLS = ("joint", "kind", "sense", "beta", *COLUMNS)
@@ -44,7 +45,7 @@ _LONGEST, _SHORTEST = 20.0, 1e-3
 
 @dataclass(frozen=True, slots=True)
 class BetterInterpretation:
-    """Another interpretation of a table, with the largest tip errors on samples after a fit."""
+    """Another interpretation of a table; `metres` and `radians` are the largest tip errors after a fit."""
 
     interpretation: Interpretation
     stated: Interpretation
@@ -74,8 +75,8 @@ def diagnose(
     """Return the interpretation with which a table agrees with a URDF; None if there is none.
 
     `data` is the table's plain data from `urdfkin.dh.parse_table.mapping_from_text`. `stated_error` (metres)
-    is the tip error of the table as its file states it. With the returned interpretation, the tip error is at
-    most 5 % of `stated_error`, or within `tolerance` (metres).
+    is the tip error with the interpretation that the file states. With the returned interpretation, the tip
+    error is at most 5 % of `stated_error` and of the reach, or at most `tolerance` (metres).
     """
     kinds = [joint.kind.turns for joint in chain.joints]
     shape_of_urdf = shape(derive(chain, Choices(last="flange")), chain.reach)

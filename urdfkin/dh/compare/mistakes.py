@@ -1,7 +1,7 @@
 """Find a single mistake in a table: a wrong sign, an extra right angle, or rows in the wrong order.
 
-A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. After the
-cell is corrected, the table agrees with the URDF after a smaller fit, or without a fit.
+A fit of base, tool, joint offsets and joint signs often compensates for a wrong sign in a cell. With the
+correct sign, the table agrees with the URDF without a fit, or after a fit that changes fewer parameters.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, pose
 
 _SAME_ANGLE = 1e-9
-#: With more possible corrections, joint offsets and joint signs are not fitted.
+#: If a table has more possible corrections, `MistakeSearch.find` does not fit joint offsets and joint signs.
 _MOST_FITS = 100
 
 
@@ -56,11 +56,12 @@ class MistakeSearch:
     tolerance: float
 
     def find(self, reference: DHTable, *, fit: bool, agrees: bool) -> tuple[Mistake, ...]:
-        """Return the mistakes whose correction leaves the fewest parameters to fit.
+        """Return the mistakes whose correction needs the smallest fit.
 
-        The result is empty if no correction reduces the number of these parameters. A table that `agrees`
-        after a fit may be correct and differ from the URDF only in its frames. Corrections of such a table
-        are reported only if they need no fit, or a fit of only the base or only the tool.
+        The smallest fit changes the fewest parameters. The result is empty if no correction makes the fit
+        smaller. A table that `agrees` after a fit may be correct and differ from the URDF only in its frames.
+        A correction of such a table is reported only if the fit then changes at most the base or the tool,
+        but not both.
         """
         if self._as_written(reference) is not None:
             return ()
@@ -94,7 +95,7 @@ class MistakeSearch:
         metres, radians = self.check_targets.largest_errors(model)
         return metres <= self.tolerance and radians * self.check_targets.scale <= self.tolerance
 
-    # -- fits, from no parameters to all parameters; None if the table does not agree --------------------
+    # -- fits; each function returns None if the fitted table does not agree with the URDF ---------------
 
     def _as_written(self, table: DHTable) -> TableArrays | None:
         model = _model(table)
@@ -132,7 +133,7 @@ class MistakeSearch:
         return min(agreeing, key=lambda model: self._fitted(written, model).count, default=None)
 
     def _fitted(self, written: TableArrays, model: TableArrays) -> Fitted:
-        """Return the free parameters that the fit changed by more than the resolution of the fit."""
+        """Return which parameters a fit changed; changes up to the resolution of the fit do not count."""
         metres, radians = self.check_targets.largest_errors(model)
         fine = resolution(metres / self.check_targets.scale, radians)
         rows = np.arange(len(model.cells))
@@ -181,7 +182,7 @@ def _corrections(reference: DHTable) -> Iterator[_TableCorrection]:
         rows = list(reference.rows)
         rows[i], rows[j] = rows[j], rows[i]
         orders.append((MistakeKind.EXCHANGED, (i, j), rows))
-    # For three rows, the reverse order is the exchange of the first and the last row.
+    # With two or three rows, the reversal of the order only exchanges the first and the last row.
     if len(reference.rows) > 3:
         backwards = list(reversed(reference.rows))
         orders.append((MistakeKind.REVERSED, tuple(range(len(backwards))), backwards))

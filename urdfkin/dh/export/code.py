@@ -1,8 +1,8 @@
 """Export a table as code for exact symbolic computation, and format names and numbers in code.
 
-`urdfkin.export` writes code that computes with doubles. This module writes the rows themselves, with exact
-numbers: pi/2 stays pi/2, and 0.425 becomes 17/40. The languages are Python with SymPy, and MATLAB with the
-Symbolic Math Toolbox, or Octave with the package symbolic.
+`urdfkin.export` writes code that computes with doubles. This module writes code that contains the table's
+rows with exact numbers: pi/2 stays pi/2, and 0.425 becomes 17/40. The Python code uses SymPy. The MATLAB code
+uses the Symbolic Math Toolbox; it also runs in Octave with the package symbolic.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def header(table: DHTable) -> list[str]:
         f"q = ({', '.join(table.joint_names)})",
     ]
     if table.snap is not None and table.snap.changes:
-        lines.append(f"angles snapped: the tip moves by at most {table.snap.metres:.3g} m")
+        lines.append(f"the rounding of angles moves the tip by at most {table.snap.metres:.3g} m")
     return [plain(line) for line in lines]
 
 
@@ -83,7 +83,7 @@ _LARGEST = 10**9
 
 
 class Fractions(Units):
-    """SymPy's exact multiples of pi, and exact fractions (0.425 is 17/40)."""
+    """Format angles as multiples of pi, and lengths as fractions (0.425 is 17/40), in the syntax of SymPy."""
 
     def length(self, metres: float) -> str:
         sign, x = "-" if metres < 0.0 else "", Fraction(repr(abs(metres)))
