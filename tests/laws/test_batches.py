@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.laws.everything import as_a_block, by_the_robot, differing, prepared
-from tests.laws.subjects import NAMES, robot_of, state
+from tests.laws.subjects import NAMES, as_a_block, by_the_robot, differing, prepared, robot_of, state
 from tests.robots.odd_urdfs import Urdf
 from tests.urdfs import loaded
 from urdfkin import load
@@ -100,9 +99,8 @@ def test_inputs_of_any_memory_layout_and_type_give_the_same_result() -> None:
     for other in (*layouts, q.tolist(), q.astype(">f8")):
         assert (robot.jacobian(other, "panda_hand") == straight).all()
     for other in (q.astype(np.float32), np.zeros(8, dtype=np.int64)):
-        assert (
-            robot.jacobian(other, "panda_hand") == robot.jacobian(other.astype(float), "panda_hand")
-        ).all()
+        expected = robot.jacobian(other.astype(float), "panda_hand")
+        assert (robot.jacobian(other, "panda_hand") == expected).all()
 
 
 def test_inputs_do_not_change_and_results_are_not_shared() -> None:
@@ -281,6 +279,7 @@ def test_the_sample_nearest_to_a_singularity_is_named(threads: int) -> None:
     with pytest.raises(RepresentationSingularityError) as caught:
         robot.analytical_jacobian(q.reshape(3, PART, 6), "tool0", nearest=1.6, threads=threads)
     assert caught.value.sample == divmod(int(distances.argmin()), PART)
+    assert f"sample {list(caught.value.sample)}" in str(caught.value)
     assert caught.value.distance == distances.min()
 
 
@@ -363,25 +362,21 @@ def all_frames_faults(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray)
                 yield f"{what} of {frame}"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("joints", [*range(1, 21), 30, 33, 64, 70])
-def test_chains_of_any_number_of_joints_have_equal_results_in_single_calls_and_batches(joints: int) -> None:
-    robot = chain(joints)
-    assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, joints))) == []
+#: Robots of every kind, robots with planar, floating and mimic joints, and chains of any length.
+SUBJECTS = [
+    *(pytest.param(partial(robot_of, name), id=name) for name in NAMES),
+    *(pytest.param(partial(mixed, floating), id=f"mixed {floating}") for floating in (False, True)),
+    *(
+        pytest.param(partial(chain, joints), id=f"chain of {joints}", marks=pytest.mark.slow)
+        for joints in (*range(1, 21), 30, 33, 64, 70)
+    ),
+]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_robots_of_every_kind_have_equal_results_in_single_calls_and_batches(name: str) -> None:
-    robot = robot_of(name)
+@pytest.mark.parametrize("made", SUBJECTS)
+def test_results_are_equal_in_single_calls_and_batches(made: Callable[[], Robot]) -> None:
+    robot = made()
     assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, 2))) == []
-
-
-@pytest.mark.parametrize("floating", [False, True])
-def test_planar_floating_and_mimic_joints_have_equal_results_in_single_calls_and_batches(
-    floating: bool,
-) -> None:
-    robot = mixed(floating)
-    assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, 3))) == []
 
 
 @pytest.mark.slow

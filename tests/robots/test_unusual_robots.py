@@ -1,5 +1,7 @@
 """Unusual and random robots agree with Pinocchio in every quantity, frame and reference."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -41,16 +43,13 @@ def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
     assert max(tally.share for tally in report.tallies.values()) < USUAL_SHARE
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_quantity_of_every_frame_agrees_with_pinocchio(name: str) -> None:
-    text = urdf_of(name)
-    report = urdfkin.validate(text, samples=5).robots[0]
-    assert_verified(report, loaded(text), samples=5 + 3)
+WITH_ROOT = product(
+    ["mimic_hand_40", "tree_3", "single_link", "one_joint", "fixed_only"], ["planar", "floating"]
+)
 
 
-@pytest.mark.parametrize("root_joint", ["planar", "floating"])
-@pytest.mark.parametrize("name", ["mimic_hand_40", "tree_3", "single_link", "one_joint", "fixed_only"])
-def test_unusual_robots_with_a_root_joint_agree_with_pinocchio(name: str, root_joint: str) -> None:
+@pytest.mark.parametrize(("name", "root_joint"), [*product(NAMES, [None]), *WITH_ROOT])
+def test_every_quantity_of_every_frame_agrees_with_pinocchio(name: str, root_joint: str | None) -> None:
     text = urdf_of(name)
     report = urdfkin.validate(text, samples=5, root_joint=root_joint).robots[0]
     assert_verified(report, loaded(text, root_joint=root_joint), samples=5 + 3)
