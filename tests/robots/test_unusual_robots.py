@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests.laws.subjects import state
 from tests.robots.against_pinocchio import assert_agrees
 from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
 from tests.urdfs import loaded
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
@@ -22,11 +22,6 @@ pytestmark = pytest.mark.slow
 
 #: Upper bound on the measured ratios to a bound, because rounding errors rarely add up in the worst way.
 USUAL_SHARE = 0.25
-
-
-def rates(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    generator = np.random.default_rng(seed)
-    return robot.sample(n, seed), *generator.standard_normal((2, n, robot.nv))
 
 
 def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
@@ -61,14 +56,14 @@ def test_results_of_an_unusual_robot_agree_with_direct_calls_of_pinocchio(
     name: str, reference: Reference
 ) -> None:
     robot = loaded(urdf_of(name), verify=False)
-    q, v, a = (x[0] for x in rates(robot, 1, 3))
+    q, v, a = (x[0] for x in state(robot, 1, 3))
     assert_agrees(robot, q, v, a, robot.tip_frame, reference, is_odd=True)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_certificate_counts_every_checked_call(name: str) -> None:
     robot = loaded(urdf_of(name))
-    q, v, a = rates(robot, 2, 4)
+    q, v, a = state(robot, 2, 4)
     frame = robot.tip_frame
     robot.placement(q, frame)
     for reference in Reference:
