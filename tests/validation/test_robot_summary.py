@@ -126,15 +126,11 @@ def test_the_commands_for_a_text_read_the_text_from_standard_input(root_joint: s
 def test_a_command_computes_the_compared_joint_and_not_a_link_with_the_same_name() -> None:
     robot = urdfkin.load(TEXT)
     report = validate(robot, samples=2).robots[0]
-    for (quantity, reference), tally in report.tallies.items():
-        line = report.replay((quantity, reference))
-        if quantity != "joint jacobian" or line is None or tally.case is None:
-            continue
-        done = command(*shlex.split(line)[1:], "--format", "json", stdin=TEXT)
-        expected = robot.jacobian(tally.case.q, f"joint:{tally.case.frame}", reference)
-        assert np.allclose(done.data["result"][0], expected, atol=1e-12)
-        return
-    pytest.fail("no joint was compared")
+    key = next(key for key in report.tallies if key[0] == "joint jacobian" and report.replay(key))
+    case, line = present(report.tallies[key].case), present(report.replay(key))
+    done = command(*shlex.split(line)[1:], "--format", "json", stdin=TEXT)
+    expected = robot.jacobian(case.q, f"joint:{case.frame}", key[1])
+    assert np.allclose(done.data["result"][0], expected, atol=1e-12)
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from types import ModuleType
@@ -139,8 +140,8 @@ def test_mujoco_agrees_for_every_quantity_and_reference_frame(name: str, far: fl
     text, options = SUBJECTS[name]
     robot, base = loaded(text, oracle="mujoco", **options), None
     if far is not None:
-        base = draw_base(5, np.random.default_rng(0))
-        base = urdfkin.BaseMotion(shift(*[far] * 3) @ base.placement, base.velocity, base.acceleration)
+        base = draw_base(1, np.random.default_rng(0))
+        base = replace(base, placement=shift(far, far, far) @ base.placement)
     ask_everything(robot, 5, base)
     certificate = robot.certificate()
     assert certificate.verified, certificate
