@@ -15,8 +15,7 @@ import pytest
 
 import urdfkin
 from tests.cli.running import python
-from tests.laws.everything import differing
-from tests.laws.subjects import robot_of, state
+from tests.laws.subjects import differing, robot_of, state
 from urdfkin import Reference
 from urdfkin.compiled.machine.single import arrays_are_known, one_configuration, single
 from urdfkin.compiled.plan import KernelArgs

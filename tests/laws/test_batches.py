@@ -5,6 +5,7 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.laws.everything import as_a_block, by_the_robot, differing, prepared
-from tests.laws.subjects import NAMES, robot_of, state
+from tests.laws.subjects import NAMES, as_a_block, by_the_robot, differing, prepared, robot_of, state
 from tests.robots.odd_urdfs import Urdf
 from tests.urdfs import loaded
 from urdfkin import load
@@ -100,9 +100,8 @@ def test_inputs_of_any_memory_layout_and_type_give_the_same_result() -> None:
     for other in (*layouts, q.tolist(), q.astype(">f8")):
         assert (robot.jacobian(other, "panda_hand") == straight).all()
     for other in (q.astype(np.float32), np.zeros(8, dtype=np.int64)):
-        assert (
-            robot.jacobian(other, "panda_hand") == robot.jacobian(other.astype(float), "panda_hand")
-        ).all()
+        expected = robot.jacobian(other.astype(float), "panda_hand")
+        assert (robot.jacobian(other, "panda_hand") == expected).all()
 
 
 def test_inputs_do_not_change_and_results_are_not_shared() -> None:
@@ -281,6 +280,7 @@ def test_the_sample_nearest_to_a_singularity_is_named(threads: int) -> None:
     with pytest.raises(RepresentationSingularityError) as caught:
         robot.analytical_jacobian(q.reshape(3, PART, 6), "tool0", nearest=1.6, threads=threads)
     assert caught.value.sample == divmod(int(distances.argmin()), PART)
+    assert f"sample {list(caught.value.sample)}" in str(caught.value)
     assert caught.value.distance == distances.min()
 
 
@@ -335,15 +335,6 @@ def mixed(floating: bool) -> Robot:
     return loaded(urdf.text, verify=False)
 
 
-def broom(branches: int, joints: int) -> Robot:
-    """Return branches from one link, so that the path to a tip needs only some blocks of coordinates."""
-    urdf = Urdf(f"broom_{branches}_{joints}", branches)
-    for branch in range(branches):
-        for i in range(joints):
-            urdf.add(KINDS[(branch + i) % 3], None if i else 0, joint=f"b{branch}_{i:02}")
-    return loaded(urdf.text, verify=False)
-
-
 def faults(robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray) -> Iterator[str]:
     batch = dict(by_the_robot(robot, frame, q, v, a))
     for k in [row for row in ROWS if row < len(q)]:
@@ -354,40 +345,33 @@ def faults(robot: Robot, frame: str, q: FloatArray, v: FloatArray, a: FloatArray
                     yield f"{what} of {frame}, row {k}, {way}"
 
 
-def all_frames_faults(robot: Robot, q: FloatArray, v: FloatArray, a: FloatArray) -> Iterator[str]:
-    frames = [f"link:{name}" for name in robot.link_names]
-    together = dict(by_the_robot(robot, frames, q, v, a))
-    for f, frame in enumerate(frames):
-        for what, alone in by_the_robot(robot, frame, q, v, a):
-            if differing(np.ascontiguousarray(together[what][:, f]), alone):
-                yield f"{what} of {frame}"
+#: Robots of every kind, robots with planar, floating and mimic joints, and chains of any length.
+SUBJECTS = [
+    *(pytest.param(partial(robot_of, name), id=name) for name in NAMES),
+    *(pytest.param(partial(mixed, floating), id=f"mixed {floating}") for floating in (False, True)),
+    *(
+        pytest.param(partial(chain, joints), id=f"chain of {joints}", marks=pytest.mark.slow)
+        for joints in (*range(1, 21), 30, 33, 64, 70)
+    ),
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("joints", [*range(1, 21), 30, 33, 64, 70])
-def test_chains_of_any_number_of_joints_have_equal_results_in_single_calls_and_batches(joints: int) -> None:
-    robot = chain(joints)
-    assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, joints))) == []
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_robots_of_every_kind_have_equal_results_in_single_calls_and_batches(name: str) -> None:
-    robot = robot_of(name)
+@pytest.mark.parametrize("made", SUBJECTS)
+def test_results_are_equal_in_single_calls_and_batches(made: Callable[[], Robot]) -> None:
+    robot = made()
     assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, 2))) == []
-
-
-@pytest.mark.parametrize("floating", [False, True])
-def test_planar_floating_and_mimic_joints_have_equal_results_in_single_calls_and_batches(
-    floating: bool,
-) -> None:
-    robot = mixed(floating)
-    assert list(faults(robot, robot.tip_frame, *state(robot, SAMPLES, 3))) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("branches", "joints"), [(2, 4), (3, 8), (5, 7), (4, 17)])
-def test_each_tip_of_a_tree(branches: int, joints: int) -> None:
-    robot = broom(branches, joints)
+def test_results_at_each_tip_of_a_tree_are_equal_in_single_calls_and_batches(
+    branches: int, joints: int
+) -> None:
+    # Branches begin at one link, so the path to a tip needs only some blocks of coordinates.
+    urdf = Urdf("broom", branches)
+    for branch, i in product(range(branches), range(joints)):
+        urdf.add(KINDS[(branch + i) % 3], None if i else 0, joint=f"b{branch}_{i:02}")
+    robot = loaded(urdf.text, verify=False)
     for leaf in robot.tree.leaves():
         assert list(faults(robot, robot.tree.frame_name(leaf), *state(robot, LANES + 1, 4))) == []
 
@@ -396,7 +380,11 @@ def test_each_tip_of_a_tree(branches: int, joints: int) -> None:
 @pytest.mark.parametrize("name", ["tree_8", "mimic_hand_40_sliding", "planar_and_floating_in_the_middle"])
 def test_each_frame_has_equal_results_alone_and_in_a_call_for_all_frames(name: str) -> None:
     robot = robot_of(name)
-    assert list(all_frames_faults(robot, *state(robot, LANES + 1, 5))) == []
+    x, frames = state(robot, LANES + 1, 5), [f"link:{name}" for name in robot.link_names]
+    together = dict(by_the_robot(robot, frames, *x))
+    for f, frame in enumerate(frames):
+        for what, alone in by_the_robot(robot, frame, *x):
+            assert not differing(np.ascontiguousarray(together[what][:, f]), alone), (what, frame)
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import urdfkin
+from tests import urdfs
 from tests.laws.subjects import NAMES, moved, robot_of, rotation_vector, state
-from tests.robots.odd_urdfs import Urdf
 from urdfkin import VerificationError, load
 from urdfkin.compiled import evaluate
 from urdfkin.kinematics import bodies
@@ -80,9 +80,7 @@ def turned(R: FloatArray, six: FloatArray) -> FloatArray:
     return back
 
 
-def test_the_power_and_the_joint_torques_of_a_wrench_do_not_depend_on_the_reference(
-    robot: Robot,
-) -> None:
+def test_the_power_and_the_joint_torques_of_a_wrench_do_not_depend_on_the_reference(robot: Robot) -> None:
     q, v, _ = state(robot, 17, 4)
     frame = robot.tip_frame
     force = np.random.default_rng(5).normal(size=(17, 6))  # at the frame's origin, in world axes
@@ -173,13 +171,16 @@ def test_the_jacobian_with_mimic_joints_is_the_jacobian_of_free_joints_times_g(n
             assert close(coupled.acceleration(q, v, a, frame, reference), acceleration)
 
 
+ELBOW = urdfs.robot(
+    urdfs.joint("shoulder", "continuous", "base", "upper"),
+    urdfs.joint("elbow", "continuous", "upper", "lower", 'xyz="3 0 0"'),
+    urdfs.joint("flange", "fixed", "lower", "tip", 'xyz="4 0 0"'),
+)
+
+
 def test_an_elbow_of_three_and_four_metres_has_its_tip_at_five_metres() -> None:
     # Computed by hand: two links of 3 m and 4 m at a right angle.
-    urdf = Urdf("elbow", 0)
-    urdf.add("continuous", axis='<axis xyz="0 0 1"/>', origin="")
-    urdf.add("continuous", axis='<axis xyz="0 0 1"/>', origin='<origin xyz="3 0 0"/>')
-    urdf.add("fixed", link="tip", origin='<origin xyz="4 0 0"/>')
-    robot, q = load(urdf.text), [0.0, np.pi / 2]
+    robot, q = load(ELBOW), [0.0, np.pi / 2]
     assert robot.placement(q, "tip")[:3, 3] == pytest.approx([3.0, 4.0, 0.0], abs=1e-15)
     assert np.hypot(*robot.placement(q, "tip")[:2, 3]) == pytest.approx(5.0, rel=1e-15)
     assert robot.jacobian(q, "tip")[:2] == pytest.approx(np.array([[-4.0, -4.0], [3.0, 0.0]]), abs=2e-15)
@@ -262,9 +263,7 @@ def assert_converges(error: FloatArray, reach: float, order: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "order", [1, 2], ids=["the Jacobian, of quotients", "the acceleration, of second ones"]
-)
+@pytest.mark.parametrize("order", [1, 2], ids=["Jacobian", "acceleration"])
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", NAMES)
 def test_central_differences_converge_to_jacobian_and_acceleration_with_second_order(
@@ -275,9 +274,7 @@ def test_central_differences_converge_to_jacobian_and_acceleration_with_second_o
     assert_converges(angular, 1.0, order)
 
 
-def test_the_convergence_check_detects_an_error_of_1e_7_in_a_jacobian(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_convergence_check_detects_an_error_of_1e_7_in_a_jacobian() -> None:
     linear, _, reach = errors("panda", 0, order=1)
     with pytest.raises(AssertionError):
         assert_converges(linear + 1e-7, reach, 1)
@@ -285,20 +282,16 @@ def test_the_convergence_check_detects_an_error_of_1e_7_in_a_jacobian(
 
 # -- relative placements ---------------------------------------------------------------------------
 
-#: Pairs of frames on one branch and on two, in both directions; also with a mimic joint.
-TRIPLES = {
-    "panda": (
-        ("panda_link4", "panda_hand", "panda_leftfinger"),
-        ("panda_rightfinger", "panda_link2", "panda_link0"),
-    ),
-    "talos": (("left_sole_link", "gripper_right_base_link", "torso_1_link"),),
-}
+#: Frames on one branch and on two, in both directions; also with a mimic joint.
+TRIPLES = [
+    ("panda", ("panda_link4", "panda_hand", "panda_leftfinger")),
+    ("panda", ("panda_rightfinger", "panda_link2", "panda_link0")),
+    ("talos", ("left_sole_link", "gripper_right_base_link", "torso_1_link")),
+]
 
 
-@pytest.mark.parametrize(
-    ("name", "frames", "root_joint"),
-    [(name, frames, joint) for name in TRIPLES for frames in TRIPLES[name] for joint in (None, "floating")],
-)
+@pytest.mark.parametrize("root_joint", [None, "floating"])
+@pytest.mark.parametrize(("name", "frames"), TRIPLES)
 def test_relative_placements_are_composed_and_inverted(
     name: str, frames: tuple[str, str, str], root_joint: str | None
 ) -> None:
@@ -339,8 +332,7 @@ def test_relative_placement_accepts_frames_batches_and_out_as_placement_does() -
 def test_an_error_in_a_relative_placement_is_found_and_reproducible(
     mistake: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    face: Any = bodies
-    right = face.seen_from
+    right: Any = bodies.seen_from
 
     def wrong(T_a: FloatArray, T_b: FloatArray, out: FloatArray | None) -> FloatArray:
         T: FloatArray = right(T_a, T_b, out)
@@ -354,7 +346,7 @@ def test_an_error_in_a_relative_placement_is_found_and_reproducible(
 
     robot = urdfkin.load("ur5")
     q = robot.sample(1, seed=4)[0]
-    monkeypatch.setattr(face, "seen_from", wrong)
+    monkeypatch.setattr(bodies, "seen_from", wrong)
     with pytest.raises(VerificationError, match="relative placement of tool0") as caught:
         robot.relative_placement(q, "tool0", "forearm_link")
     monkeypatch.undo()

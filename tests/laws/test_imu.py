@@ -62,12 +62,13 @@ def test_an_imu_measures_gravity_at_rest_and_zero_in_free_fall() -> None:
     assert np.abs(robot.imu(q, still, still, "panda_hand", gravity=[0, 0, 0])).max() == 0.0
 
 
-@pytest.mark.parametrize("mistake", ["sign", "spatial", "none"])
+@pytest.mark.parametrize("mistake", ["sign", "spatial"])
 def test_an_imu_with_reversed_gravity_or_spatial_acceleration_is_found(
     mistake: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot, original = urdfkin.load("ur5"), evaluate.imus
     x = robot.sample(3)
+    robot.imu(x, x, x, "tool0")
 
     def wrong(plan: Any, q: FloatArray, v: FloatArray, a: FloatArray, **how: Any) -> FloatArray:
         if mistake == "sign":
@@ -79,9 +80,6 @@ def test_an_imu_with_reversed_gravity_or_spatial_acceleration_is_found(
         return found
 
     monkeypatch.setattr(evaluate, "imus", wrong)
-    if mistake == "none":
-        robot.imu(x, x, x, "tool0")
-        return
     with pytest.raises(urdfkin.VerificationError, match="the imu of tool0") as caught:
         robot.imu(x, x, x, "tool0")
     monkeypatch.undo()

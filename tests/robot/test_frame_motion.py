@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import urdfkin
+from tests.laws.subjects import state
 from tests.laws.test_imu import moving_base
-from tests.verify.test_singular_values import SLIDE
+from tests.verify.test_singular_values import ROWS, SLIDE
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion
@@ -16,12 +17,6 @@ from urdfkin.verify.pinocchio import PinocchioOracle
 
 N = 7
 REFERENCES = ["local", "world", "local_world_aligned"]
-ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-
-
-def state(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray]:
-    v, a = np.random.default_rng(0).standard_normal((2, N, robot.nv))
-    return robot.sample(N, 0), v, a
 
 
 def assert_is_the_robots(
@@ -40,8 +35,8 @@ def assert_is_the_robots(
 @pytest.mark.parametrize("reference", REFERENCES)
 def test_a_frame_motion_has_the_results_of_the_robots_methods_and_is_checked(reference: str) -> None:
     robot = urdfkin.load("panda")
-    x = frame_motion(robot, state(robot), robot.tip_frame, reference)
-    assert_is_the_robots(x, robot, *state(robot))
+    x = frame_motion(robot, state(robot, N, 0), robot.tip_frame, reference)
+    assert_is_the_robots(x, robot, *state(robot, N, 0))
     assert set(x.checks) >= {"placement", "velocity", "acceleration", "jacobian"}
     assert all(check.units.shape == (N,) for check in x.checks.values())
 
@@ -52,7 +47,7 @@ def test_a_disagreement_of_a_frame_motion_is_stored_and_raises_no_error(
     robot = urdfkin.load("panda")
     right = PinocchioOracle.velocities
     monkeypatch.setattr(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-10))
-    x = frame_motion(robot, state(robot), robot.tip_frame)
+    x = frame_motion(robot, state(robot, N, 0), robot.tip_frame)
     assert not x.agrees
     assert (x.checks["velocity"].share > 1.0).all()
     assert (x.checks["placement"].share < 1.0).all()
@@ -60,12 +55,11 @@ def test_a_disagreement_of_a_frame_motion_is_stored_and_raises_no_error(
 
 def test_manipulability_is_the_square_root_of_the_determinant_of_j_times_j_transposed() -> None:
     robot = urdfkin.load("ur5")
-    x = frame_motion(robot, state(robot), robot.tip_frame)
+    x = frame_motion(robot, state(robot, N, 0), robot.tip_frame)
     for rows in ROWS.values():
         J = x.jacobian[:, rows]
-        np.testing.assert_allclose(
-            x.manipulability(rows) ** 2, np.linalg.det(J @ J.swapaxes(1, 2)), rtol=1e-6
-        )
+        squares = np.linalg.det(J @ J.swapaxes(1, 2))
+        np.testing.assert_allclose(x.manipulability(rows) ** 2, squares, rtol=1e-6)
     np.testing.assert_allclose(x.singular_values.prod(axis=1), x.manipulability(), rtol=1e-12)
 
 
@@ -94,10 +88,9 @@ def test_manipulability_is_equal_for_one_configuration_and_in_a_batch(rows: str,
 def test_a_moving_base_of_a_trajectory_moves_the_frame_and_is_checked(tmp_path: Path) -> None:
     robot, base, rng = urdfkin.load("ur5"), moving_base(5, 3), np.random.default_rng(2)
     q, (v, a) = robot.sample(5, 1), rng.standard_normal((2, 5, 6))
-    fields: dict[str, Any] = {
-        f"base_{name}": getattr(base, name) for name in ("placement", "velocity", "acceleration")
-    }
-    np.savez(tmp_path / "log.npz", t=np.arange(5.0), q=q, v=v, a=a, **fields)
+    motion = {"base_placement": base.placement, "base_velocity": base.velocity}
+    motion |= {"base_acceleration": base.acceleration, "q": q, "v": v, "a": a, "t": np.arange(5.0)}
+    np.savez(tmp_path / "log.npz", **motion)  # type: ignore[arg-type]
     x = urdfkin.frame_motion(robot, urdfkin.read_trajectory(robot, tmp_path / "log.npz"), "tool0")
     assert_is_the_robots(x, robot, q, v, a, base=base)
     assert repr(x) == "<FrameMotion of tool0: 5 samples, verified by Pinocchio>"

@@ -1,5 +1,6 @@
 """The velocities of a line are its derivatives; a table is read exactly or rejected with the place."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,10 @@ import pytest
 import urdfkin
 from urdfkin.errors import InputError, SourceError
 from urdfkin.robot import Robot
-from urdfkin.robot.trajectory import line, read_columns, read_trajectory
+from urdfkin.robot.trajectory import Trajectory, line, read_columns, read_trajectory
 
+PARTS = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+JOINTS = [f"{part}_joint" for part in PARTS]
 END = np.array([1.0, -1.2, 0.8, 0.4, -0.3, 2.0])
 
 
@@ -58,39 +61,48 @@ def test_velocities_on_a_line_of_a_floating_base_are_derivatives_of_frame_positi
     np.testing.assert_allclose(robot.acceleration(x.q, x.v, x.a, "FL_foot")[1:-1, :3], seconds, atol=2e-3)
 
 
-def write(path: Path, robot: Robot, columns: dict[str, np.ndarray]) -> Path:
+Columns = dict[str, np.ndarray]
+Read = Callable[[Columns], Trajectory]
+
+
+def write(path: Path, columns: Columns) -> Path:
     rows = [",".join(columns)]
     rows += [",".join(repr(float(x)) for x in row) for row in zip(*columns.values(), strict=True)]
     path.write_text("\n".join(rows))
     return path
 
 
-def columns_of(robot: Robot, *, rates: bool) -> dict[str, np.ndarray]:
-    x = line(robot, robot.neutral(), END, 2.0, 41)
-    columns = {"t": x.t} | {name: x.q[:, k] for k, name in enumerate(robot.coordinate_names)}
-    if rates:
-        for letter, values in (("v", x.v), ("a", x.a)):
-            columns |= {f"{letter}:{name}": values[:, k] for k, name in enumerate(robot.rate_names)}
-    return columns
+@pytest.fixture
+def read(robot: Robot, tmp_path: Path) -> Read:
+    """A function that writes a table and reads it."""
+    return lambda columns: read_trajectory(robot, write(tmp_path / "x.csv", columns))
+
+
+@pytest.fixture(scope="module")
+def direct(robot: Robot) -> Trajectory:
+    return line(robot, robot.neutral(), END, 2.0, 41)
+
+
+def columns_of(x: Trajectory, letters: str = "") -> Columns:
+    """Return the columns of t and q, and of the rates with these letters, of the robot ur5."""
+    names = ["t", *JOINTS, *(f"{letter}:{name}" for letter in letters for name in JOINTS)]
+    values = [x.t[:, np.newaxis], x.q, *(getattr(x, letter) for letter in letters)]
+    return dict(zip(names, np.hstack(values).T, strict=True))
 
 
 def test_a_trajectory_table_with_velocities_is_read_back_exactly_in_any_column_order(
-    robot: Robot, tmp_path: Path
+    direct: Trajectory, read: Read
 ) -> None:
-    columns = columns_of(robot, rates=True)
-    shuffled = {name: columns[name] for name in sorted(columns, reverse=True)}
-    x = read_trajectory(robot, write(tmp_path / "x.csv", robot, shuffled))
-    direct = line(robot, robot.neutral(), END, 2.0, 41)
+    x = read(dict(sorted(columns_of(direct, "va").items(), reverse=True)))
     for ours, theirs in ((x.t, direct.t), (x.q, direct.q), (x.v, direct.v), (x.a, direct.a)):
         np.testing.assert_array_equal(ours, theirs)
     assert x.rates == "as given"
 
 
 def test_velocities_missing_in_a_trajectory_table_are_central_differences(
-    robot: Robot, tmp_path: Path
+    direct: Trajectory, read: Read
 ) -> None:
-    x = read_trajectory(robot, write(tmp_path / "x.csv", robot, columns_of(robot, rates=False)))
-    direct = line(robot, robot.neutral(), END, 2.0, 41)
+    x = read(columns_of(direct))
     np.testing.assert_allclose(x.v[2:-2], direct.v[2:-2], atol=0.02)
     np.testing.assert_allclose(x.a[4:-4], direct.a[4:-4], atol=0.15)
     assert x.rates == "by central differences"
@@ -115,10 +127,9 @@ def test_velocities_missing_in_a_trajectory_table_are_central_differences(
     ],
 )
 def test_an_invalid_or_missing_trajectory_table_is_refused_with_the_reason(
-    spoil: object, message: str, robot: Robot, tmp_path: Path
+    spoil: Callable[[str], str], message: str, robot: Robot, direct: Trajectory, tmp_path: Path
 ) -> None:
-    path = write(tmp_path / "x.csv", robot, columns_of(robot, rates=False))
-    assert callable(spoil)
+    path = write(tmp_path / "x.csv", columns_of(direct))
     path.write_text(spoil(path.read_text()))
     with pytest.raises(InputError, match=message):
         read_trajectory(robot, path)
@@ -129,65 +140,48 @@ def test_an_invalid_or_missing_trajectory_table_is_refused_with_the_reason(
 
 @pytest.mark.parametrize("samples", [41, 100, 1001])
 def test_the_estimated_errors_of_central_differences_are_near_the_true_errors(
-    samples: int, robot: Robot, tmp_path: Path
+    samples: int, robot: Robot, read: Read
 ) -> None:
     direct = line(robot, robot.neutral(), END, 2.0, samples)
-    columns = {"t": direct.t} | {name: direct.q[:, k] for k, name in enumerate(robot.coordinate_names)}
-    found = read_trajectory(robot, write(tmp_path / "x.csv", robot, columns))
+    found = read(columns_of(direct))
     assert found.errors is not None
     for estimate, ours, theirs in zip(found.errors, (found.v, found.a), (direct.v, direct.a), strict=True):
         assert 0.5 < estimate / np.abs(ours - theirs).max() < 2.0
     assert "largest errors about" in found.derivation()
 
 
-def test_missing_accelerations_are_differences_of_the_given_velocities(robot: Robot, tmp_path: Path) -> None:
-    columns = columns_of(robot, rates=True)
-    given = {name: x for name, x in columns.items() if not name.startswith("a:")}
-    found = read_trajectory(robot, write(tmp_path / "x.csv", robot, given))
-    direct = line(robot, robot.neutral(), END, 2.0, 41)
+def test_missing_accelerations_are_differences_of_the_given_velocities(
+    direct: Trajectory, read: Read
+) -> None:
+    found = read(columns_of(direct, "v"))
     np.testing.assert_array_equal(found.v, direct.v)
     np.testing.assert_array_equal(found.a, np.gradient(direct.v, direct.t, axis=0, edge_order=2))
     assert found.rates == "v as given, a by central differences of v"
-    without = {name: x for name, x in columns.items() if not name.startswith("v:")}
     with pytest.raises(InputError, match="joint accelerations need joint velocities"):
-        read_trajectory(robot, write(tmp_path / "x.csv", robot, without))
+        read(columns_of(direct, "a"))
 
 
-def test_times_too_large_for_the_time_steps_are_reported(robot: Robot, tmp_path: Path) -> None:
-    columns = columns_of(robot, rates=False)
-    (note,) = read_trajectory(
-        robot, write(tmp_path / "x.csv", robot, columns | {"t": 1.7e9 + columns["t"]})
-    ).notes
+def test_times_too_large_for_the_time_steps_are_reported(direct: Trajectory, read: Read) -> None:
+    (note,) = read(columns_of(direct) | {"t": 1.7e9 + direct.t}).notes
     assert "subtract the first time in the file" in note
 
 
+#: Headings of a column, by the value of 30 in SI units. The name of the joint `wheel_deg` ends like a unit.
+HEADINGS = {
+    30.0: ("elbow", "q:elbow", "elbow [rad]", "elbow_rad", "wheel_deg", "a:elbow [rad/s²]", "Time"),
+    np.pi / 6: (
+        *("elbow [deg]", "elbow (degrees)", "elbow[°]", "elbow_deg", "wheel_deg_deg", "v:elbow [deg/s]"),
+        *("v:elbow_deg_per_s", "a:elbow [deg/s^2]", "a:elbow_deg_s2"),
+    ),
+    0.03: ("lift_mm", "lift [mm]", "timestamp [ms]"),
+    3e-8: ("time_ns",),
+}
+
+
 @pytest.mark.parametrize(
-    ("heading", "value"),
-    [
-        ("elbow", 30.0),
-        ("q:elbow", 30.0),
-        ("elbow [rad]", 30.0),
-        ("elbow_rad", 30.0),
-        ("elbow [deg]", np.pi / 6),
-        ("elbow (degrees)", np.pi / 6),
-        ("elbow[°]", np.pi / 6),
-        ("elbow_deg", np.pi / 6),
-        ("lift_mm", 0.03),
-        ("lift [mm]", 0.03),
-        ("wheel_deg", 30.0),
-        ("wheel_deg_deg", np.pi / 6),
-        ("v:elbow [deg/s]", np.pi / 6),
-        ("v:elbow_deg_per_s", np.pi / 6),
-        ("a:elbow [deg/s^2]", np.pi / 6),
-        ("a:elbow [rad/s²]", 30.0),
-        ("a:elbow_deg_s2", np.pi / 6),
-        ("Time", 30.0),
-        ("timestamp [ms]", 0.03),
-        ("time_ns", 3e-8),
-    ],
+    ("heading", "value"), [(heading, value) for value, headings in HEADINGS.items() for heading in headings]
 )
 def test_a_column_heading_may_end_with_a_unit(heading: str, value: float) -> None:
-    # The name of the joint `wheel_deg` ends like a unit.
     units = {"t": "s", "elbow": "rad", "lift": "m", "wheel_deg": "rad"}
     units |= {"v:elbow": "rad/s", "a:elbow": "rad/s^2"}
     (found,) = read_columns(f"{heading}\n30\n", "x.csv", "q", [], list(units), units=units).values()
@@ -221,18 +215,15 @@ def test_a_trajectory_table_in_a_convention_is_converted_to_the_same_motion(tmp_
     start, end = robot.sample(2, seed=8)
     x = line(robot, start, end, 2.0, 31)
     mujoco = robot.convention("mujoco")
-    columns = {"time": x.t}
-    for prefix, names, values in zip(
-        ("", "v:", "a:"),
-        (mujoco.coordinate_names, mujoco.rate_names, mujoco.rate_names),
-        mujoco.to(x.q, x.v, x.a),
-        strict=True,
-    ):
-        columns |= {f"{prefix}{name}": values[:, k] for k, name in enumerate(names)}
-    path = write(tmp_path / "x.csv", robot, columns)
+    names = [
+        *mujoco.coordinate_names,
+        *(f"{letter}:{name}" for letter in "va" for name in mujoco.rate_names),
+    ]
+    columns = {"time": x.t} | dict(zip(names, np.hstack(mujoco.to(x.q, x.v, x.a)).T, strict=True))
+    path = write(tmp_path / "x.csv", columns)
     found = urdfkin.read_trajectory(robot, path, convention="mujoco")
     for ours, theirs in ((found.q, x.q), (found.v, x.v), (found.a, x.a)):
         np.testing.assert_allclose(ours, theirs, atol=1e-13)
     del columns["FL_hip_joint"]
     with pytest.raises(InputError, match="in the convention mujoco: found missing: FL_hip_joint"):
-        urdfkin.read_trajectory(robot, write(path, robot, columns), convention="mujoco")
+        urdfkin.read_trajectory(robot, write(path, columns), convention="mujoco")

@@ -6,9 +6,11 @@ Numbers have six digits, like those of CAD exporters, so right angles are only a
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
+
+from tests import urdfs
+from tests.urdfs import limit
 
 _ODD_ANGLES = (0.0, 1.5708, -1.5708, 3.14159, 0.785398, -0.001047, 1e-6, 2.0944)
 
@@ -39,41 +41,40 @@ class Urdf:
         """Add a joint with a child link to link `parent` (None: the last link); return the joint's name."""
         number = len(self.joints)
         joint, link = joint or f"joint_{number}", link or f"link_{number}"
-        parts = [
-            f"<parent link={quoteattr(self.links[-1 if parent is None else parent])}/>",
-            f"<child link={quoteattr(link)}/>",
+        above, origin = (
+            self.links[-1 if parent is None else parent],
             self._origin() if origin is None else origin,
-        ]
-        if kind in ("revolute", "continuous", "prismatic", "planar"):
-            parts.append(self._axis(kind) if axis is None else axis)
-        if kind in ("revolute", "prismatic"):
-            reach = 0.6 if kind == "prismatic" else 2.5
-            parts.append(f'<limit lower="{-reach}" upper="{reach}" effort="1" velocity="2"/>')
+        )
+        if kind in ("fixed", "floating"):
+            axis = ""
+        elif axis is None:
+            axis = self._axis(kind)
+        reach = {"prismatic": 0.6, "revolute": 2.5}.get(kind)
+        more = "" if reach is None else limit(-reach, reach)
         if mimic is not None:
             leader, multiplier, offset = mimic
             given = "" if multiplier is None else f' multiplier="{multiplier!r}"'
             given += "" if offset is None else f' offset="{offset!r}"'
-            parts.append(f"<mimic joint={quoteattr(leader)}{given}/>")
-        self.joints.append(f"<joint name={quoteattr(joint)} type={quoteattr(kind)}>{''.join(parts)}</joint>")
+            more += f'<mimic joint="{leader}"{given}/>'
+        self.joints.append(urdfs.joint(joint, kind, above, link, origin, axis, more))
         self.links.append(link)
         return joint
 
     def _origin(self) -> str:
         rpy = self._rng.choice(_ODD_ANGLES, 3)
         xyz = self._rng.uniform(-0.4, 0.4, 3)
-        return f'<origin xyz="{_numbers(xyz)}" rpy="{_numbers(rpy)}"/>'
+        return f'xyz="{_numbers(xyz)}" rpy="{_numbers(rpy)}"'
 
     def _axis(self, kind: str) -> str:
         if kind == "planar":  # Pinocchio's planar joint moves in the joint frame's x-y plane
-            return '<axis xyz="0 0 1"/>'
+            return "0 0 1"
         plain = self._rng.random() < 0.3
         axis = np.eye(3)[self._rng.integers(3)] * self._rng.choice((-1.0, 1.0)) if plain else None
-        return f'<axis xyz="{_numbers(self._rng.normal(size=3) if axis is None else axis)}"/>'
+        return _numbers(self._rng.normal(size=3) if axis is None else axis)
 
     @property
     def text(self) -> str:
-        links = "".join(f"<link name={quoteattr(link)}/>" for link in self.links)
-        return f"<robot name={quoteattr(self.name)}>{links}{''.join(self.joints)}</robot>"
+        return urdfs.robot(*self.joints, name=self.name)
 
 
 def _numbers(values: Sequence[float] | np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
@@ -94,12 +95,9 @@ def _hand(name: str, seed: int, *, sliding: bool = False) -> str:
         parent, leaders = 0, list[str]()
         for phalanx in range(8):
             kind = "prismatic" if sliding and phalanx % 3 == 2 else ("revolute", "continuous")[phalanx % 2]
-            leads = phalanx in (0, 3)
-            rule = (
-                None
-                if leads
-                else (leaders[-1], float(rng.normal()), float(rng.normal()) if phalanx % 2 else None)
-            )
+            rule, leads = None, phalanx in (0, 3)
+            if not leads:
+                rule = leaders[-1], float(rng.normal()), float(rng.normal()) if phalanx % 2 else None
             made = urdf.add(kind, parent, joint=f"f{finger}_{phalanx}", mimic=rule)
             parent = len(urdf.links) - 1
             if leads:
@@ -144,9 +142,9 @@ def _default_everything() -> str:
     """Return a robot without optional elements and attributes, and with axes that are not unit vectors."""
     urdf = Urdf("terse", 13)
     urdf.add("continuous", axis="", origin="")
-    urdf.add("continuous", axis='<axis xyz="0 3 4"/>', origin='<origin xyz="0.1 0.2 0.3"/>')
-    urdf.add("prismatic", axis='<axis xyz="0 0 2"/>', origin='<origin rpy="0.1 0.2 0.3"/>')
-    urdf.add("prismatic", axis='<axis xyz="-0.001 0 0.0005"/>', origin="")
+    urdf.add("continuous", axis="0 3 4", origin='xyz="0.1 0.2 0.3"')
+    urdf.add("prismatic", axis="0 0 2", origin='rpy="0.1 0.2 0.3"')
+    urdf.add("prismatic", axis="-0.001 0 0.0005", origin="")
     return urdf.text
 
 
@@ -162,10 +160,10 @@ def _followers_of_followers() -> str:
 def _sizes() -> str:
     """Return a chain with origins of kilometres and of micrometres, and with angles of many turns."""
     urdf = Urdf("sizes", 15)
-    urdf.add("revolute", origin='<origin xyz="1000 -2000 500" rpy="1.5708 0 0"/>')
-    urdf.add("revolute", origin='<origin xyz="1e-06 2e-06 0" rpy="0 1e-06 0"/>')
-    urdf.add("prismatic", origin='<origin xyz="-1000 2000 -500" rpy="0.5 -1.5708 3.14159"/>')
-    urdf.add("revolute", origin='<origin xyz="0 0 0" rpy="100 -200 300"/>')
+    urdf.add("revolute", origin='xyz="1000 -2000 500" rpy="1.5708 0 0"')
+    urdf.add("revolute", origin='xyz="1e-06 2e-06 0" rpy="0 1e-06 0"')
+    urdf.add("prismatic", origin='xyz="-1000 2000 -500" rpy="0.5 -1.5708 3.14159"')
+    urdf.add("revolute", origin='xyz="0 0 0" rpy="100 -200 300"')
     return urdf.text
 
 
@@ -185,7 +183,7 @@ _TEXTS: dict[str, Callable[[], str]] = {
     ),
     "mimic_hand_40": lambda: _hand("hand", 8),
     "mimic_hand_40_sliding": lambda: _hand("gripper", 9, sliding=True),
-    "single_link": lambda: Urdf("stone", 0).text,
+    "single_link": lambda: '<robot name="stone"><link name="base"/></robot>',
     "fixed_only": lambda: _chain("statue", 10, ("fixed",) * 6),
     "one_joint": lambda: _chain("door", 16, ("revolute",)),
     "odd_names": _names,

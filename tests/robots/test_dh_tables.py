@@ -18,16 +18,10 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.robot.loading import load
 from urdfkin.urdf.catalogue import examples
 
-#: Tables of each robot that is checked in the fast subset.
-FAST = {"ur5", "panda", "xarm7", "kinova", "so101", "tiago"}
-LENGTH_BOUND = 10.0
-
-robots = [pytest.param(name, marks=() if name in FAST else pytest.mark.slow) for name in examples()]
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize("convention", ["standard", "modified"])
-@pytest.mark.parametrize("name", robots)
+@pytest.mark.parametrize("name", examples())
 def test_the_table_of_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long_row(
     name: str, convention: str
 ) -> None:
@@ -40,7 +34,7 @@ def test_the_table_of_every_path_to_a_leaf_agrees_with_pinocchio_and_has_no_long
         assert check.agrees
         assert max(check.units.values()) <= 20.0 + left_out(robot.chain(tip, root)) / EPS
         reach = float(robot.chain(tip, root).lengths.sum())
-        assert all(max(abs(row.a), abs(row.d)) <= LENGTH_BOUND * reach for row in table.rows)
+        assert all(max(abs(row.a), abs(row.d)) <= 10.0 * reach for row in table.rows)
 
 
 @pytest.mark.slow

@@ -10,7 +10,8 @@ import pinocchio as pin
 import pytest
 
 import urdfkin
-from tests.urdfs import loaded
+from tests import urdfs
+from tests.urdfs import joint, limit, loaded
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.tree import FloatArray, KinematicTree, with_tilts, without_mimic_rules
 from urdfkin.robot import Robot
@@ -23,14 +24,11 @@ AXES = np.eye(3)
 
 def text(kind: str, *axes: FloatArray) -> str:
     """Write a chain with these joint axes, with enough digits to read each number exactly."""
-    limit = "" if kind == "continuous" else '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
-    joints = "".join(
-        f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}"><parent link="l{i}"/>'
-        f'<child link="l{i + 1}"/><origin xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"/>'
-        f'<axis xyz="{" ".join(repr(float(x)) for x in axis)}"/>{limit}</joint>'
-        for i, axis in enumerate(axes)
+    origin, more = 'xyz="0.3 0.2 0.1" rpy="0.1 0.2 0.3"', "" if kind == "continuous" else limit(-3, 3)
+    words = (" ".join(map(repr, axis.tolist())) for axis in axes)
+    return urdfs.robot(
+        *(joint(f"j{i}", kind, f"l{i}", f"l{i + 1}", origin, axis, more) for i, axis in enumerate(words))
     )
-    return f'<robot name="r"><link name="l0"/>{joints}</robot>'
 
 
 def snaps(kind: str, axis: FloatArray) -> bool:
@@ -106,11 +104,6 @@ def test_urdfkin_uses_the_tilted_axis_of_the_file_and_pinocchio_differs_by_the_t
     assert doubled.certificate().verified
 
 
-def untold(robot: Robot) -> Robot:
-    """Return the robot without the correction for Pinocchio's axes."""
-    return Robot(with_tilts(robot.tree, {}), robot.urdf, origin=robot.origin)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("tilt", [1e-16, 1e-15, 1e-14, 1e-13, 0.99e-12])
@@ -130,26 +123,21 @@ def test_a_robot_with_tilted_axes_is_verified_within_twice_the_tilts(kind: str, 
     if tilt > 1e-15:
         assert max(line.share for line in certificate.lines) > 0.01  # the bound is not too large
     if tilt > 1e-13:
+        uncorrected = Robot(with_tilts(robot.tree, {}), robot.urdf, origin=robot.origin)
         with pytest.raises(urdfkin.VerificationError):
-            untold(robot).placement(q, "l12")
+            uncorrected.placement(q, "l12")
 
 
 @pytest.mark.parametrize("tilt", [1e-15, 1e-13])
-def test_errors_above_the_tilt_bound_and_errors_before_tilted_axes_are_detected(
-    tilt: float,
-) -> None:
-    document = text("revolute", AXES[2], AXES[0], near(tilt, 2), AXES[1])
-    robot = loaded(document)
+def test_errors_above_the_tilt_bound_and_errors_before_tilted_axes_are_detected(tilt: float) -> None:
+    robot = loaded(text("revolute", AXES[2], AXES[0], near(tilt, 2), AXES[1]))
     assert [joint.tilt > 0.0 for joint in robot.tree.joints] == [False, False, True, False]
     q = robot.sample(20, 1)
 
     def with_an_error(by: float) -> Robot:
-        joints = [
-            replace(joint, axis=joint.axis + (by * AXES[1] if i == 0 else 0.0))
-            for i, joint in enumerate(robot.tree.joints)
-        ]
-        tree = KinematicTree(robot.name, robot.tree.links, tuple(joints))
-        return Robot(tree, robot.urdf, origin=robot.origin)
+        first, *others = robot.tree.joints
+        joints = replace(first, axis=first.axis + by * AXES[1]), *others
+        return Robot(KinematicTree(robot.name, robot.tree.links, joints), robot.urdf, origin=robot.origin)
 
     allowed = 2.0 * tilt + 24.0 * 5 * EPS
     with pytest.raises(urdfkin.VerificationError):
@@ -180,8 +168,7 @@ def test_a_tilted_axis_is_a_note_and_results_are_verified(kind: str) -> None:
 
 
 def test_bounds_of_tables_and_validation_include_tilted_axes() -> None:
-    document = text("revolute", *(near(0.99e-12, seed) for seed in (2, 0, 1, 2)))
-    robot = loaded(document)
+    robot = loaded(text("revolute", *(near(0.99e-12, seed) for seed in (2, 0, 1, 2))))
     robot.dh()
     robot.dh(convention="modified")
     robot.tree_parameters()
@@ -193,8 +180,7 @@ def test_bounds_of_tables_and_validation_include_tilted_axes() -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_tilt_of_one_eps_in_every_joint_stays_within_the_bound(kind: str) -> None:
     # All tilts have the same direction and all joints are far from zero, so the errors add up.
-    tilted = [AXES[2] + [EPS, 0.0, 0.0]] * 30
-    robot = loaded(text(kind, *tilted))
+    robot = loaded(text(kind, *[AXES[2] + [EPS, 0.0, 0.0]] * 30))
     q, v = robot.sample(50, 1), robot.sample(50, 2)
     robot.placement(q, "l30")
     robot.jacobian(q, "l30", "local")

@@ -1,16 +1,18 @@
 """Unusual and random robots agree with Pinocchio in every quantity, frame and reference."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urdfkin
+from tests.laws.subjects import state
 from tests.robots.against_pinocchio import assert_agrees
 from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
 from tests.urdfs import loaded
 from urdfkin.model.reference import Reference
-from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
@@ -20,11 +22,6 @@ pytestmark = pytest.mark.slow
 
 #: Upper bound on the measured ratios to a bound, because rounding errors rarely add up in the worst way.
 USUAL_SHARE = 0.25
-
-
-def rates(robot: Robot, n: int, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    generator = np.random.default_rng(seed)
-    return robot.sample(n, seed), *generator.standard_normal((2, n, robot.nv))
 
 
 def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
@@ -41,16 +38,13 @@ def assert_verified(report: RobotReport, robot: Robot, samples: int) -> None:
     assert max(tally.share for tally in report.tallies.values()) < USUAL_SHARE
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_quantity_of_every_frame_agrees_with_pinocchio(name: str) -> None:
-    text = urdf_of(name)
-    report = urdfkin.validate(text, samples=5).robots[0]
-    assert_verified(report, loaded(text), samples=5 + 3)
+WITH_ROOT = product(
+    ["mimic_hand_40", "tree_3", "single_link", "one_joint", "fixed_only"], ["planar", "floating"]
+)
 
 
-@pytest.mark.parametrize("root_joint", ["planar", "floating"])
-@pytest.mark.parametrize("name", ["mimic_hand_40", "tree_3", "single_link", "one_joint", "fixed_only"])
-def test_unusual_robots_with_a_root_joint_agree_with_pinocchio(name: str, root_joint: str) -> None:
+@pytest.mark.parametrize(("name", "root_joint"), [*product(NAMES, [None]), *WITH_ROOT])
+def test_every_quantity_of_every_frame_agrees_with_pinocchio(name: str, root_joint: str | None) -> None:
     text = urdf_of(name)
     report = urdfkin.validate(text, samples=5, root_joint=root_joint).robots[0]
     assert_verified(report, loaded(text, root_joint=root_joint), samples=5 + 3)
@@ -62,14 +56,14 @@ def test_results_of_an_unusual_robot_agree_with_direct_calls_of_pinocchio(
     name: str, reference: Reference
 ) -> None:
     robot = loaded(urdf_of(name), verify=False)
-    q, v, a = (x[0] for x in rates(robot, 1, 3))
+    q, v, a = (x[0] for x in state(robot, 1, 3))
     assert_agrees(robot, q, v, a, robot.tip_frame, reference, is_odd=True)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_certificate_counts_every_checked_call(name: str) -> None:
     robot = loaded(urdf_of(name))
-    q, v, a = rates(robot, 2, 4)
+    q, v, a = state(robot, 2, 4)
     frame = robot.tip_frame
     robot.placement(q, frame)
     for reference in Reference:

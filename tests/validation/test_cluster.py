@@ -19,6 +19,7 @@ from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import dask
 import numpy as np
@@ -386,12 +387,7 @@ def test_a_run_resumes_from_its_store_after_the_scheduler_was_lost(undisturbed: 
 
 
 def test_a_scheduler_that_is_lost_while_a_result_arrives_is_an_error() -> None:
-    class Gone:
-        status = "finished"
-
-        def result(self) -> None:
-            raise CommClosedError("reset by peer")
-
+    gone = Mock(status="finished", **{"result.side_effect": CommClosedError("reset by peer")})
     there: Any = Cluster(SimpleNamespace(status="running", scheduler=None))  # type: ignore[arg-type]
     with pytest.raises(ClusterError, match="connection to the scheduler is lost"):
-        there._found(Gone(), None, 1)
+        there._found(gone, None, 1)

@@ -163,18 +163,17 @@ def test_the_diagnosis_names_a_reversed_joint_and_exchanged_joints(name: str, qu
     check_diagnosis(check(name, quantity, wrong(exchange)), f"{one!r} and {other!r} are exchanged")
 
 
+def without_mimic_columns(robot: Robot, frame: str, **options: Any) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a Jacobian to which the columns of mimic joints are not added."""
+    free = urdfkin.load(robot.source, mimic=False, verify=False, **options)
+    own = [free.rate_names.index(x) for x in robot.rate_names]
+    return lambda q: free.jacobian(free.from_pinocchio(robot.to_pinocchio(q)), frame)[:, own]
+
+
 @pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")  # the PR2's file has a warning about an inertia
 @pytest.mark.parametrize("name", MIMICS)
 def test_the_diagnosis_names_a_missing_mimic_column(name: str) -> None:
-    robot = robot_of(name)
-    free = urdfkin.load(name, mimic=False, verify=False)
-    own = [free.rate_names.index(x) for x in robot.rate_names]
-    frame = MIMICS[name]
-
-    def function(q: np.ndarray) -> np.ndarray:
-        every = free.from_pinocchio(robot.to_pinocchio(q))
-        return free.jacobian(every, frame)[:, own]
-
+    function = without_mimic_columns(robot_of(name), MIMICS[name])
     found = check(name, "jacobian", function, MIMICS)
     check_diagnosis(found, "the columns of the mimic joints (")
     check_diagnosis(found, ") are not added")
@@ -243,12 +242,9 @@ def test_a_function_with_another_algorithm_or_that_reuses_its_arrays_agrees() ->
 
 
 def test_the_diagnosis_names_one_wrong_number_and_the_needed_factor() -> None:
-    def function(q: np.ndarray) -> np.ndarray:
-        J = ur5_jacobian(q)
-        J[1, 3] += 1e-9
-        return J
-
-    found = check("ur5", "jacobian", function)
+    wrong = np.zeros((6, 6))
+    wrong[1, 3] = 1e-9
+    found = check("ur5", "jacobian", lambda q: ur5_jacobian(q) + wrong)
     assert not found.agrees
     assert [name for name, share in found.rows.items() if share > 1] == ["vy"]
     assert [name for name, share in found.columns.items() if share > 1] == ["wrist_1_joint"]
@@ -362,14 +358,10 @@ def test_a_robot_without_moving_joints_is_compared_and_a_missing_column_of_a_loc
     robot = urdfkin.load(robot_text(joint("j", "fixed", "a", "b", 'xyz="1 0 0"', "")))
     assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees
     assert not verify_function(lambda q: np.eye(4), robot, "placement", samples=3).agrees
-    robot = urdfkin.load("panda", lock={"panda_joint3": 0.5})
-    free = urdfkin.load("panda", mimic=False, lock={"panda_joint3": 0.5}, verify=False)
-    own = [free.rate_names.index(x) for x in robot.rate_names]
-
-    def function(q: np.ndarray) -> np.ndarray:
-        return free.jacobian(np.r_[q, q[-1]], "panda_rightfinger")[:, own]
-
-    found = verify_function(function, robot, "jacobian", frame="panda_rightfinger", samples=30)
+    lock, frame = {"panda_joint3": 0.5}, "panda_rightfinger"
+    robot = urdfkin.load("panda", lock=lock)
+    function = without_mimic_columns(robot, frame, lock=lock)
+    found = verify_function(function, robot, "jacobian", frame=frame, samples=30)
     check_diagnosis(found, "not added")
 
 

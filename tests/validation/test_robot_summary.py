@@ -25,6 +25,8 @@ from urdfkin.validation.robot_summary import MOST, chains_of
 from urdfkin.validation.timings import Timings
 from urdfkin.verify.pinocchio import PinocchioOracle
 
+pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
+
 
 def test_the_chains_of_a_catalogue_robot_are_its_limbs_checked_in_both_conventions() -> None:
     robot = urdfkin.load("talos")
@@ -114,7 +116,6 @@ def replay_all(report: RobotReport, stdin: str = "") -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("root_joint", [None, "planar"])
 def test_the_commands_for_a_text_read_the_text_from_standard_input(root_joint: str | None) -> None:
     report = validate(TEXT, samples=2, root_joint=root_joint).robots[0]
@@ -122,23 +123,17 @@ def test_the_commands_for_a_text_read_the_text_from_standard_input(root_joint: s
     assert replay_all(report, TEXT) > 10
 
 
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_a_command_computes_the_compared_joint_and_not_a_link_with_the_same_name() -> None:
     robot = urdfkin.load(TEXT)
     report = validate(robot, samples=2).robots[0]
-    for (quantity, reference), tally in report.tallies.items():
-        line = report.replay((quantity, reference))
-        if quantity != "joint jacobian" or line is None or tally.case is None:
-            continue
-        done = command(*shlex.split(line)[1:], "--format", "json", stdin=TEXT)
-        expected = robot.jacobian(tally.case.q, f"joint:{tally.case.frame}", reference)
-        assert np.allclose(done.data["result"][0], expected, atol=1e-12)
-        return
-    pytest.fail("no joint was compared")
+    key = next(key for key in report.tallies if key[0] == "joint jacobian" and report.replay(key))
+    case, line = present(report.tallies[key].case), present(report.replay(key))
+    done = command(*shlex.split(line)[1:], "--format", "json", stdin=TEXT)
+    expected = robot.jacobian(case.q, f"joint:{case.frame}", key[1])
+    assert np.allclose(done.data["result"][0], expected, atol=1e-12)
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 @pytest.mark.parametrize("loaded", [False, True])
 def test_a_path_is_a_file_even_if_a_catalogue_robot_has_this_name(
     loaded: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -152,7 +147,6 @@ def test_a_path_is_a_file_even_if_a_catalogue_robot_has_this_name(
     assert replay_all(report.robots[0]) > 10
 
 
-@pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")
 def test_the_command_of_a_report_repeats_the_run_with_a_line_for_each_set_of_options(tmp_path: Path) -> None:
     floating, texts = urdfkin.load("ur5", root_joint="floating"), map(urdf_of, ("single_link", "odd_names"))
     report = validate(["planar_two_link", floating, "ur3", *texts], samples=0)

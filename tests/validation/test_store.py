@@ -11,6 +11,7 @@ import sys
 import time
 import tracemalloc
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from urdfkin.validation.answer import (
 )
 from urdfkin.validation.campaign import StoreWarning, chunks_of_shard, stored, validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
-from urdfkin.validation.collector import CampaignProgress, Progress, ResultCollector
+from urdfkin.validation.collector import CampaignProgress, ResultCollector
 from urdfkin.validation.engines import Task
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import subject
@@ -69,20 +70,16 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int]]:
     return found
 
 
-def interrupted_after(chunks_: int) -> Progress:
-    def stop(state: CampaignProgress) -> None:
-        if state.chunks_done >= chunks_:
-            raise KeyboardInterrupt
-
-    return stop
-
-
 def run_all(store: Path, **how: Any) -> Any:
     return validate(ROBOTS, **{"samples": SAMPLES, "store": store, **how})
 
 
 def interrupt(store: Path, chunks_: int = 1) -> Any:
-    return run_all(store, progress=interrupted_after(chunks_))
+    def stop(state: CampaignProgress) -> None:
+        if state.chunks_done >= chunks_:
+            raise KeyboardInterrupt
+
+    return run_all(store, progress=stop)
 
 
 def robot_file(path: Path, name: str) -> Path:
@@ -457,14 +454,9 @@ def test_a_full_disk_is_reported_and_the_stored_chunks_are_reused(undisturbed: s
 
 @pytest.mark.long
 def test_a_second_process_is_refused_with_the_id_of_the_first(tmp_path: Path) -> None:
-    refused = list[str]()
-
-    def second(_: object) -> None:
-        if not refused:
-            refused.append(_run(tmp_path).stderr)
-
-    assert not run_all(tmp_path, progress=second).interrupted
-    assert "another process uses this store: found process " in refused[0]
+    second = cache(lambda: _run(tmp_path).stderr)
+    assert not run_all(tmp_path, progress=lambda _: second()).interrupted
+    assert "another process uses this store: found process " in second()
 
 
 @pytest.mark.long

@@ -62,6 +62,10 @@ def document(path: Path, **how: Any) -> dict[str, Any]:
     return found
 
 
+def results(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [one for sample in data["samples"] for one in sample["results"]]
+
+
 def urdf_of(path: Path, written: Mapping[str, Any]) -> bytes:
     folders = path.parent, example_robots_dir(), robots_dir()
     return next(file.read_bytes() for one in folders if (file := one / str(written["file"])).is_file())
@@ -135,9 +139,8 @@ def test_the_errors_of_urdfkin_are_at_most_a_twentieth_of_the_tolerances(folder:
         path = folder / f"{stem(name)}.json"
         answer = own(urdfkin.load(feature.text, verify=False))
         data = document(path)
-        for sample in data["samples"]:
-            for one in sample["results"]:
-                one["tolerance"] = [0.05 * x for x in one["tolerance"]]
+        for one in results(data):
+            one["tolerance"] = [0.05 * x for x in one["tolerance"]]
         (narrow := folder.parent / "narrow.txt").write_text(json.dumps(data), "utf-8")
         assert not list(wrong(narrow, answer)), name
 
@@ -332,15 +335,14 @@ def test_the_tolerances_of_chains_of_rules_hold_if_offsets_cancel_or_are_large(
 # -- the readers ----------------------------------------------------------------------------------------
 
 
-def changed(data: Mapping[str, Any], which: int) -> Iterator[tuple[dict[str, Any], list[float]]]:
-    """Yield each result with one number changed by 1e-9 of its size."""
-    for sample in data["samples"]:
-        for one in sample["results"]:
-            values = list(one["value"])
-            if values:
-                i = which % len(values)
-                values[i] += 1e-9 * (one["tolerance"][i] / (one["k"] * EPS) or 1.0)
-            yield one, values
+def changed(data: Mapping[str, Any], which: int) -> Iterator[list[float]]:
+    """Yield the numbers of each result, one of them changed by 1e-9 of its size."""
+    for one in results(data):
+        values = list(one["value"])
+        if values:
+            i = which % len(values)
+            values[i] += 1e-9 * (one["tolerance"][i] / (one["k"] * EPS) or 1.0)
+        yield values
 
 
 def in_turn(rows: Sequence[Sequence[float]]) -> Callable[..., Any]:
@@ -354,12 +356,11 @@ def test_the_reader_in_python_finds_every_number_changed_by_a_billionth(which: i
     kinds = set()
     for path in folder.glob("*.json"):
         data = document(path)
-        answers = [values for _, values in changed(data, which)]
-        count = sum(bool(values) for values in answers)
-        kinds |= {(one["quantity"], one["reference"]) for one, values in changed(data, which) if values}
-        right = [one["value"] for sample in data["samples"] for one in sample["results"]]
+        right = [one["value"] for one in results(data)]
+        kinds |= {(one["quantity"], one["reference"]) for one in results(data) if one["value"]}
         assert not list(wrong(path, in_turn(right)))
-        assert len(list(wrong(path, in_turn(answers)))) == count, path
+        found = list(wrong(path, in_turn(list(changed(data, which)))))
+        assert len(found) == sum(map(bool, right)), path
     assert len(kinds) == 19
 
 
@@ -395,21 +396,20 @@ def test_the_reader_in_cpp_finds_every_number_changed_by_a_billionth(
 ) -> None:
     vectors, answers = folder / f"{stem(name)}.tsv", tmp_path / "answers.tsv"
     lines = [line.split("\t") for line in vectors.read_text("utf-8").splitlines() if line[0] != "#"]
-    results = [fields for fields in lines if fields[1] != "-"]
     data = document(folder / f"{stem(name)}.json")
 
     def write(rows: Sequence[Sequence[float]]) -> None:
-        given = zip(results, rows, strict=True)
+        given = zip((fields for fields in lines if fields[1] != "-"), rows, strict=True)
         words = ["\t".join((*fields[:4], " ".join(map(repr, row)))) for fields, row in given]
         answers.write_text("".join(f"{line}\n" for line in words), "utf-8")
 
-    right = [one["value"] for sample in data["samples"] for one in sample["results"]]
+    right = [one["value"] for one in results(data)]
     write(right)
     assert compared(program, vectors, answers) == (
         0, f"{sum(map(len, right))} numbers compared, 0 wrong, 0 lines without an answer\n",
     )  # fmt: skip
     for which in (0, 4):
-        write([values for _, values in changed(data, which)])
+        write(list(changed(data, which)))
         code, words = compared(program, vectors, answers)
         assert code == 1
         assert f", {len(right)} wrong" in words
@@ -435,9 +435,8 @@ def test_both_file_formats_have_the_same_numbers_and_conform_to_the_schema(folde
         assert data["sha256"] == hashlib.sha256((folder / data["file"]).read_bytes()).hexdigest()
         assert (data["rule"], data["note"], data["license"]) == (feature.rule, feature.note, "CC0-1.0")
         rows = [line.split("\t") for line in path.with_suffix(".tsv").read_text("utf-8").splitlines()[3:]]
-        results = [one for sample in data["samples"] for one in sample["results"]]
         lines = [row for row in rows if row[1] != "-"]
-        for row, one in zip(lines, results, strict=True):
+        for row, one in zip(lines, results(data), strict=True):
             assert [float(x) for x in row[4].split()] == one["value"]
             assert [float(x) for x in row[5].split()] == one["tolerance"]
             assert row[1:4] == [one["frame"], one["reference"] or "-", one["quantity"]]

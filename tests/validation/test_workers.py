@@ -5,9 +5,11 @@ import pickle
 import signal
 import time
 from collections.abc import Iterator
+from itertools import chain, repeat
 from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 from typing import Any
+from unittest.mock import DEFAULT, Mock
 
 import numpy as np
 import pytest
@@ -95,9 +97,7 @@ def test_an_interrupt_kills_processes_that_hang_in_compiled_code(monkeypatch: py
 
 
 def test_a_robot_for_which_no_process_starts_is_not_verified(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_: int) -> None:
-        raise OSError(24, "Too many open files")
-
+    fail = Mock(side_effect=OSError(24, "Too many open files"))
     monkeypatch.setattr(worker_processes, "_start_interpreter", fail)
     for how in HOW:
         report = validate(["ur5", "planar_two_link"], samples=60, **how)
@@ -111,38 +111,24 @@ def test_a_robot_for_which_no_process_starts_is_not_verified(monkeypatch: pytest
 def test_running_processes_take_the_work_of_a_process_that_does_not_start(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    start, count = worker_processes._start_interpreter, 0
-
-    def fail_second(pipe: int) -> Any:
-        nonlocal count
-        count += 1
-        if count == 2:
-            raise OSError(24, "Too many open files")
-        return start(pipe)
-
-    monkeypatch.setattr(worker_processes, "_start_interpreter", fail_second)
+    starts, fail = worker_processes._start_interpreter, OSError(24, "Too many open files")
     for how in HOW[:2]:
-        count = 0
+        # `DEFAULT` is the result of the wrapped function.
+        start = Mock(wraps=starts, side_effect=chain([DEFAULT, fail], repeat(DEFAULT)))
+        monkeypatch.setattr(worker_processes, "_start_interpreter", start)
         assert validate(["double_pendulum", "planar_two_link"], samples=60, **how).passed
-        assert count >= 2
+        assert start.call_count >= 2
 
 
 def test_a_worker_runs_no_file_of_the_current_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    codes: list[list[str]] = []
-
-    class RecordedError(Exception):
-        pass
-
-    def started(command: list[str], **_: object) -> None:
-        codes.append(command)
-        raise RecordedError
-
+    started = Mock(side_effect=InterruptedError)
     monkeypatch.setattr("subprocess.Popen", started)
     monkeypatch.syspath_prepend("")
-    with pytest.raises(RecordedError):
+    with pytest.raises(InterruptedError):
         worker_processes._start_interpreter(3)
-    assert codes[0][1] == "-I"
-    path = codes[0][3].partition("sys.path[:] = ")[2].partition("; from")[0]
+    command = started.call_args.args[0]
+    assert command[1] == "-I"
+    path = command[3].partition("sys.path[:] = ")[2].partition("; from")[0]
     assert "''" not in path
     assert "site-packages" in path
 

@@ -171,8 +171,7 @@ def test_an_unknown_quantity_or_wrong_inputs_are_refused() -> None:
         robot.compute("analytical jacobian", ([0.0, 0.0],), "slider")
 
 
-# -- J_full G adds the columns of mimic joints to those of mimicked joints
-# ------------------------------------
+# -- J_full G adds the columns of mimic joints to those of mimicked joints -----------------------------
 
 
 @given(st.data())
@@ -208,8 +207,7 @@ def test_coupled_columns_of_a_robot_without_joint_velocities_are_empty(rows: int
     assert coupled(np.zeros((rows, 6, 0)), nothing, nothing, np.zeros(0), 0).shape == (rows, 6, 0)
 
 
-# -- random samples of a validation
-# ----------------------------------------------------------------------------
+# -- random samples of a validation --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("with_special", [True, False])

@@ -24,7 +24,7 @@ from urdfkin.robot import Robot
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.call import Call
 from urdfkin.verify.oracle import Oracle, QueryBatch
-from urdfkin.verify.quantities import JACOBIAN, QUANTITIES, Quantity
+from urdfkin.verify.quantities import JACOBIAN, QUANTITIES
 from urdfkin.verify.verifier import bound_of
 
 ARMS = ("panda", "ur5", "talos", "kinova", "tiago", "elbow", "planar_two_link")
@@ -78,13 +78,6 @@ def planted(robot: Robot, method: str, place: int, by: float) -> Any:
     return robot.verifier.with_check(method, wrong, plan, frame, Reference.LOCAL_WORLD_ALIGNED)
 
 
-def bound_of_one(robot: Robot, quantity: Quantity, inputs: tuple[FloatArray, ...]) -> FloatArray:
-    call = Call(robot.tree, robot.plan, robot.tip_frame, Reference.LOCAL_WORLD_ALIGNED, None, inputs)
-    bound = bound_of(quantity, call.part(slice(0, 1)))
-    shape = quantity.own_shape(robot.nv)
-    return np.asarray(np.broadcast_to(EPS * bound.k * bound.scale, (1, 1, *shape))).ravel()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "ur5", "tiago"])
 @pytest.mark.parametrize("method", METHODS)
@@ -93,13 +86,15 @@ def test_an_error_in_any_number_of_a_single_result_is_detected(name: str, method
     q, v, a = (x[0].copy() for x in state(robot, 1, 4))
     inputs = (q, v, a)[: METHODS[method]]
     quantity = QUANTITIES[method]
-    bounds = bound_of_one(robot, quantity, inputs)
+    call = Call(robot.tree, robot.plan, robot.tip_frame, Reference.LOCAL_WORLD_ALIGNED, None, inputs)
+    bound, shape = bound_of(quantity, call.part(slice(0, 1))), quantity.own_shape(robot.nv)
+    bounds = np.broadcast_to(EPS * bound.k * bound.scale, (1, 1, *shape)).ravel()
     step = max(1, len(bounds) // 60)  # some entries of a Hessian
     for place in range(0, len(bounds), step):
         check = planted(robot, method, place, 2.0 * bounds[place])
         with pytest.raises(VerificationError) as caught:
             check(*inputs, None)
-        wrong = np.unravel_index(place, quantity.own_shape(robot.nv))
+        wrong = np.unravel_index(place, shape)
         assert abs(caught.value.ours - caught.value.theirs)[wrong] > caught.value.bound[wrong]
     assert robot.certificate().lines == ()
 

@@ -244,13 +244,12 @@ def test_one_configuration_alone_and_in_a_batch_have_the_same_singular_values(ro
     robot = urdfkin.load(SLIDE)
     alone = robot.singular_values([0.3, 0.0], "c", rows)
     batch = robot.singular_values([[0.3, 0.0], [0.3, 1.0]], "c", rows)
-    for one, many in ((alone.values, batch.values), (alone.condition, batch.condition)):
-        np.testing.assert_array_equal(np.stack(one), np.stack(many)[:, 0])
-    np.testing.assert_array_equal(np.stack(alone.manipulability), np.stack(batch.manipulability)[:, 0])
+    for name in ("values", "condition", "manipulability"):
+        one, many = (np.stack(getattr(found, name)) for found in (alone, batch))
+        np.testing.assert_array_equal(one, many[:, 0])
     H = robot.hessian([0.3, 0.0], "c")
-    np.testing.assert_array_equal(
-        alone.manipulability_gradient(H), batch.manipulability_gradient(np.stack([H, H]))[0]
-    )
+    gradients = batch.manipulability_gradient(np.stack([H, H]))
+    np.testing.assert_array_equal(alone.manipulability_gradient(H), gradients[0])
 
 
 def test_the_manipulability_of_a_slide_on_the_axis_of_rotation_is_zero() -> None:

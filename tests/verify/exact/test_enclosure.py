@@ -11,14 +11,12 @@ from pathlib import Path
 import flint
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import urdfkin
 from tests import urdfs
 from tests.attacks.test_extreme_numbers import quaternions, turned_chain
 from tests.high_precision import mp, true_motion
-from tests.laws.everything import by_the_robot
-from tests.laws.subjects import robot_of, state
+from tests.laws.subjects import by_the_robot, robot_of, state
 from tests.laws.test_mutation import with_a_mistake
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic
@@ -29,6 +27,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.verify.exact import recursion
 from urdfkin.verify.exact.enclosure import Enclosure, Enclosures
+from urdfkin.verify.exact.recursion import ExactMotion
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.quantities import QUANTITIES
 
@@ -59,7 +58,9 @@ def quantities(x: Enclosures) -> tuple[Enclosure, ...]:
     return x.placement, x.velocity, x.acceleration, x.jacobian, x.jacobian_rate
 
 
-def holds(enclosure: Enclosure, true: NDArray[np.object_]) -> bool:
+def holds(enclosure: Enclosure, motion: ExactMotion, link: int, reference: Reference) -> bool:
+    """Return whether the true values of the motion lie in the intervals."""
+    true = QUANTITIES[enclosure.quantity].truth(motion, link, reference)
     rows = zip(enclosure.lower.flat, true.flat, enclosure.upper.flat, strict=True)
     return all(mp.mpf(low) <= mp.mpf(number) <= mp.mpf(high) for low, number, high in rows)
 
@@ -77,7 +78,7 @@ def test_every_result_at_fifty_digits_lies_in_the_interval_at_any_precision(name
         for digits in (15, 40):
             enclosed = robot.enclose(*x, robot.tree.link_frames[link], reference, base=base, digits=digits)
             for one in quantities(enclosed):
-                assert holds(one, QUANTITIES[one.quantity].truth(motion, link, reference)), (digits, one)
+                assert holds(one, motion, link, reference), (digits, one)
             before, widest = widest, max(float(one.width.max(initial=0.0)) for one in quantities(enclosed))
             assert widest <= before
 
@@ -89,11 +90,10 @@ def test_robots_with_quaternions_or_a_root_joint_are_enclosed() -> None:
         robot_of("tree_1", root_joint="floating"),
         robot_of("one_joint", root_joint="planar"),
     ):
-        x = sample(robot)
+        x, link = sample(robot), robot.tree.frame_link(robot.tip_frame)
         motion = true_motion(robot, x)
         for one in quantities(robot.enclose(*x, robot.tip_frame, "local")):
-            link = robot.tree.frame_link(robot.tip_frame)
-            assert holds(one, QUANTITIES[one.quantity].truth(motion, link, Reference.LOCAL)), one
+            assert holds(one, motion, link, Reference.LOCAL), one
 
 
 @pytest.mark.slow
@@ -204,7 +204,7 @@ def test_a_hessian_is_enclosed_on_request(name: str) -> None:
     assert robot.enclose(*x, robot.tip_frame).hessian is None
     for reference in Reference:
         one = present(robot.enclose(*x, robot.tip_frame, reference, hessian=True).hessian)
-        assert holds(one, QUANTITIES["hessian"].truth(motion, link, reference))
+        assert holds(one, motion, link, reference)
         assert ((one.width <= 2.0 * np.spacing(np.abs(one.upper))) | (one.width < 1e-25)).mean() > 0.8
         assert one.error(robot.hessian(x[0], robot.tip_frame, reference)).max() < 1e-14
 
@@ -219,9 +219,7 @@ FOLLOWERS = urdfs.robot(
 
 
 @pytest.mark.parametrize("reference", list(Reference))
-def test_a_hessian_with_two_mimic_joints_is_enclosed_with_both_multipliers(
-    reference: Reference,
-) -> None:
+def test_a_hessian_with_two_mimic_joints_is_enclosed_with_both_multipliers(reference: Reference) -> None:
     robot, x = urdfkin.load(FOLLOWERS), (np.array([0.3]), np.array([1.0]), np.array([0.5]))
     one = present(robot.enclose(*x, "d", reference, hessian=True).hessian)
     assert one.error(robot.hessian(x[0], "d", reference)).max() < 1e-14
