@@ -178,7 +178,7 @@ def study_parts(studies: dict[str, AccuracyStudy]) -> dict[str, str]:
     lines = [line for study in studies.values() for line in plain(study)["lines"]]
     ratios = [line["urdfkin"]["typical"] / line["pinocchio"]["typical"] for line in lines]
     counts = f"""The study used {SAMPLES} samples of each robot, seed 0, every link and Pinocchio {version()}.
-The typical errors are compared in each line of the tables:
+Each line of the tables below compares the typical errors of both libraries:
 {more_accurate_counts(lines)}. Equal errors are
 the same double. The median ratio of urdfkin's typical error to Pinocchio's is
 {median(ratios):.2f}. The ratios lie between {min(ratios):.2f} and {max(ratios):.2f}."""
