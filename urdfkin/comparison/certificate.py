@@ -213,7 +213,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     return cast("SameCertificate", plain(document))
 
 
-#: Attributes of `Sameness` that have equal names in the certificate.
+#: Attributes of `Sameness` that the certificate contains under the same names.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
@@ -233,8 +233,9 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models, and return a line of text for each wrong statement.
 
     The check uses the pairs of joints that the certificate states. If the verdict is "differs", the function
-    also searches for other pairs of joints, for which the models do not differ.
-    urdfkin and Pinocchio both compute the distance of each lower bound. Each upper bound is proven again.
+    also matches the joints again. The verdict is wrong if the models do not differ with the new pairs.
+    urdfkin and Pinocchio both compute the distance at the configurations `q_a` and `q_b` of each lower bound.
+    Each upper bound is proven again.
 
     Raises:
         InputError: the certificate was made for other models, or names an unknown joint or link.
@@ -364,7 +365,7 @@ def _choices(document: SameCertificate) -> AlignmentChoices:
 def _choices_error(
     document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
 ) -> str | None:
-    """Return why the certificate's alignment of B with A is not allowed, or None."""
+    """Return the first error in the certificate's alignment of B with A, or None."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -433,7 +434,10 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Check an interval; `sharply` allows the slow branch and bound. `rounding` is (m, rad)."""
+    """Check an interval; `rounding` is (m, rad).
+
+    If `sharply` is true, the check may use branch and bound, a slow method.
+    """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)
