@@ -63,7 +63,9 @@ class DifferenceEntry(TypedDict):
     """A difference between the two models at one joint or link."""
 
     place: Annotated[str, says("Name of the joint or link of A that differs.")]
-    what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
+    what: Annotated[
+        str, says("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
+    ]
     a: Annotated[Value, says("Value of the parameter in A; null if A has none.")]
     b: Annotated[Value, says("Value of the parameter in B; null if B has none.")]
     radians: Annotated[Size, says("Angular part of the difference, radians; 0 if there is none.")]
@@ -80,7 +82,8 @@ class CertifiedConversion(TypedDict):
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
-        bool, says("Whether the pose in A is inverted, because one model has the joint reversed.")
+        bool,
+        says("Whether the inverse of the pose in A is used; true if the joint is reversed in one model."),
     ]
 
 
@@ -120,7 +123,13 @@ class FrameEntry(TypedDict):
 
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
-    lower: Annotated[Size, says("Lower bound of the largest distance, metres: the distance at `q_a`, `q_b`.")]
+    lower: Annotated[
+        Size,
+        says(
+            "Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding"
+            " error."
+        ),
+    ]
     upper: Annotated[
         Size | None,
         says(
@@ -337,8 +346,8 @@ def _confirmation_errors(
     known = claimed["by"].startswith(f"{PINOCCHIO.title} ")
     if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not known:
         yield (
-            f"`checked`: there is neither a confirmation at {CONFIRMED} configurations, nor a reason"
-            " for its absence"
+            f"`checked`: the entry must contain a confirmation at {CONFIRMED} configurations, or a reason"
+            " why there is none"
         )
         return
     metres = float(comparator.pinocchio_distances(alignment, variables).max(initial=0.0))
@@ -378,7 +387,9 @@ def _choices_error(
     for names in choices.orders:
         if not b.allows_order(names, comparator.tolerance):
             order = ", ".join(names)
-            return f"`orders`: the joints {order} are not consecutive, or this order changes the motion"
+            return (
+                f"`orders`: the joints {order} are not consecutive, or this order changes the robot's motion"
+            )
         b = b.reordered(names)
     return None
 
@@ -408,7 +419,7 @@ def _as_written_errors(
     written = comparator.as_written(alignment)
     if claim is None:
         if written.frames:
-            yield "`as_written` is missing: the largest distance if B is not changed"
+            yield "`as_written` is missing; it must contain the largest distance between the unchanged models"
         return
     variables = variables_of(written, comparator.tolerance)
     links = [tree.links for tree in comparator.trees]

@@ -187,7 +187,7 @@ def _source(robot: Robot) -> tuple[str, str]:
         if robot.origin.variants or robot.origin.articulation is not None:
             raise InputError(
                 "other libraries cannot select a variant or an articulation of a USD stage",
-                remedy="load the stage without variants and articulation",
+                remedy="load the USD file without the arguments `variant` and `articulation`",
             )
         return str(source), "usd"
     if is_mjcf(source):

@@ -192,7 +192,7 @@ def _rule(rule: Value) -> str:
 def _idle_words(values: Value) -> str:
     kind, value = values if isinstance(values, tuple) else (None, None)
     unit = "m" if kind == JointKind.PRISMATIC.value else "rad"
-    return f"its mimic rule has the multiplier 0 and fixes it at {_number(value):.12g} {unit}"
+    return f"its mimic rule has the multiplier 0, so the joint's value is always {_number(value):.12g} {unit}"
 
 
 def _number(x: object, infinity: float = math.inf) -> float:
@@ -552,7 +552,7 @@ class Sameness(Displayable):
                     "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with to_b; a convention cannot describe a different joint frame",
+                    remedy="convert q with `Sameness.to_b`; a convention cannot convert between joint frames",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
@@ -647,7 +647,9 @@ def changes_of_b(
                 ("base", f"{which}'s root is {root}; the joints between {base} and this root are reversed")
             )
     if alignment.X is not IDENTITY:
-        lines.append(("base", f"B's root is in A's root frame at {pose_words(alignment.X, rounding)}"))
+        lines.append(
+            ("base", f"the pose of B's root in A's root frame is {pose_words(alignment.X, rounding)}")
+        )
     for step in alignment.steps:
         if step.conversion is not None:
             lines.append(("free joints", _conversion_words(alignment, step, step.conversion, rounding)))

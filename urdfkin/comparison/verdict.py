@@ -311,7 +311,7 @@ class Comparator:
                     "these joints cannot be matched: their parent links are not matched",
                     where="map",
                     found=f"{ours!r} of A, {theirs!r} of B",
-                    remedy="also map the joints before these joints, or remove this pair",
+                    remedy="also map the joints that carry these two joints, or remove this pair",
                 )
 
     def search(
@@ -716,11 +716,13 @@ class JointComparison:
         name = f"link {trees[0].links[link]}"
         partners = [None if step is None or step.unlike else step.b for step in steps]
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
-            yield JointDifference(name, "", None, "is carried by other joints in the other model")
+            yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
         # `paths[1][0]` contains the joints of B between the common ancestor and P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
-            yield JointDifference(name, "", None, "is carried by joints without a common link between them")
+            yield JointDifference(
+                name, "", None, "the joints between this link and the nearest common link cannot be compared"
+            )
             return
         if any(step is not None and step.kind in ("planar", "floating") for step in steps):
             yield from self._free_joint_differences(name, [path for _, path in paths])
@@ -806,7 +808,7 @@ class JointComparison:
         parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
         bodies = [m.body_of[parent] for m, parent in zip(self.mechanisms, parents, strict=True)]
         if any(bodies) or not all(len(path) == 1 for path in paths):
-            why = "follows a planar or floating joint that is not compared joint by joint"
+            why = "urdfkin cannot compare the planar or floating joint that carries this link"
             yield JointDifference(name, "", None, why)
             return
         for T, other in (
@@ -814,7 +816,7 @@ class JointComparison:
             [mechanism.homes[path[0] + 1] for mechanism, path in ends],
         ):
             if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
-                why = "follows a planar or floating joint with a different frame"
+                why = "the planar or floating joint that carries this link has different frames in A and B"
                 yield JointDifference(name, "", None, why)
 
     def _rule_differences(self, step: MatchedJoints) -> Iterator[JointDifference]:
