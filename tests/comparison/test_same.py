@@ -455,4 +455,4 @@ def test_a_mimic_joint_with_multiplier_zero_and_an_independent_joint_differ_in_t
 def test_a_prismatic_joint_that_never_moves_is_stated_in_metres() -> None:
     found = urdfkin.same(idle("prismatic", 0.5), with_k("fixed"))
     assert found.verdict is Verdict.DIFFERS
-    assert "fixes it at 0.5 m" in str(found.remarks[0].words)
+    assert "the joint's value is always 0.5 m" in str(found.remarks[0].words)
