@@ -273,12 +273,12 @@ FORGED: dict[str, Any] = {
     "value is wrong in: joint": lambda d: d["differences"][0].update(a=0.5),
     "or a value is wrong in: joint": lambda d: d["differences"][0].update(detail="alone"),
     "an entry is listed twice": lambda d: d["differences"].append(d["differences"][0]),
-    "neither a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
-    "neither a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
-    "nor a reason": lambda d: d.update(checked=confirmed(state="not asked", reason="I was lazy")),
-    "nor a reason for": lambda d: d.update(
+    "must contain a confirmation": lambda d: d.update(checked=confirmed(configurations=7)),
+    "must contain a confirmation at": lambda d: d.update(checked=confirmed(reason="no need")),
+    "or a reason": lambda d: d.update(checked=confirmed(state="not asked", reason="I was lazy")),
+    "or a reason why": lambda d: d.update(
         checked=confirmed(state="not verified", by="", configurations=0, metres=0.0)),
-    "nor a reason for its absence": lambda d: d.update(checked=confirmed(by="")),
+    "or a reason why there is none": lambda d: d.update(checked=confirmed(by="")),
     "`checked`: Pinocchio finds at most": lambda d: d.update(checked=confirmed()),
     "`orders`: the joints joint_2, joint_1": lambda d: d["orders"].append(["joint_2", "joint_1"]),
 }  # fmt: skip
@@ -427,7 +427,7 @@ def test_a_mimic_joint_with_multiplier_zero_is_a_fixed_joint_at_its_offset(kind:
     for which, (a, b) in zip("AB", (models, models[::-1]), strict=True):
         found = urdfkin.same(a, b)
         assert found.verdict is Verdict.SAME, found
-        words = f"its mimic rule has the multiplier 0 and fixes it at {offset:g} rad"
+        words = f"its mimic rule has the multiplier 0, so the joint's value is always {offset:g} rad"
         remark = f"joint k never moves in {which}: {words}"
         assert remark in [one.words for one in found.remarks]
         assert found.exit_code(strict=True) == 1
@@ -455,4 +455,4 @@ def test_a_mimic_joint_with_multiplier_zero_and_an_independent_joint_differ_in_t
 def test_a_prismatic_joint_that_never_moves_is_stated_in_metres() -> None:
     found = urdfkin.same(idle("prismatic", 0.5), with_k("fixed"))
     assert found.verdict is Verdict.DIFFERS
-    assert "fixes it at 0.5 m" in str(found.remarks[0].words)
+    assert "the joint's value is always 0.5 m" in str(found.remarks[0].words)

@@ -1365,8 +1365,8 @@ def test_only_the_joints_after_a_free_base_may_be_rounded(write: Write, kind: st
     if kind == "planar":  # 0.1 in single precision is 1.5e-9 from 0.1
         urdf, text = free_base(kind, 0.1)
         found = urdfkin.same(loaded(urdf), loaded(write(text)), bounds=False)
-        words = "link base: follows a planar or floating joint with a different frame"
-        assert [str(one) for one in found.unexplained] == [words]
+        why = "the planar or floating joint that carries this link has different frames in A and B"
+        assert [str(one) for one in found.unexplained] == [f"link base: {why}"]
 
 
 @pytest.mark.parametrize("name", ["panda", "so101", "allegro_left_hand"])

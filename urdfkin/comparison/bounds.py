@@ -49,7 +49,7 @@ STARTS = 4
 TRIED_VALUES = 13
 #: Number of frames that are searched in one batch.
 SEARCHED_TOGETHER = 24
-#: For each round of the search, the fraction of a coordinate's range that the round covers.
+#: Width of the search interval in each round, as a fraction of the coordinate's range.
 WINDOWS = (1.0, 1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.003, 0.001)
 
 #: Function that computes the poses (n, frames, 4, 4) of a robot's frames at q.
@@ -100,7 +100,8 @@ class DistanceSearch:
     def configurations(self, z: FloatArray, *, moved: bool = False) -> tuple[FloatArray, FloatArray]:
         """Return configurations (n, nq) of A and B for values `z` (n, variables).
 
-        A's planar and floating joints are neutral, or random if `moved` is true.
+        If `moved` is true, the configuration of A's planar and floating joints is random. Otherwise, it is
+        the neutral configuration.
         """
         values = dict(zip(self.names, z.T, strict=True))
         tree_a, tree_b = (robot.tree for robot in self.robots)
@@ -195,7 +196,10 @@ class DistanceSearch:
         return np.asarray(z[int(np.argmax(turned))])
 
     def _maximize(self, frames: Sequence[FramePair], z: FloatArray) -> list[tuple[float, FloatArray]]:
-        """Maximize each frame's distance by coordinate search from values (frames, starts, variables)."""
+        """Maximize each frame's distance by coordinate search.
+
+        `z` (frames, starting points, variables) contains the starting points of the search.
+        """
         variables = [self._variables_of(frame) for frame in frames]
         low, high = self.ends.T
         k, s = np.ogrid[: len(frames), : z.shape[1]]
@@ -224,7 +228,10 @@ class DistanceSearch:
         return [(float(best[n, m]), z[n, m]) for n, m in enumerate(at)]
 
     def _own_distances(self, z: FloatArray, frames: Sequence[FramePair]) -> FloatArray:
-        """Return distances (frames, starts, values), m, for `z` (frames, starts, values, variables)."""
+        """Return each frame's distances (m) at values `z` (frames, starting points, values, variables).
+
+        The result has the shape (frames, starting points, values).
+        """
         # NumPy rejects the size -1 for an empty array.
         flat = z.reshape(math.prod(z.shape[:-1]), z.shape[-1])
         distances = self.distances(flat, frames).reshape(*z.shape[:-1], len(frames))
@@ -296,7 +303,10 @@ class Boxes:
                     rates[tree.v_index[tree.joint_index(joint)], names.index(line.variable)] = line.slope
 
     def bounds(self, c: FloatArray, h: FloatArray) -> FloatArray:
-        """Bound |D + sum_i D_i x_i|, (n,), in boxes with middles `c` (n, variables) and half widths `h`."""
+        """Return upper bounds (n,) on |D + sum_i D_i x_i| in boxes, for |x_i| <= h_i.
+
+        `c` (n, variables) contains the centers of the boxes, and `h` (variables,) their half widths.
+        """
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
         along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]

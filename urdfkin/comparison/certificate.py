@@ -63,7 +63,9 @@ class DifferenceEntry(TypedDict):
     """A difference between the two models at one joint or link."""
 
     place: Annotated[str, says("Name of the joint or link of A that differs.")]
-    what: Annotated[str, says("Name of the parameter that differs: axis, place, mimic rule, limits, ...")]
+    what: Annotated[
+        str, says("Name of the parameter that differs, for example `axis`, `mimic rule` or `limits`.")
+    ]
     a: Annotated[Value, says("Value of the parameter in A; null if A has none.")]
     b: Annotated[Value, says("Value of the parameter in B; null if B has none.")]
     radians: Annotated[Size, says("Angular part of the difference, radians; 0 if there is none.")]
@@ -80,7 +82,8 @@ class CertifiedConversion(TypedDict):
     before: Annotated[Matrix, says("Matrix M (4, 4), multiplied from the left.")]
     behind: Annotated[Matrix, says("Matrix N (4, 4), multiplied from the right.")]
     back: Annotated[
-        bool, says("Whether the pose in A is inverted, because one model has the joint reversed.")
+        bool,
+        says("Whether the inverse of the pose in A is used; true if the joint is reversed in one model."),
     ]
 
 
@@ -120,7 +123,13 @@ class FrameEntry(TypedDict):
 
     frame: Annotated[str, says("Link of A.")]
     frame_b: Annotated[str, says("Link of B.")]
-    lower: Annotated[Size, says("Lower bound of the largest distance, metres: the distance at `q_a`, `q_b`.")]
+    lower: Annotated[
+        Size,
+        says(
+            "Lower bound of the largest distance, metres: the distance at `q_a` and `q_b`, less the rounding"
+            " error."
+        ),
+    ]
     upper: Annotated[
         Size | None,
         says(
@@ -213,7 +222,7 @@ def certificate(result: Sameness, command: str | None = None) -> SameCertificate
     return cast("SameCertificate", plain(document))
 
 
-#: Attributes of `Sameness` that have equal names in the certificate.
+#: Attributes of `Sameness` that the certificate contains under the same names.
 _COPIED = (
     "up_to", "differences", "remarks", "joints", "links", "tools", "orders", "base", "base_links", "frames",
     "as_written", "checked",
@@ -233,8 +242,9 @@ def recheck(document: SameCertificate, a: Robot, b: Robot) -> list[str]:
     """Check a certificate against two models, and return a line of text for each wrong statement.
 
     The check uses the pairs of joints that the certificate states. If the verdict is "differs", the function
-    also searches for other pairs of joints, for which the models do not differ.
-    urdfkin and Pinocchio both compute the distance of each lower bound. Each upper bound is proven again.
+    also matches the joints again. The verdict is wrong if the models do not differ with the new pairs.
+    urdfkin and Pinocchio both compute the distance at the configurations `q_a` and `q_b` of each lower bound.
+    Each upper bound is proven again.
 
     Raises:
         InputError: the certificate was made for other models, or names an unknown joint or link.
@@ -336,8 +346,8 @@ def _confirmation_errors(
     known = claimed["by"].startswith(f"{PINOCCHIO.title} ")
     if state != "confirmed" or reason or claimed["configurations"] != CONFIRMED or not known:
         yield (
-            f"`checked`: there is neither a confirmation at {CONFIRMED} configurations, nor a reason"
-            " for its absence"
+            f"`checked`: the entry must contain a confirmation at {CONFIRMED} configurations, or a reason"
+            " why there is none"
         )
         return
     metres = float(comparator.pinocchio_distances(alignment, variables).max(initial=0.0))
@@ -364,7 +374,7 @@ def _choices(document: SameCertificate) -> AlignmentChoices:
 def _choices_error(
     document: SameCertificate, choices: AlignmentChoices, comparator: Comparator
 ) -> str | None:
-    """Return why the certificate's alignment of B with A is not allowed, or None."""
+    """Return the first error in the certificate's alignment of B with A, or None."""
     a, b = comparator.mechanisms
     for joint in document["joints"]:
         a.tree.joint_index(joint["a"])
@@ -377,7 +387,9 @@ def _choices_error(
     for names in choices.orders:
         if not b.allows_order(names, comparator.tolerance):
             order = ", ".join(names)
-            return f"`orders`: the joints {order} are not consecutive, or this order changes the motion"
+            return (
+                f"`orders`: the joints {order} are not consecutive, or this order changes the robot's motion"
+            )
         b = b.reordered(names)
     return None
 
@@ -407,7 +419,7 @@ def _as_written_errors(
     written = comparator.as_written(alignment)
     if claim is None:
         if written.frames:
-            yield "`as_written` is missing: the largest distance if B is not changed"
+            yield "`as_written` is missing; it must contain the largest distance between the unchanged models"
         return
     variables = variables_of(written, comparator.tolerance)
     links = [tree.links for tree in comparator.trees]
@@ -433,7 +445,10 @@ def _interval_errors(
     *,
     sharply: bool,
 ) -> Iterator[str]:
-    """Check an interval; `sharply` allows the slow branch and bound. `rounding` is (m, rad)."""
+    """Check an interval; `rounding` is (m, rad).
+
+    If `sharply` is true, the check may use branch and bound, a slow method.
+    """
     problems = list[str]()
     if claim["lower"] > 0.0 or claim["radians_seen"] > 0.0:
         problems += _lower_bound_errors(search, frame, claim, rounding)

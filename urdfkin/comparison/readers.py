@@ -59,7 +59,8 @@ class LibraryReading:
 
     Attributes:
         refused: Reason why the library does not read the file; None if it reads the file.
-        missing: Links that the library's model lacks. Links without a prim in a USD file do not count.
+        missing: Links that the library's model lacks. For a USD file, only links with a prim (an object of
+            the USD file) are listed.
         worst: Largest difference of link poses relative to the first common link; 0 if only rounding differs.
     """
 
@@ -93,8 +94,9 @@ def compare_readers(
 
     Raises:
         UnknownNameError: a library has no adapter.
-        InputError: a library is not installed, none reads the format, a joint is locked, the robot is MJCF
-            text without a file, or a variant or an articulation of a USD stage was selected.
+        InputError: a library is not installed, or no installed library reads the file's format. The error is
+            also raised if a joint is locked, or if the robot was loaded from MJCF text instead of a file. It
+            is also raised if a variant or an articulation of a USD file was selected.
     """
     source, form = _source(robot)
     names = installed(form) if libraries is None else tuple(libraries)
@@ -185,7 +187,7 @@ def _source(robot: Robot) -> tuple[str, str]:
         if robot.origin.variants or robot.origin.articulation is not None:
             raise InputError(
                 "other libraries cannot select a variant or an articulation of a USD stage",
-                remedy="load the stage without variants and articulation",
+                remedy="load the USD file without the arguments `variant` and `articulation`",
             )
         return str(source), "usd"
     if is_mjcf(source):

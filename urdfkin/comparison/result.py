@@ -55,7 +55,8 @@ class Verdict(Enum):
     DIFFERS = "differs"
 
 
-#: Kinds of changes that do not make two models different, in the order of the printed verdict.
+#: Kinds of changes of B after which `same` still calls the models equivalent.
+#: The printed verdict lists the kinds in this order.
 FREE = ("base", "zeros", "senses", "free joints", "tools")
 #: Kinds of differences for which the distance between matching frames has an upper bound.
 BOUNDED = frozenset({"axis", "place", "frame", "mimic rule", "fixed"})
@@ -66,8 +67,8 @@ class SameQuestion:
     """The question whether two models are equivalent, or whether their frames are close enough.
 
     `within` is the largest allowed distance (m) and angle (rad) between matching frames of the unchanged
-    models. With None, the question is whether the models are equivalent. With `strict`, changes of B and
-    remarks count as differences.
+    models. With None, the question is whether the models are equivalent. If `strict` is true, the answer is
+    no for models with remarks. It is also no if the models are equivalent only after changes of B.
     """
 
     within: float | None = None
@@ -191,7 +192,7 @@ def _rule(rule: Value) -> str:
 def _idle_words(values: Value) -> str:
     kind, value = values if isinstance(values, tuple) else (None, None)
     unit = "m" if kind == JointKind.PRISMATIC.value else "rad"
-    return f"its mimic rule has the multiplier 0 and fixes it at {_number(value):.12g} {unit}"
+    return f"its mimic rule has the multiplier 0, so the joint's value is always {_number(value):.12g} {unit}"
 
 
 def _number(x: object, infinity: float = math.inf) -> float:
@@ -205,7 +206,7 @@ def _range(ends: Value) -> str:
 
 @dataclass(frozen=True, slots=True)
 class JointDifference:
-    """A difference at one joint or link that is too large to be caused by rounding.
+    """A difference at one joint or link that rounding does not explain.
 
     Attributes:
         place: The joint or link of A, for example "joint elbow".
@@ -318,16 +319,18 @@ class Sameness(Displayable):
             10 m.
         single: (m, rad) bound on the distance and the angle between matching frames that single precision can
             cause. None if no file has single precision.
-        unexplained: The differences of the unchanged models that rounding does not explain, joint by joint.
+        unexplained: Differences of the unchanged models at one joint or link that rounding does not explain.
             The numbers of a USD file are rounded to single precision.
-        frames: The interval for each pair of matching links, after the changes in `after`.
+        frames: For each pair of matching links, an interval that contains the largest distance after the
+            changes in `after`.
         as_written: The interval for the frame with the largest distance between the models as they are
             written. None if `after` is empty.
         written: (m, rad) proven bound on the distance and the angle of all pairs of matching frames, for the
             models as they are written. The bound is infinite if no bound was proven. If one model is a
             Denavit-Hartenberg table, only frames with the same name in A and B count.
-        narrowed: One line of text for each mimicked joint whose range lets a mimic joint exceed its limits.
-            The distances in `frames` are computed for the whole range of the mimicked joint.
+        narrowed: One line of text for each mimicked joint whose range contains values at which a mimic joint
+            exceeds its limits. The distances in `frames` are computed for the whole range of the mimicked
+            joint.
         checked: Pinocchio's confirmation, or the reason why there is none.
         trees: The two robot models.
 
@@ -421,7 +424,7 @@ class Sameness(Displayable):
 
     @property
     def within_single(self) -> bool:
-        """Whether the models differ, but each frame by no more than single precision can cause.
+        """Whether the models differ, but single precision can explain the displacement of every frame.
 
         The models are compared as they are written. The limit is the sum of the rounding errors of all
         joints. A real error in one joint can be smaller than this sum. Therefore, only `up_to_single` proves
@@ -440,8 +443,9 @@ class Sameness(Displayable):
         """Return whether all matching frames are proven to be within a distance (m and rad) of each other.
 
         The models are compared as they are written: their roots coincide, and their coordinates are equal. A
-        different base pose, joint zero or tool frame therefore increases the distance. The result is False if
-        the types of two matching joints differ, or if a joint exists in one model only.
+        different base pose, a different tool frame, or a different zero position of a joint can therefore
+        increase the distance. The result is False if the types of two matching joints differ, or if a joint
+        exists in one model only.
 
         >>> import urdfkin
         >>> found = urdfkin.same("ur5", "ur10")
@@ -466,8 +470,8 @@ class Sameness(Displayable):
         """Return 0 if the models are equivalent, or within the given distance; else 1.
 
         Args:
-            strict: If true, the result is also 1 for models that are equivalent only after changes, and for
-                models with remarks, such as different joint limits.
+            strict: If true, the result is 1 for models with remarks, such as different joint limits. The
+                result is also 1 if the models are equivalent only after changes of B.
             within: Largest allowed distance (m) and angle (rad) between matching frames of the models as they
                 are written.
 
@@ -481,8 +485,8 @@ class Sameness(Displayable):
     def to_b(self, q: ArrayLike) -> FloatArray:
         """Convert A's configurations (..., nq) to the corresponding configurations (..., nq) of B.
 
-        At corresponding configurations, A and B have the same poses, except for `base`. A coordinate that
-        only B has is set to its value in the neutral configuration.
+        If the models are equivalent, their poses at corresponding configurations are equal, except for `base`
+        and `tools`. A coordinate that only B has is set to its value in the neutral configuration.
 
         Raises:
             InputError: q does not have A's length.
@@ -512,11 +516,11 @@ class Sameness(Displayable):
         return out
 
     def convention(self) -> Convention:
-        """Return a convention for A with the names, order, senses and zero offsets of B's joints.
+        """Return a convention for A with the names, order, directions and zero offsets of B's joints.
 
-        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to q, v, a and Jacobians of B. At
-        a configuration of A and the converted configuration of B, A and B have the same poses, except for
-        `base` and `tools`.
+        A's `robot.convention(...)` then converts q, v, a and Jacobians of A to q, v, a and Jacobians of B. If
+        the models are equivalent, their poses at q and at the converted q are equal, except for `base` and
+        `tools`.
 
         Raises:
             InputError: a coordinate of one model has no matching coordinate in the other model, or a planar
@@ -548,7 +552,7 @@ class Sameness(Displayable):
                     "the frames of a planar or floating joint in A and B differ",
                     where="map",
                     found=joint.name,
-                    remedy="convert q with to_b; a convention cannot describe a different joint frame",
+                    remedy="convert q with `Sameness.to_b`; a convention cannot convert between joint frames",
                 )
             joints.append(joint.name)
             rule = JointRule(joint.name if one.b != one.a else None, float(one.sense), one.offset)
@@ -627,8 +631,9 @@ def changes_of_b(
 ) -> tuple[tuple[str, str], ...]:
     """Return the changes that make B equal to A, as (kind, text).
 
-    The function also stores the tool poses in `alignment`. With `tables`, every frame that differs
-    counts as a tool, because the frames of a Denavit-Hartenberg table depend on the table's convention.
+    The function also stores the tool poses in `alignment`. If `tables` is true, every frame with a different
+    pose is treated as a tool. The reason is that the frames of a Denavit-Hartenberg table depend on the
+    table's convention.
     """
     lines = list[tuple[str, str]]()
     tree_a, tree_b = alignment.a.tree, alignment.b.tree
@@ -642,7 +647,9 @@ def changes_of_b(
                 ("base", f"{which}'s root is {root}; the joints between {base} and this root are reversed")
             )
     if alignment.X is not IDENTITY:
-        lines.append(("base", f"B's root is in A's root frame at {pose_words(alignment.X, rounding)}"))
+        lines.append(
+            ("base", f"the pose of B's root in A's root frame is {pose_words(alignment.X, rounding)}")
+        )
     for step in alignment.steps:
         if step.conversion is not None:
             lines.append(("free joints", _conversion_words(alignment, step, step.conversion, rounding)))
@@ -665,8 +672,8 @@ def changes_of_b(
 def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) -> Iterator[tuple[str, str]]:
     """Yield ("tools", text) for each tool whose pose differs.
 
-    A frame without children counts as a tool. A frame that only describes the robot's mounting also counts
-    as a tool.
+    A tool is a link that is fixed to its parent and has no child. A link of the robot's mounting, such as a
+    pedestal, is also treated as a tool.
     """
     mounts, links = _mount_frames(alignment), (alignment.a.tree.links, alignment.b.tree.links)
     for k, frame in enumerate(alignment.frames):
@@ -676,7 +683,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
             if is_mount and rounding.holds(
                 *pose_difference(alignment.a.homes[frame.a], alignment.b.homes[frame.b])
             ):
-                continue  # The line about the base already reports this displacement.
+                continue  # The listed change of the base pose causes this displacement.
         if (tool := alignment.frames[k].tool) is not IDENTITY:
             moved = pose_words(tool, rounding)
             yield (
@@ -686,7 +693,7 @@ def _tool_changes(alignment: Alignment, rounding: Tolerance, *, tables: bool) ->
 
 
 def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
-    """Return matching frames of the root body that only describe the robot's mounting."""
+    """Return the pairs of matching links that belong to the robot's mounting, such as a pedestal."""
     if alignment.a.body_of[alignment.base[0]] or alignment.b.body_of[alignment.base[1]]:
         return set()
     (before_a, beside_a), (before_b, beside_b) = (
@@ -705,10 +712,10 @@ def _mount_frames(alignment: Alignment) -> set[tuple[int, int]]:
 
 
 def _links_without_joints(mechanism: Mechanism) -> tuple[set[int], set[int]]:
-    """Return the links of the root body before the robot, and the links beside the robot.
+    """Return two sets of links of the root body: supports of the robot, and links without moving joints.
 
-    A link before the robot, such as a pedestal, has a fixed child link that carries all moving joints. A link
-    beside the robot, such as a table, carries no moving joint.
+    A support, such as a pedestal, has a fixed child link that carries all moving joints. A link without
+    moving joints is, for example, a table next to the robot.
     """
     tree = mechanism.tree
     carried = [0] * len(tree.links)
@@ -749,7 +756,8 @@ def _rounded(x: float, rounding: float) -> float:
 
 
 def _is_tool(alignment: Alignment, frame: FramePair) -> bool:
-    # A mimic joint with the multiplier 0 can be stored as a fixed joint, but the child link is not a tool.
+    # `same` can store a mimic joint with the multiplier 0 as a fixed joint.
+    # The child link of this joint is not a tool.
     for tree, link in ((alignment.a.tree, frame.a), (alignment.b.tree, frame.b)):
         if link == 0 or tree.joints[link - 1].kind.nv or idle(tree.joints[link - 1]):
             return False
@@ -880,8 +888,8 @@ def limit_differences(
     """Yield the differences between two joints' kinds and limits.
 
     `tolerance` is relative to the larger of 1 (rad or m) and the limit's absolute value. `single` is the
-    relative error of a limit in single precision, or 0. `zero` is (sign, offset), with
-    (value in B) = sign * (value in A) + offset.
+    relative error of a limit in single precision, or 0. With `zero` = (sign, offset), the joint's value in B
+    is sign * (value in A) + offset.
     """
     place, (sense, offset) = f"joint {a.name}", zero
     if a.kind is not b.kind:

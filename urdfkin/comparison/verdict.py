@@ -61,7 +61,8 @@ from urdfkin.verify.verifier import as_verify
 
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
-#: Maximum number of frames that are searched for the largest distance, or bounded on the finer grid.
+#: Maximum number of frames whose upper bound is computed on the finer grid `FINE`.
+#: For the unchanged models, the largest distance is also searched for at most this many frames.
 FARTHEST = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 LONGEST = 1e150
@@ -121,7 +122,8 @@ def same(
         within = real_number(within, "within")
     for which, robot, names in zip("AB", robots, (joint_map, joint_map.values()), strict=True):
         demand_joint_names(robot.tree, list(names), which)
-    # A comparison stores many compiled trees in its robots, so `same` copies the user's robots.
+    # The comparison stores compiled trees in the robots that it uses.
+    # `same` therefore copies the user's robots.
     return Comparator((copy(robots[0]), copy(robots[1])), joint_map, bounds, boxes, within).compare()
 
 
@@ -309,7 +311,7 @@ class Comparator:
                     "these joints cannot be matched: their parent links are not matched",
                     where="map",
                     found=f"{ours!r} of A, {theirs!r} of B",
-                    remedy="also map the joints before these joints, or remove this pair",
+                    remedy="also map the joints that carry these two joints, or remove this pair",
                 )
 
     def search(
@@ -320,9 +322,10 @@ class Comparator:
     def rounding(self, alignment: Alignment, variables: Variables) -> tuple[float, float]:
         """Bound the distance and the angle (m, rad) between frames that differ only by rounding.
 
-        `same` ignores a small rounding difference at each joint. These differences add up along the path. A
-        tilt moves a frame in proportion to the travel of the joints behind the tilt, so the bound of the
-        distance holds while each joint of `unlimited` travels at most `WIDEST`.
+        `same` ignores a small rounding difference at each joint. These differences add up along the path. If
+        an axis is tilted, the displacement of a frame grows with the travel of the joints between the axis
+        and the frame. The bound of the distance therefore holds only while each joint of `unlimited` travels
+        at most `WIDEST`.
         """
         pairs = [
             (step.kind, pair)
@@ -421,7 +424,10 @@ class Comparator:
         attained: tuple[float, FloatArray] | None,
         upper: tuple[float, float],
     ) -> Interval:
-        """Return a frame's interval; `attained` is the largest distance (m) found, with its variables."""
+        """Return a frame's interval.
+
+        `attained` contains the largest distance (m) found, and the values of the variables at this distance.
+        """
         names = self.trees[0].links[frame.a], self.trees[1].links[frame.b]
         if attained is None:
             return Interval(*names, 0.0, *upper, 0.0, (), ())
@@ -528,7 +534,10 @@ def _never_moves(joint: Joint) -> bool:
 def _spelled_alike(
     robots: tuple[Robot, Robot],
 ) -> tuple[tuple[Sequence[str], Sequence[str]], dict[str, str]]:
-    """Return link labels, and joint pairs whose names differ only because USD restricts names."""
+    """Return the link names of both robots, and the pairs of joints that USD spells differently.
+
+    USD restricts names. Where possible, the links of a USD robot get the names of the other robot's links.
+    """
     labels, joints = [list(robot.tree.links) for robot in robots], dict[str, str]()
     for k, own in enumerate(robots):
         other = robots[1 - k]
@@ -578,9 +587,10 @@ def parse_map(words: tuple[str, ...]) -> dict[str, str]:
 class JointComparison:
     """Prove joint by joint that single precision is the cause of every difference between two models.
 
-    The rounding errors of all joints add up in the pose of a frame. The sum of all errors is therefore a weak
-    limit: a wrong number in one joint can move a frame by less than this sum. The proof compares the models
-    joint by joint. Each joint may differ only by the rounding of the numbers that define this joint.
+    The rounding errors of all joints add up in the pose of a frame. A wrong number in one joint can move a
+    frame by less than this sum. The pose of a frame therefore does not reveal every wrong number. For this
+    reason, the proof compares the models joint by joint. Each joint may differ only by the rounding of the
+    numbers that define this joint.
 
     **Compared quantities.** Two files can describe the same joint by different frames. For example, one file
     may shift the origin of a joint along the joint's axis, and a converter may add or merge fixed links. The
@@ -624,22 +634,22 @@ class JointComparison:
     models are added.
 
     **Both orders.** The bound for one joint can contain the rounding of other joints. One case is a joint
-    whose parent is a link that only B has. Another case is a link P that is far from the joint in B.
-    Therefore, `same` compares A with B, and also B with A. If the first of the two models is rounded, the
-    path from P to the link must have at most one moving joint. In the second model, the path from the common
-    ancestor to P must then have no rounded joint. If a condition does not hold, `same` reports the difference
-    as not explained.
+    whose parent is a link that only B has. Another case is a path in B that passes other joints between P and
+    this joint. Therefore, `same` compares A with B, and also B with A. If the first of the two models is
+    rounded, the path from P to the link must have at most one moving joint. In the second model, no joint on
+    the path from the common ancestor to P may then have rounded numbers. If a condition does not hold, `same`
+    reports the difference as not explained.
 
     **Limits of the proof.** If a difference exceeds its bound, single precision is not the cause of this
     difference. `same` names the first joint with such a difference. A joint can still have an error that is
     smaller than the rounding of the numbers that define the joint. A comparison of the two models cannot
     detect this error. The proof does not cover planar joints, floating joints, joints in another order, and
     links on different branches of A and B. These joints and links must agree up to double precision. If they
-    do not, `same` reports the difference as not explained.
+    differ by more, `same` reports this difference as not explained.
 
-    `errors` contains bounds (joints, 3) on the errors of each joint of A and of B: m, rad, and the relative
-    error of the joint's mimic rule. The bounds are 0 for double precision. `base` is the pose (4, 4) of B's
-    root in A's root frame.
+    `errors` contains an array (joints, 3) of error bounds for A, and an array for B. The columns are the
+    position error (m), the rotation error (rad), and the relative error of the mimic rule. The bounds are 0
+    for double precision. `base` is the pose (4, 4) of B's root in A's root frame.
     """
 
     def __init__(
@@ -706,11 +716,13 @@ class JointComparison:
         name = f"link {trees[0].links[link]}"
         partners = [None if step is None or step.unlike else step.b for step in steps]
         if moving[0][0] or moving[1][0] or partners != moving[1][1]:
-            yield JointDifference(name, "", None, "is carried by other joints in the other model")
+            yield JointDifference(name, "", None, "different joints carry this link in A and B")
             return
         # `paths[1][0]` contains the joints of B between the common ancestor and P.
         if self.errors[0].any() and (len(steps) > 1 or self.errors[1][paths[1][0]].any()):
-            yield JointDifference(name, "", None, "is carried by joints without a common link between them")
+            yield JointDifference(
+                name, "", None, "the joints between this link and the nearest common link cannot be compared"
+            )
             return
         if any(step is not None and step.kind in ("planar", "floating") for step in steps):
             yield from self._free_joint_differences(name, [path for _, path in paths])
@@ -739,7 +751,10 @@ class JointComparison:
             yield from axis
 
     def _axis_difference(self, step: MatchedJoints, axis: Screw, other: Screw) -> tuple[float, float]:
-        """Return the angle (rad) between two axes, and the distance (m) of a point of one from the other."""
+        """Return the angle (rad) between two axes, and the distance (m) from a point of one to the other.
+
+        For a prismatic joint, the distance is 0, because the axis has only a direction.
+        """
         ends = (axis, other) if self.errors[0].any() else (other, axis)
         return smallest_motion(*ends, turns=step.kind == "turns")[1:]
 
@@ -785,12 +800,15 @@ class JointComparison:
             yield JointDifference(place, what, None, sizes, " and ".join(explained))
 
     def _free_joint_differences(self, name: str, paths: Sequence[list[int]]) -> Iterator[JointDifference]:
-        """Compare a planar or floating joint, which must be attached to the root body."""
+        """Compare a planar or floating joint.
+
+        The joint must be attached to the root body, and be the only joint on the path to the link.
+        """
         ends = list(zip(self.mechanisms, paths, strict=True))
         parents = [mechanism.tree.joints[path[0]].parent for mechanism, path in ends]
         bodies = [m.body_of[parent] for m, parent in zip(self.mechanisms, parents, strict=True)]
         if any(bodies) or not all(len(path) == 1 for path in paths):
-            why = "follows a planar or floating joint that is not compared joint by joint"
+            why = "urdfkin cannot compare the planar or floating joint that carries this link"
             yield JointDifference(name, "", None, why)
             return
         for T, other in (
@@ -798,7 +816,7 @@ class JointComparison:
             [mechanism.homes[path[0] + 1] for mechanism, path in ends],
         ):
             if not self.tolerance.holds(*pose_difference(T, self.base @ other)):
-                why = "follows a planar or floating joint with a different frame"
+                why = "the planar or floating joint that carries this link has different frames in A and B"
                 yield JointDifference(name, "", None, why)
 
     def _rule_differences(self, step: MatchedJoints) -> Iterator[JointDifference]:
