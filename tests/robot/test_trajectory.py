@@ -147,7 +147,7 @@ def test_missing_accelerations_are_differences_of_the_given_velocities(robot: Ro
     direct = line(robot, robot.neutral(), END, 2.0, 41)
     np.testing.assert_array_equal(found.v, direct.v)
     np.testing.assert_array_equal(found.a, np.gradient(direct.v, direct.t, axis=0, edge_order=2))
-    assert found.rates == "v as given, a by central differences of v"
+    assert found.rates == "v as given, and a by central differences of this v"
     without = {name: x for name, x in columns.items() if not name.startswith("v:")}
     with pytest.raises(InputError, match="joint accelerations need joint velocities"):
         read_trajectory(robot, write(tmp_path / "x.csv", robot, without))

@@ -171,7 +171,7 @@ def frame_motion(
     base = motion.base if isinstance(motion, Trajectory) else None
     given = (motion.q, motion.v, motion.a) if isinstance(motion, Trajectory) else tuple(motion)
     if len(given) != len("qva"):
-        raise InputError("a motion is a trajectory, or q, v and a", found=f"{len(given)} arrays")
+        raise InputError("motion must be a trajectory, or q, v and a", found=f"{len(given)} arrays")
     call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, base, given)
     inputs, reference, state = (call.q, *call.rates), call.reference, call.state
     ours = {row: call.compute(row.ours, call.plan, inputs, reference, base=state) for row in validated()}

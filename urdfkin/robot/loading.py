@@ -151,7 +151,7 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         lost = lost_quaternions(source, written[1])
         robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
         if lost:
-            robot.verifier.reading = "from a yourdfpy object, which drops quat_xyzw; the file was not read"
+            robot.verifier.reading = "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     streamed = source == "-" or hasattr(source, "read")

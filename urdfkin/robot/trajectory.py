@@ -180,7 +180,7 @@ class Trajectory:
         v, a = self.errors
         return (
             f"{self.rates}; largest errors about {v:.1e} rad/s or m/s (v) and {a:.1e} rad/s^2 or m/s^2 (a),"
-            " estimated with half of the samples"
+            " estimated by a second computation with every second sample"
         )
 
 
@@ -303,7 +303,7 @@ def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
         # With the time step h, the error of a is proportional to h^order.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
-    words = "by central differences" if x.v is None else "v as given, a by central differences of v"
+    words = "by central differences" if x.v is None else "v as given, and a by central differences of this v"
     if found.joints:
         words += f", after unwrapping {', '.join(found.joints)}"
     notes = (*found.notes, *_time_notes(t, given=x.t is not None))
@@ -446,7 +446,7 @@ def read_columns(
                 f"no header: the first line must name the columns of {what}",
                 where=f"{where}:{line}",
                 found=f"only numbers: {', '.join(cells[:3])}{', ...' if len(cells) > 3 else ''}",
-                remedy=f"write a line with names above it: {listed([*optional[:1], *required])}",
+                remedy=f"add a first line with the column names: {listed([*optional[:1], *required])}",
             )
         _check_columns(names, cells, f"{where}:{line}", what, required, optional)
     elif first is not None:
@@ -663,7 +663,7 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     more = f" and {len(k) - 1} more samples" if len(k) > 1 else ""
     return (
         f"joint {joint.name}: its {what} after sample {k[0]}{more};"
-        " the robot does not move there, so this change was removed"
+        " this change is not a motion of the robot, so urdfkin removed the change"
     )
 
 
