@@ -1293,8 +1293,8 @@ class Robot(Displayable):
 
         At the first call of a quantity, the system's C compiler compiles the code in a few seconds. A cache
         stores the compiled code for later programs on the same machine. At the first call, urdfkin also
-        compares the compiled code with Pinocchio, unless the robot was loaded with `verify=False`. Without a C
-        compiler, the evaluator uses Numba. The class `CompiledFrame` documents the evaluator's methods.
+        compares the compiled code with Pinocchio, unless the robot was loaded with `verify=False`. Without a
+        C compiler, the evaluator uses Numba. The class `CompiledFrame` documents the evaluator's methods.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
