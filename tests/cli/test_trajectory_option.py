@@ -198,9 +198,9 @@ def test_velocities_of_the_file_are_used_and_computed_derivatives_are_stated(
     assert velocity.data["v"] == motion["v"].tolist()
     assert "rates" not in velocity.err
     done = run("acceleration", *words)
-    assert "derivatives v as given, a by central differences of v" in done.text.splitlines()[0]
+    assert "derivatives v as given, and a by central differences of this v" in done.text.splitlines()[0]
     assert "largest errors about" in done.err
-    assert "estimated with half of the samples" in done.err
+    assert "estimated by a second computation with every second sample" in done.err
     exact = run("acceleration", *words, "--format", "json").data
     np.testing.assert_array_equal(exact["a"], np.gradient(motion["v"], motion["t"], axis=0, edge_order=2))
 

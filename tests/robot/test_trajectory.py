@@ -156,7 +156,7 @@ def test_missing_accelerations_are_differences_of_the_given_velocities(
     found = read(columns_of(direct, "v"))
     np.testing.assert_array_equal(found.v, direct.v)
     np.testing.assert_array_equal(found.a, np.gradient(direct.v, direct.t, axis=0, edge_order=2))
-    assert found.rates == "v as given, a by central differences of v"
+    assert found.rates == "v as given, and a by central differences of this v"
     with pytest.raises(InputError, match="joint accelerations need joint velocities"):
         read(columns_of(direct, "a"))
 

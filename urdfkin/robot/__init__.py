@@ -79,12 +79,12 @@ if TYPE_CHECKING:
     from urdfkin.verify.usd_check import SinglePrecision
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
-#: Gravity in m/s^2, in world axes. Pinocchio and MuJoCo have the same default.
+#: Gravity in m/s^2, in world axes; also the default value of gravity in Pinocchio and MuJoCo.
 GRAVITY = (0.0, 0.0, -9.81)
 _ROWS = {"all": slice(0, 6), "linear": slice(0, 3), "angular": slice(3, 6)}
-#: Number of random configurations at which the usual rank of a Jacobian is computed.
+#: Number of random configurations that determine the generic rank of a Jacobian.
 _RANK_SAMPLES = 3
-#: Internal members, which name completion does not list.
+#: Internal members that `dir(robot)` leaves out, so that name completion does not offer them.
 _INTERNAL = {"plan", "verifier"}
 #: Maximum number of float64 values in an array, because the number of bytes must fit in 63 bits.
 _MOST_NUMBERS = (2**63 - 1) // 8
@@ -104,12 +104,14 @@ class Robot(Displayable):
     - a text with names: `"elbow=0.5, wrist=2"`
     - the name of a pose in `poses`, with or without changed values: `"ready"`, `"ready, elbow=0.5"`
 
-    A mapping or text must contain all names, except after the name of a pose.
+    A mapping or text must contain all names. A text that begins with the name of a pose needs only the
+    changed values.
 
     Methods that compute a quantity share these arguments:
 
     - `q`: (..., nq) rad, m.
-    - `v`: (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
+    - `v`: (..., nv) rad/s, m/s. The velocity of a planar or floating joint is in the axes of the moving
+      frame.
     - `a`: (..., nv) rad/s^2, m/s^2; in the same axes as `v`.
     - `frame`: Name of a link or joint; None: the robot's only tip. For a list of names, such as
       `link_frames`, the result has an axis of frames after the batch axes.
@@ -164,7 +166,7 @@ class Robot(Displayable):
             urdf, tree, origin, policy=verify, mimic=mimic, unverifiable=unverifiable, oracle=oracle
         )
         self.findings = Findings(findings)
-        #: Bounds on the errors of poses from a USD stage, which has single precision; None: double precision.
+        #: Bounds on the errors of poses that a USD stage stores in single precision; None for other sources.
         self.single: SinglePrecision | None = None
         #: USD path of each link's prim (scene object), for a robot from a USD stage.
         self.prims: Mapping[str, str] = {}
@@ -172,13 +174,13 @@ class Robot(Displayable):
         self._tip_frame = tip_frame
         self._has_one_tip = tip_frame is not None or len(list(tree.leaves())) == 1
         self._plans: dict[tuple[int, ...], CompiledTree] = {}
-        #: Fast evaluators of frames, without checks (`_prepared`) and with checks (`_checked`).
+        #: Evaluators of `prepare`, by frame. Pinocchio checks only the results of those in `_checked`.
         self._prepared: dict[object, PreparedFrame] = {}
         self._checked: dict[object, PreparedFrame] = {}
         self._compiled: dict[object, CompiledFrame] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy rebuilds its compiled trees, and has its own verifier.
+        # A copied or unpickled robot has empty caches, and a verifier of its own.
         empty: dict[str, Any] = {"_plans": {}, "_prepared": {}, "_checked": {}, "_compiled": {}}
         return {**self.__dict__, "verifier": copy(self.verifier), **empty}
 
@@ -261,7 +263,7 @@ class Robot(Displayable):
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the URDF text as UTF-8, or of an MJCF or USD file without its included files.
+        """SHA-256 of the URDF text in UTF-8, or of the MJCF or USD file; included files have no effect.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").sha256[:8]
@@ -378,8 +380,8 @@ class Robot(Displayable):
     def all_frames(self) -> tuple[str, ...]:
         """Frame names: `link:NAME` for each link, and `joint:NAME` for each joint.
 
-        Each name is a `FrameName`, which always means the link or joint NAME, even if another link or joint
-        has the literal name `link:NAME`.
+        Each name is a `FrameName`. The `FrameName` `link:hand` always means the link `hand`, even if another
+        link or joint is named `link:hand`.
 
         >>> import urdfkin
         >>> urdfkin.load("planar_two_link").all_frames[-3:]
@@ -487,8 +489,8 @@ class Robot(Displayable):
         """Draw random configurations (n, nq) within the limits of all joints, mimic joints included.
 
         The same seed gives the same configurations. In some robots, no value of a mimicked joint satisfies
-        both its own limits and the limits of its mimic joint. Then only the limits of the mimicked joint
-        apply, and `limit_violations` names the mimic joint.
+        both its own limits and the limits of its mimic joint. In this case, the configurations respect only
+        the limits of the mimicked joint. `limit_violations` then reports the mimic joint.
 
         Args:
             n: Number of configurations.
@@ -523,7 +525,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").limit_violations([[4.0, 0.0], [0.0, 0.0]])
         ['joint joint_1: 4 is outside [-3, 3]']
         """
-        # The returned lines mention degrees, so no warning is needed.
+        # `look=False` prevents a warning of values in degrees, because the returned lines mention degrees.
         q = configuration.checked(self.tree, q, "q", look=False)
         return configuration.limit_violations(self.tree, q)
 
@@ -535,7 +537,8 @@ class Robot(Displayable):
 
         Args:
             q: (..., nq) rad, m.
-            v: (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
+            v: (..., nv) rad/s, m/s. The velocity of a planar or floating joint is in the axes of the moving
+                frame.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -563,7 +566,8 @@ class Robot(Displayable):
             end: (..., nq) rad, m.
 
         Returns:
-            (..., nv) rad/s, m/s; for planar and floating joints in the axes of the moving frame.
+            (..., nv) rad/s, m/s. The velocity of a planar or floating joint is in the axes of the moving
+            frame.
 
         Raises:
             InputError: a wrong length, or a number that is not finite.
@@ -738,7 +742,7 @@ class Robot(Displayable):
         verify: Verify | None = None,
         threads: int | None = None,
     ) -> FloatArray:
-        """Compute the quantity with the given name; the method with this name returns the same result.
+        """Compute a quantity, selected by its name; the method of the quantity returns the same result.
 
         Args:
             name: "placement", "velocity", "jacobian", "jacobian rate", "hessian" or "acceleration".
@@ -814,7 +818,7 @@ class Robot(Displayable):
             from urdfkin.kinematics.bodies import seen_from
 
         name = as_str(relative_to, "relative_to")
-        # Error messages quote the name, and a subclass of str may print differently.
+        # A plain str replaces a subclass of str, whose `__repr__` may change the name in error messages.
         name = name if isinstance(name, FrameName) else str(name)
         call = Call(self.tree, self.plan, frame, _ALIGNED, None, (q,), also=(name,), relative_to=name)
         to = call.flat(out, (4, 4))
@@ -891,10 +895,10 @@ class Robot(Displayable):
         """Return J-dot (..., 6, nv), the time derivative of `jacobian` along the motion.
 
         In LOCAL_WORLD_ALIGNED, J a + J-dot v equals the classical acceleration, which `acceleration` returns.
-        In LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration, because the axes (LOCAL) or the body
-        point (WORLD) change with time. The linear part of the spatial acceleration is the linear part of the
-        classical acceleration minus the cross product of the angular and the linear velocity. J a + J-dot v
-        does not contain the acceleration that a moving base causes.
+        In LOCAL, the axes rotate with the frame; in WORLD, the body point changes with time. Therefore, in
+        LOCAL and WORLD, J a + J-dot v is the *spatial* acceleration. The linear part of the spatial
+        acceleration is the linear part of the classical acceleration minus the cross product of the angular
+        and the linear velocity. J a + J-dot v does not contain the acceleration that a moving base causes.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")
@@ -926,7 +930,8 @@ class Robot(Displayable):
         - Joint j before joint i: z_j x (z_i x d_i), because joint j rotates column i.
         - Joint j after joint i: z_i x (z_j x d_j), because joint j moves the frame.
 
-        H[..., i, j] is 0 in WORLD for a joint j after joint i, and in LOCAL for a joint j before joint i.
+        In WORLD, H[..., i, j] is 0 if joint j comes after joint i. In LOCAL, H[..., i, j] is 0 if joint j
+        comes before joint i.
 
         Symmetry in LOCAL_WORLD_ALIGNED, except for two columns of one planar or floating joint:
 
@@ -1090,8 +1095,8 @@ class Robot(Displayable):
         The orientation is three Euler angles or a quaternion. The check uses Pinocchio's rotation and
         Jacobian, and an independent formula for the derivatives of the angles
         (`urdfkin.verify.analytical_reference`). Near the representational singularity of Euler angles, the
-        result has fewer correct digits: the bound grows as 1 / s^2, where s is the sine or cosine of the
-        middle angle.
+        result has fewer correct digits. There, the bound grows as 1 / s^2, where s is the sine or cosine of
+        the middle angle.
 
         Args:
             representation: Euler sequence by SciPy's name, "rpy" (the same as "xyz": roll, pitch, yaw), or
@@ -1103,9 +1108,9 @@ class Robot(Displayable):
             (..., 6, nv), or (..., 7, nv) for a quaternion.
 
         Raises:
-            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`, or, in a
-                checked call, nearer than the rounding error (about 1e-13 rad). A quaternion has no
-                singularity.
+            RepresentationSingularityError: a sample is nearer to the singularity than `nearest`. In a checked
+                call, a distance below the rounding error of the rotation (about 1e-13 rad) raises the error
+                too. A quaternion has no singularity.
             UnknownNameError: the frame or representation does not exist.
 
         >>> import urdfkin
@@ -1216,9 +1221,10 @@ class Robot(Displayable):
         """Return intervals that provably contain the true placement, velocity, acceleration, J and J-dot.
 
         The true values are those of eq. 7.77, 7.85 and 7.126 to 7.130 without rounding, for the decimals in
-        the URDF and the exact doubles of `q`, `v`, `a` and `base`. The ends of an interval are doubles,
-        nearly always neighbouring ones. The result also states whether urdfkin's and Pinocchio's values lie
-        in the intervals. The computation takes less than 1 ms for each joint before the frame.
+        the URDF and the exact doubles of `q`, `v`, `a` and `base`. Both ends of an interval are doubles.
+        Nearly always, no other double lies between the two ends. The result also states whether urdfkin's and
+        Pinocchio's values lie in the intervals. The computation takes less than 1 ms for each joint between
+        the root link and the frame.
 
         Args:
             q: (nq,) rad, m.
@@ -1227,9 +1233,9 @@ class Robot(Displayable):
             frame: Name of a link or joint; None: the robot's only tip.
             reference: Reference frame of velocities, accelerations and Jacobians.
             base: Motion of the root link; None: fixed at the world origin.
-            digits: Decimal digits of the interval arithmetic, at least 15. None: 30 digits plus one for each
-                joint before the frame. With 15 digits, the intervals are about as wide as the rounding errors
-                of doubles.
+            digits: Decimal digits of the interval arithmetic, at least 15. None: 30 plus the number of joints
+                between the root link and the frame. With 15 digits, the intervals are about as wide as the
+                rounding errors of doubles.
             hessian: Whether to compute intervals for the Hessian too; this takes less than 0.1 ms for each
                 pair of joints.
 
@@ -1261,7 +1267,7 @@ class Robot(Displayable):
     ) -> PreparedFrame:
         """Return a fast evaluator of one frame, for one configuration per call.
 
-        `PreparedFrame` lists the methods of the evaluator.
+        The class `PreparedFrame` documents the evaluator's methods.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1285,9 +1291,10 @@ class Robot(Displayable):
     def compiled(self, frame: str | None = None, reference: Reference | str = _ALIGNED) -> CompiledFrame:
         """Return the fastest evaluator of one frame: machine code for this robot.
 
-        The system's C compiler compiles each quantity at its first use, in a few seconds, once on each
-        machine. The compiled code is compared with Pinocchio. Without a C compiler, the evaluator uses Numba.
-        `CompiledFrame` lists the methods.
+        At the first call of a quantity, the system's C compiler compiles the code in a few seconds. A cache
+        stores the compiled code for later programs on the same machine. At the first call, urdfkin also
+        compares the compiled code with Pinocchio, unless the robot was loaded with `verify=False`. Without a
+        C compiler, the evaluator uses Numba. The class `CompiledFrame` documents the evaluator's methods.
 
         Args:
             frame: Name of a link or joint; None: the robot's only tip.
@@ -1455,30 +1462,33 @@ class Robot(Displayable):
     ) -> DHTable:
         """Return the Denavit-Hartenberg table of the path between two frames, checked with Pinocchio.
 
-        The table's methods take only the coordinates of the path, in the order of `table.joint_names`;
-        `robot.select(table, q)` returns these coordinates. `urdfkin.dh.dh_table` explains the arguments in
-        full.
+        The table's methods take only the coordinates of the joints in the table, in the order of
+        `table.joint_names`. `robot.select(table, q)` selects these coordinates from q.
+        `urdfkin.dh.dh_table` explains the arguments in full.
 
         Args:
             tip: Name of a link or joint; None: `tip_frame`.
             base: Name of a link or joint; None: `base_frame`.
             convention: "standard" (distal, the textbook's) or "modified" (proximal, Craig's).
-            near_parallel: Row type for nearly parallel axes, "hayati" or "strict".
+            near_parallel: "hayati": rows of nearly parallel axes have a fifth parameter, beta. "strict": all
+                rows have only the four parameters.
             snap: Tolerance in rad for rounding angles to multiples of 15 degrees; 0 for an exact table.
             last: "tip": the table leads to the tip. "flange": the table leads to the flange, and a separate
                 tool transform leads from the flange to the tip.
-            parallel_offset: Row or rows that contain the offset along consecutive parallel joint axes.
-                "last": the row of the last parallel axis. "first": the row of the first parallel axis.
-                "each": the row of each parallel axis contains the offset of one link.
+            parallel_offset: Where consecutive parallel joint axes have their offsets d along the axes.
+                "last": the row of the last axis contains the sum. "first": the row of the first axis contains
+                the sum. "each": each row contains the offset of its own link.
             flip: Names of joints whose positive direction is reversed in the table.
-            first: "base": the first row includes the offset from the base. "joint": Craig's choice, d_1 = 0.
+            first: "base": d_1 and theta_1 contain the transform from the base to the first axis if possible.
+                "joint": d_1 and theta_1 are 0, and the table's base contains this transform (Craig's choice).
             sign: Rule for the direction of the x axes. "theta": |theta| is at most a right angle. "a": the
                 length a is not negative. "alpha": the angle alpha is not negative.
             slide: Position of the axes of prismatic joints. "drawn": the axis passes through the joint's
                 origin in the URDF. "minimal": the axis passes through the origin of the next revolute joint,
                 so that a is 0.
-            like: A published table; the new table has the same frames, signs and zero positions. With `like`,
-                the arguments `flip`, `first`, `last`, `sign` and `parallel_offset` have no effect.
+            like: A published table. The returned table has the same frames, positive joint directions and
+                zero positions as the published table. With `like`, the arguments `flip`, `first`, `last`,
+                `sign` and `parallel_offset` have no effect.
             verify: True: check the table with Pinocchio. None: as chosen in `load`.
 
         Raises:
@@ -1588,7 +1598,7 @@ class Robot(Displayable):
     # -- internal ------------------------------------------------------------------------------------
 
     def plan(self, links: Sequence[int]) -> CompiledTree:
-        """Return the cached compiled tree of the joints that move `links`."""
+        """Return the compiled tree for links, given by index; the robot caches each compiled tree."""
         key = tuple(links)
         if (plan := self._plans.get(key)) is None:
             plan = self._plans[key] = compile_tree(self.tree, key)
@@ -1655,7 +1665,8 @@ class Robot(Displayable):
 
     def _prepare(self, frame: str, reference: Reference | str, *, verify: bool = False) -> PreparedFrame:
         # A plain name is a fast key; the hash of an enumeration member is slow.
-        # The other keys contain types, to distinguish the name "link:a" from `LinkFrame("link:a")`.
+        # All other keys contain the type of `frame`: `LinkFrame("link:a") == "link:a"`, but the two differ in
+        # meaning.
         plain = reference is _ALIGNED and type(frame) is str
         key = frame if plain else (type(frame), frame, type(reference), reference)
         known = self._checked if verify else self._prepared
@@ -1677,9 +1688,9 @@ _ITEM = re.compile(r"^    (\w+): (.*(?:\n {8}.*)*)", re.MULTILINE)
 
 
 def _completed(method: FunctionType, shared: dict[str, str], errors: dict[str, str]) -> str:
-    """Return a method's docstring with the shared arguments and errors.
+    """Return a method's docstring, completed with the arguments and errors in `shared` and `errors`.
 
-    `QUANTITIES` contains the shape, the units and the equations of the result.
+    The shape, the units and the equations of the result come from `QUANTITIES`.
     """
     text, start, example = cleandoc(method.__doc__ or "").partition("\n\n>>> ")
     text, *parts = re.split(r"\n\n(Args|Returns|Raises):\n", text)

@@ -32,10 +32,11 @@ class MotionCheck:
     """Comparison of a quantity from urdfkin with the same quantity from Pinocchio, for each sample.
 
     Attributes:
-        units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale,
-            where eps is the machine epsilon, and scale is the size of the quantity's numbers.
-        share: (n,) the difference as a fraction of the bound; above 1 is a disagreement.
-        bound: (n,) largest difference that rounding can cause, divided by eps * scale.
+        units: (n,) largest difference between urdfkin and Pinocchio in each sample, divided by eps * scale.
+            eps is the machine epsilon. scale is an upper bound on the sum of the absolute values of the terms
+            of a number (`urdfkin.verify.bounds`).
+        share: (n,) `units` divided by `bound`. A value above 1 is a disagreement.
+        bound: (n,) largest difference that rounding can cause, divided by the same eps * scale.
     """
 
     units: FloatArray
@@ -54,7 +55,7 @@ class FrameMotion:
         velocity: (n, 6) m/s, rad/s.
         acceleration: (n, 6) classical, m/s^2, rad/s^2.
         jacobian: (n, 6, nv).
-        movable: (6, nv) False for entries of the Jacobian that are 0 in every configuration.
+        movable: (6, nv) booleans. False: this entry of the Jacobian is 0 in every configuration.
         parts: Contributions to the acceleration, for each joint and each term of the equation.
         checks: Comparison with Pinocchio for each quantity, by name; empty if Pinocchio cannot check the
             robot.
@@ -170,7 +171,7 @@ def frame_motion(
     base = motion.base if isinstance(motion, Trajectory) else None
     given = (motion.q, motion.v, motion.a) if isinstance(motion, Trajectory) else tuple(motion)
     if len(given) != len("qva"):
-        raise InputError("a motion is a trajectory, or q, v and a", found=f"{len(given)} arrays")
+        raise InputError("motion must be a trajectory, or q, v and a", found=f"{len(given)} arrays")
     call = Call(robot.tree, robot.plan, as_str(frame, "frame"), reference, base, given)
     inputs, reference, state = (call.q, *call.rates), call.reference, call.state
     ours = {row: call.compute(row.ours, call.plan, inputs, reference, base=state) for row in validated()}

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from urdfkin.dh.table import DHTable
     from urdfkin.urdf.foreign import XmlElement, XmlTree
 
-#: Findings that help only the author of a URDF file, and are not reported for generated URDFs.
+#: Findings that help only the author of a URDF file. For a generated URDF, they cause no warning.
 _OF_A_TEXT = {NEWER_VERSION.id, MIMIC_CONTINUOUS.id}
 
 
@@ -79,7 +79,8 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         verify: True: compare every result with Pinocchio. "sample": compare 100 configurations of each call.
             False: no comparison.
         mimic: True: mimic joints follow the mimicked joints, as the URDF states. False: each mimic joint
-            moves freely. None: True, except for robots of the catalogue with unusable mimic rules.
+            moves freely. None: False for robots of the catalogue with unusable mimic rules, and True for all
+            other robots.
         root_joint: Kind of the joint between the world and the root link: "floating" or "planar". None: the
             root link is fixed.
         xacro_args: Arguments for a .xacro file, which needs the extra `xacro`.
@@ -150,7 +151,7 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
         lost = lost_quaternions(source, written[1])
         robot = robot_of(Text(written[0].encode(), written[1], written[1]), **how, listed=lost)
         if lost:
-            robot.verifier.reading = "from a yourdfpy object, which drops quat_xyzw; the file was not read"
+            robot.verifier.reading = "from a yourdfpy object, not from the file; yourdfpy ignores quat_xyzw"
         return robot
     text = read_source(cast("Source", source), xacro_args=xacro_args)
     streamed = source == "-" or hasattr(source, "read")
@@ -312,11 +313,11 @@ def robot_of(
     table: bool = False,
     quiet: bool = False,
 ) -> Robot:
-    """Return the robot of a URDF text in memory; the first six options are those of `load`.
+    """Return the robot that a URDF text describes; the options `verify` to `joints` are those of `load`.
 
-    `made` states whether urdfkin generated the text from another source, and `listed` contains findings about
-    this source. `table` states whether the source is a Denavit-Hartenberg table or a product of
-    exponentials. With `quiet`, no warnings are issued.
+    `made` states whether urdfkin generated the text from another source. `listed` contains findings about
+    that source. `table` states whether the source is a Denavit-Hartenberg table or a product of
+    exponentials. If `quiet` is True, no warnings are issued.
     """
     oracle_library(oracle)
     other = None if oracle == "pinocchio" else oracle

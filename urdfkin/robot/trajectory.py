@@ -1,12 +1,13 @@
-"""Make a trajectory from a line between two configurations, or from samples in a CSV or .npz file.
+"""Make trajectories: straight lines between two configurations, or samples from a CSV or .npz file.
 
 *Line.* A line is parameterised by s = 10 u^3 - 15 u^4 + 6 u^5 with u = t / duration. The motion starts and
 ends at rest, and the acceleration is continuous.
 
 *Differences.* Joint velocities that a file does not contain are computed by central differences of the
-configurations, with an error proportional to the square of the time step. If joint accelerations are computed
-from configurations, the errors at the start and the end of the trajectory are larger: they are proportional
-to the time step. To estimate the errors, the differences are also computed from every second sample.
+configurations, with an error proportional to the square of the time step. Joint accelerations that are
+computed from configurations have larger errors at the start and the end of the trajectory. There, the errors
+are proportional to the time step. To estimate all errors, the differences are also computed from every second
+sample.
 
 *Unwrapping.* In a log, the angle of a wheel or of a planar joint is often wrapped to [-pi, pi] or [0, 2 pi].
 The angle then jumps at the end of the range. The quaternion of a floating joint may change its sign without a
@@ -179,15 +180,16 @@ class Trajectory:
         v, a = self.errors
         return (
             f"{self.rates}; largest errors about {v:.1e} rad/s or m/s (v) and {a:.1e} rad/s^2 or m/s^2 (a),"
-            " estimated with half of the samples"
+            " estimated by a second computation with every second sample"
         )
 
 
 def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) -> Trajectory:
     """Return a straight line in joint space between two configurations (nq,), at rest at both ends.
 
-    Planar and floating joints make a screw motion of at most half a turn. A continuous joint moves by
-    `end - start`, even by more than one turn. `duration` is in seconds, and `samples` counts both ends.
+    A planar or floating joint moves along one screw axis, with a rotation of at most half a turn. A
+    continuous joint moves by `end - start`, even by more than one turn. `duration` is in seconds, and
+    `samples` counts both ends.
     """
     duration = real_number(duration, "the duration")
     samples = whole_number(samples, "samples", 0)
@@ -206,8 +208,9 @@ def line(robot: Robot, start: Given, end: Given, duration: float, samples: int) 
     for joint, at, to in zip(robot.tree.joints, robot.tree.q_index, robot.tree.v_index, strict=True):
         if joint.nq == 1:
             step[to] = q_1[at] - q_0[at]
-    # v is `step` times the first derivative of s, and a is `step` times the second derivative.
-    # Screw motions obey this rule too, because their velocities are expressed in the moving frame.
+    # v = s' * step, and a = s'' * step, where s' and s'' are the derivatives of s by time.
+    # This is true for planar and floating joints too: `step` contains their twist in the moving frame, and
+    # this twist is constant.
     q = integrate(robot.tree, q_0, s * step)
     return Trajectory(frozen(t), frozen(q), frozen(s_1 * step), frozen(s_2 * step), "of the line", exact=True)
 
@@ -297,10 +300,10 @@ def with_rates(tree: KinematicTree, x: TrajectorySamples) -> Trajectory:
     if n >= 2 * _FEWEST - 1:
         half = slice(None, None, 2)
         coarse = _differences(tree, found.q[half], t[half], None if x.v is None else x.v[half])
-        # The error is proportional to the time step to this power.
+        # With the time step h, the error of a is proportional to h^order.
         order = 1 if x.v is None else 2
         errors = _error(v[half], coarse[0], 2), _error(a[half], coarse[1], order)
-    words = "by central differences" if x.v is None else "v as given, a by central differences of v"
+    words = "by central differences" if x.v is None else "v as given, and a by central differences of this v"
     if found.joints:
         words += f", after unwrapping {', '.join(found.joints)}"
     notes = (*found.notes, *_time_notes(t, given=x.t is not None))
@@ -375,7 +378,10 @@ def _arrays(path: Path, known: Robot | Conversion) -> dict[str, FloatArray]:
 
 
 def _rates(tree: KinematicTree, q: FloatArray, t: FloatArray) -> FloatArray:
-    """Return joint velocities (n, nv) by central differences; planar and floating: in the moving frame."""
+    """Return joint velocities (n, nv), computed by central differences.
+
+    The velocity of a planar or floating joint is in the axes of the moving frame.
+    """
     slopes = _gradient(q, t)
     v = np.empty((len(q), tree.nv))
     for joint, at, to in zip(tree.joints, tree.q_index, tree.v_index, strict=True):
@@ -421,9 +427,9 @@ def read_columns(
     r"""Parse CSV text into columns (n,) of finite numbers in SI units; n may be zero.
 
     Empty lines and lines that begin with # are skipped. The first line that is not skipped may contain the
-    names of the columns, in any order. With `named`, this line must contain the names. Without names, the
-    columns are those in `required`. A heading may end with a unit, such as `elbow [deg]`. `units` contains
-    the SI unit of each column that may have a unit.
+    names of the columns, in any order. If `named` is True, this line must contain the names. If no line
+    contains names, the columns are those in `required`, in this order. A heading may end with a unit, such as
+    `elbow [deg]`. `units` contains the SI unit of each column that may have a unit.
 
     >>> read_columns("a_deg\n90\n", "x.csv", "q", ["a"], units={"a": "rad"})["a"].tolist()
     [1.5707963267948966]
@@ -440,7 +446,7 @@ def read_columns(
                 f"no header: the first line must name the columns of {what}",
                 where=f"{where}:{line}",
                 found=f"only numbers: {', '.join(cells[:3])}{', ...' if len(cells) > 3 else ''}",
-                remedy=f"write a line with names above it: {listed([*optional[:1], *required])}",
+                remedy=f"add a first line with the column names: {listed([*optional[:1], *required])}",
             )
         _check_columns(names, cells, f"{where}:{line}", what, required, optional)
     elif first is not None:
@@ -467,7 +473,7 @@ _SUFFIXES = (
 
 
 def _heading(cell: str, where: str, units: Mapping[str, str]) -> tuple[str, str]:
-    """Return the column that a heading names, and the unit of its numbers; "" for the SI unit.
+    """Return the column that a heading names, and the unit in the heading, as `_unit` does.
 
     >>> units = {"t": "s", "elbow": "rad", "v:elbow": "rad/s"}
     >>> [_heading(x, "x.csv", units) for x in ("Time [ms]", "elbow_deg", "v:elbow [deg/s]", "wrist")]
@@ -497,7 +503,7 @@ def _column_name(heading: str, units: Mapping[str, str]) -> str:
 
 
 def _unit(text: str, where: str, expected: str) -> str:
-    """Return the short name of a unit in a heading; "" for the SI unit."""
+    """Return the short name of the unit `text`: "ms", "deg" also for "deg/s", "" for an SI unit."""
     if expected == "s":
         if (factor := _PER_SECOND.get(text.strip().lower())) is None:
             raise InputError("wrong unit", where=where, found=text, remedy=f"use {', '.join(_PER_SECOND)}")
@@ -521,7 +527,7 @@ def _in_si(column: FloatArray, unit: str) -> FloatArray:
 
 
 def width_of(text: str, where: str) -> int:
-    """Return the number of cells in the first line with data, or 0."""
+    """Return the number of cells in the first line that `_rows` does not skip, or 0 without such a line."""
     return len(next(_rows(text, where), (0, []))[1])
 
 
@@ -540,7 +546,7 @@ def numbers(cells: Sequence[str], where: str, names: Sequence[str]) -> list[floa
 
 
 def _rows(text: str, where: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the number and the cells of each line with data."""
+    """Yield the number and the cells of each line; skip empty lines and lines that begin with #."""
     reader = csv.reader(text.splitlines(keepends=True), strict=True)
     try:
         for row in reader:
@@ -581,12 +587,12 @@ def _check_columns(
 
 #: Wrapped angles have at most this range (rad): one turn, with a margin for rounding to two decimals.
 _ONE_TURN = math.tau + 0.02
-#: Above this angle (rad) between two samples, the direction of the rotation is uncertain: the rotation in the
-#: opposite direction is less than twice as large.
+#: If a joint turns by more than this angle (rad) between two samples, the direction of rotation is uncertain.
+#: The rotation in the opposite direction leads to the same pose, and is less than twice as large.
 _AMBIGUOUS = math.tau / 3.0
 
-#: If unwrapping moves a mimic joint by at most this value (rad or m), the motion is a rounding error.
-#: A multiplier with an absolute value above 1 increases this limit in proportion.
+#: A difference of at most this value (rad or m) in the value of a mimic joint is treated as a rounding error.
+#: For a multiplier m with |m| > 1, the limit is |m| times this value.
 _ROUNDING = 1e-9
 
 
@@ -617,7 +623,7 @@ def unwrapped(tree: KinematicTree, q: FloatArray) -> Unwrapped:
 
 
 def _turning(joint: Joint, own: FloatArray) -> tuple[FloatArray, list[str]]:
-    """Unwrap the last coordinate of a continuous or planar joint, an angle."""
+    """Unwrap the angle of a continuous or planar joint; the angle is the joint's last coordinate."""
     angle, notes = own[:, -1], []
     new = own.copy()
     within_one_turn = bool(np.ptp(angle) <= _ONE_TURN)
@@ -657,7 +663,7 @@ def _unwrap_note(joint: Joint, own: FloatArray, new: FloatArray) -> str:
     more = f" and {len(k) - 1} more samples" if len(k) > 1 else ""
     return (
         f"joint {joint.name}: its {what} after sample {k[0]}{more};"
-        " the robot does not move there, so this change was removed"
+        " this change is not a motion of the robot, so urdfkin removed the change"
     )
 
 
@@ -679,7 +685,7 @@ def _ambiguity_note(joint: Joint, step: FloatArray, *, wrapped: bool) -> str:
 
 
 def _mimic_notes(tree: KinematicTree, q: FloatArray, new: FloatArray) -> Iterator[str]:
-    """Yield a note for each mimic joint that unwrapping moves to another pose."""
+    """Yield a note for each mimic joint whose pose changes when the mimicked joint is unwrapped."""
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         rule = joint.mimic
         if rule is None or np.array_equal(q[:, at], new[:, at]):
