@@ -277,7 +277,7 @@ def read_usd(
         opened = _select(pxr, stage, variants, name)
         layers = [layer.realPath.partition("[")[0] for layer in stage.GetUsedLayers() if layer.realPath]
         if more := sorted(set(map(os.path.realpath, layers)) - set(map(os.path.realpath, files))):
-            raise _refused("the stage uses a file that none of its layers names", name, more[0])
+            raise _refused("the stage uses a file that no layer of the stage refers to", name, more[0])
         return _StageReader(pxr, stage, name, opened).read(articulation, files)
     except pxr.Tf.ErrorException as error:
         words = "; ".join(str(getattr(one, "commentary", one)) for one in error.args)
@@ -670,7 +670,7 @@ class _StageReader:
             if prim.IsA(schema):
                 letter = str(self._value(prim, "physics:axis"))
                 if letter not in _AXES:
-                    raise InputError("the axis of a joint is X, Y or Z", where=path, found=letter)
+                    raise InputError("the axis of a joint must be X, Y or Z", where=path, found=letter)
                 ends = (float(self._value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
                 return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
         if prim.IsA(physics.SphericalJoint):
@@ -709,7 +709,7 @@ class _StageReader:
         """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
+            message = "a limit of a joint is blocked, and USD readers use different values instead"
             where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
             remedy = "write a number; -inf and inf mean no limit"
             raise InputError(message, where=where, found=found, remedy=remedy)
@@ -919,7 +919,7 @@ class _StageReader:
         free = kind in (JointKind.PLANAR, JointKind.FLOATING)
         if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
             raise InputError(
-                "body0 of a floating joint must be the world, and body0 of a planar joint must be the parent",
+                "body0 must be the world for a floating joint, and the parent body for a planar joint",
                 where=f"{self.source}: joint {edge.path}",
                 found=kind.value,
                 remedy="exchange body0 and body1 of this joint, or write several joints",
@@ -1003,7 +1003,7 @@ class _StageReader:
                     what = f"this joint mimics {named}, which is not a joint with one coordinate"
                     self._report("lost-mimic", edge.path, what, "correct the relationship")
                 elif edge.path in rules or leads(rules, rule.leader, edge.path):
-                    what = "this joint has two mimic rules, or its rules form a circle"
+                    what = "this joint has two mimic rules, or mimics itself through other joints"
                     self._report("lost-mimic", edge.path, what, "remove a rule")
                 else:
                     rules[edge.path] = rule
@@ -1042,7 +1042,7 @@ class _StageReader:
     def _compare_units(self, edge: _Edge, leader: str) -> None:
         kind = next((one.kind for one in self._edges if one.path == leader), edge.kind)
         if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
-            what = "a mimic rule between an angle and a length has no unit in the schema; m and rad are used"
+            what = "USD defines no unit for mimic rules between an angle and a length; urdfkin uses m and rad"
             self._report("lost-mimic", edge.path, what, "compare the joint with the simulator")
 
     # -- the whole stage -----------------------------------------------------------------------------
