@@ -6,11 +6,11 @@ robot_descriptions only if the package lists the module's name in `DESCRIPTIONS`
 
 The folder of a package `name` is the first of these folders that exists:
 
-1. For each folder `src` in `ROS_PACKAGE_PATH`: `src` itself if the folder has the name of the
-   package, then `src/name`, then `src/*/name`.
+1. For each folder `src` in `ROS_PACKAGE_PATH`: first the folder `src`, but only if it is called `name`.
+   Then `src/name`, and then each `src/*/name`.
 2. For each folder in `AMENT_PREFIX_PATH`: the subfolder `share/name`.
-3. For each folder above the file `beside`: the folder itself if the folder or its `package.xml` has the
-   package's name, then the subfolder with the package's name.
+3. For each folder above the file `beside`: first the folder itself, but only if it is called `name`, or if
+   its `package.xml` contains this name. Then the subfolder `name`.
 """
 
 from __future__ import annotations

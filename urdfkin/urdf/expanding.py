@@ -33,7 +33,7 @@ def serve() -> None:
     request = json.load(sys.stdin)
     limit(request["seconds"])
     os.environ.clear()
-    os.chdir(Path(request["path"]).parent)  # Included files may have names relative to this folder.
+    os.chdir(Path(request["path"]).parent)  # A path in an include may be relative to this folder.
     ground = Ground(**request["ground"])
     try:
         answer = _expand(Path(request["path"]), request["arguments"], request["search"], ground)
@@ -100,7 +100,10 @@ def _replace_evaluation(path: Path, search: Mapping[str, str], ground: Ground) -
 
 def _finder(path: Path, search: Mapping[str, str], ground: Ground) -> Callable[[str], str]:
     def is_package(folder: Path) -> bool:
-        """Accept allowed folders and folders with a package.xml, so that `$(find etc)` does not find /etc."""
+        """Return whether a folder is allowed or contains a package.xml.
+
+        For example, `$(find etc)` does not find /etc.
+        """
         return ground.holds(str(folder)) or (folder / "package.xml").is_file()
 
     def get_path(name: str) -> str:

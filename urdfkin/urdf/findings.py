@@ -50,7 +50,7 @@ _TAB = "    "
 
 
 class Excerpts:
-    """Shows lines of a file with the wrong text underlined; `data` has no byte order mark."""
+    """Shows the lines of a file and underlines the wrong text; `data` has no byte order mark."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines()
@@ -67,7 +67,7 @@ class Excerpts:
         """
         if finding.width <= 0 or not 0 < finding.line <= len(self.lines):
             return None
-        if self.number != finding.line:  # The decoded line is stored, because a line may have megabytes.
+        if self.number != finding.line:  # A line may have megabytes, so it is not decoded for every finding.
             self.number = finding.line
             self.text = self.lines[finding.line - 1].decode("utf-8", "replace")
         start = finding.column - 1
@@ -407,7 +407,7 @@ class Silences:
 
 #: Maximum number of misspelt names in a file for which similar names are suggested.
 SEARCHES = 20
-#: Limits of one search for similar names: number of compared names, and `work` of `nearest`.
+#: Limits of one search for similar names: number of names, and number of compared pairs of characters.
 CANDIDATES, WORK = 5_000, 250_000
 
 #: If a code has at least this number of warnings or notes, one finding represents all of them.
@@ -423,7 +423,12 @@ WRITTEN_OUT = 10_000
 
 @dataclass(slots=True)
 class _Kind:
-    """Findings of one code and severity, with weights; `lines` are lines of findings after `WRITTEN_OUT`."""
+    """Findings of one code and severity.
+
+    Attributes:
+        found: Pairs of a finding and its weight; at most `WRITTEN_OUT` pairs.
+        lines: Line numbers of all further findings.
+    """
 
     severity: Severity
     found: list[tuple[Finding, float]] = field(default_factory=list)
@@ -461,8 +466,8 @@ class Reporter:
     ) -> None:
         """Add a finding about the element `at`, or about the line and column `position`.
 
-        The finding names the child of `<robot>` that contains `at`, or `at` itself if `misplaced` is True. Of
-        combined findings, the finding with the greatest `weight` is reported.
+        The finding names the child of `<robot>` that contains `at`. If `misplaced` is True, the finding names
+        `at` itself. If warnings or notes are combined, the one with the greatest `weight` is reported.
         """
         severity = rule.severity if severity is None else severity
         reason = None
@@ -530,7 +535,10 @@ class Reporter:
 
     @property
     def has_raw_blanks(self) -> bool:
-        """Whether the file has attribute values in which XML parsers replace characters."""
+        """Whether an attribute value contains a tab, a line end or a reference such as `&amp;`.
+
+        XML parsers replace these characters.
+        """
         if self._raw_blanks is None:
             self._raw_blanks = _RAW_BLANK.search(self.data) is not None
         return self._raw_blanks
@@ -622,7 +630,10 @@ def _place_in_file(finding: Finding) -> tuple[int, int, int, str, str]:
 
 
 def _combine(kind: _Kind, *, fold: bool) -> list[Finding]:
-    """Combine findings of one kind; the last returned finding has the lines of the omitted findings."""
+    """Combine findings of one kind.
+
+    The last returned finding contains, in `also`, the line numbers of the findings that are not returned.
+    """
     kind.found.sort(key=lambda pair: _place_in_file(pair[0]))
     found = [finding for finding, _ in kind.found]
     into_one = fold and kind.severity is not Severity.ERROR

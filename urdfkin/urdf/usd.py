@@ -11,8 +11,8 @@
 - Joints that close a loop, name a missing prim, or are excluded from the articulation are reported.
 
 A stage consists of files, called layers. Before OpenUSD combines the layers, `files_of` reads each layer
-separately, and refuses references to network addresses and to files outside the robot's folder, package and
-repository.
+separately. The function refuses a reference to a network address, and a reference to a file outside the
+robot's folder, package and repository.
 """
 
 from __future__ import annotations
@@ -55,21 +55,23 @@ from urdfkin.urdf.sources import USD
 _LAYERS = 1_000
 #: A missing limit of a joint is written as infinity or as this largest number in single precision.
 _LARGEST = float(np.finfo(np.float32).max)
-#: A frame has shear if the cosine between two of its axes exceeds this number times u times n.
-#: Here n is the number of prims on the path of the frame's prim.
+#: A frame has shear if the cosine between two of its axes exceeds the product `_SHEAR` u n.
+#: In this product, n is the number of prims on the path of the frame's prim.
 #: The factor u is the largest relative error of rounding to single precision.
-#: Each entry of a stored rotation matrix has an error of u.
+#: Each entry of a stored rotation matrix has a rounding error of at most u.
 #: The product of two rotation matrices in single precision adds an error of 3 u to each entry.
 #: The scalar product of two columns then has an error of at most 4 * 2 sqrt(3) u < 14 u.
-#: Rounding changes the length of a stored quaternion by u, and the cosine between two axes by 4 u.
+#: Rounding changes the length of a stored quaternion by at most u.
+#: The cosine between two axes then changes by at most 4 u.
 _SHEAR = 14.0
-#: Joints with smaller limits (degrees) hardly move, so such limits are not reported as a wrong unit.
+#: A joint with limits up to this angle (degrees) hardly moves.
+#: urdfkin does not report that such limits are probably in radians.
 _SMALLEST_ANGLE = 0.01
 _NO_LIMITS = (-math.inf, math.inf)
 #: First bytes of a Git LFS pointer file, which replaces a file that was not downloaded.
 _LFS = b"version https://git-lfs.github.com/spec/"
 _MIMICS = ("NewtonMimicAPI", "PhysxMimicJointAPI")
-#: Names of USD relationships to a mimicked joint. The group is the direction, such as rotX.
+#: Names of USD relationships to a mimicked joint. The group matches the direction in a name, such as rotX.
 _MIMIC_RULE = re.compile(r"newton:mimicJoint|physxMimicJoint:(\w+):referenceJoint")
 #: Words in the names of USD types and schemas that couple joints or bodies.
 _COUPLINGS = ("Mimic", "Equality", "Tendon")
@@ -104,7 +106,9 @@ class Remark:
 
 @dataclass(frozen=True, slots=True)
 class JointReading:
-    """The numbers of a joint prim, in the stage's axes; `body1`, `p1` and `quat1` are about the second body.
+    """The values of a joint prim, before the conversion to z up.
+
+    The fields `body1`, `p1` and `quat1` describe the second body.
 
     Attributes:
         free: The directions in which the joint moves, such as `rotZ`.
@@ -112,7 +116,8 @@ class JointReading:
         p0: (3,) origin of the joint frame in the first body, m.
         quat0: (4,) unit quaternion of the joint frame in the first body, scalar last.
         limits: Lower and upper limit, rad or m.
-        size: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`, for error bounds.
+        size: Sum of the lengths (m) of all vectors that are added to compute `p0` and `p1`. Error bounds
+            depend on this sum.
     """
 
     free: str
@@ -134,15 +139,19 @@ class Usd:
     """A robot from a USD stage.
 
     Attributes:
-        prims: The path of the prim for each link that represents a prim.
+        prims: Path of the prim, by link name. A link without a prim has no entry.
         rest: (n, 4, 4) pose in the world of each prim in `prims`, in m with z up, computed by UsdGeom.
-        rest_q: (nq,) configuration in which the stage shows the robot.
-        single: Five numbers, by joint name, that bound the effect of rounding to single precision. Number 1
-            bounds the error (m) of the joint origins. Number 2 bounds the error (rad) of the joint
-            orientations. Number 3 is the sum of the lengths (m) of the vectors that these orientation errors
-            rotate. Number 4 bounds the relative error of a mimic joint's value; number 4 is 0 for other
-            joints. Number 5 is the distance (m) between the joint frame and the child frame.
-        joints: The numbers of each joint prim in the tree, by the path of the prim.
+        rest_q: (nq,) configuration of the robot in the poses `rest`. Planar and floating joints are in their
+            zero configuration instead.
+        single: Five numbers for each joint, by joint name. The numbers bound the effect of rounding to single
+            precision:
+
+            1. a bound on the error (m) of the joint origins,
+            2. a bound on the error (rad) of the joint orientations,
+            3. the sum of the lengths (m) of the vectors that the orientation errors rotate,
+            4. a bound on the relative error of a mimic joint's value, or 0 for other joints,
+            5. the distance (m) between the joint frame and the child frame.
+        joints: The values of each joint prim in the tree, by the path of the prim.
         unit: The stage's metersPerUnit.
     """
 
@@ -259,7 +268,7 @@ def read_usd(
     """Read a USD file in this process (`urdfkin.verify.usd_check` confines the process).
 
     `variants` are pairs of a variant set and a variant. The variants are selected in order, on every prim
-    with the variant set. `articulation` is the path or name of the articulation to read.
+    that has the variant set. `articulation` is the path or name of the articulation to read.
     """
     pxr = library()
     try:
@@ -268,7 +277,7 @@ def read_usd(
         opened = _select(pxr, stage, variants, name)
         layers = [layer.realPath.partition("[")[0] for layer in stage.GetUsedLayers() if layer.realPath]
         if more := sorted(set(map(os.path.realpath, layers)) - set(map(os.path.realpath, files))):
-            raise _refused("the stage uses a file that none of its layers names", name, more[0])
+            raise _refused("the stage uses a file that no layer of the stage refers to", name, more[0])
         return _StageReader(pxr, stage, name, opened).read(articulation, files)
     except pxr.Tf.ErrorException as error:
         words = "; ".join(str(getattr(one, "commentary", one)) for one in error.args)
@@ -279,8 +288,8 @@ def read_usd(
 def _select(pxr: Any, stage: Any, variants: Sequence[tuple[str, str]], name: str) -> frozenset[str]:
     """Select variants in the session layer, which is not saved; return the paths of expanded instances.
 
-    OpenUSD cannot select a variant inside an instance. An instance with the variant set is therefore made
-    non-instanceable.
+    OpenUSD cannot select a variant inside an instance. If a prim inside an instance has the variant set, the
+    function expands the instance: the instance becomes an ordinary prim.
     """
     stage.SetEditTarget(stage.GetSessionLayer())
     opened = set[str]()
@@ -352,7 +361,12 @@ class _Articulation:
 
 @dataclass(slots=True)
 class _StageReader:
-    """Read a stage; `source` is the stage's name in messages, `opened` the paths of expanded instances."""
+    """Read a stage.
+
+    Attributes:
+        source: Name of the stage in messages.
+        opened: Paths of the instances that `_select` expanded.
+    """
 
     pxr: Any
     stage: Any
@@ -592,9 +606,11 @@ class _StageReader:
     def _side(
         self, prim: Any, i: int, target: str | None
     ) -> tuple[str | None, FloatArray, float, tuple[float, float]] | None:
-        """Return the path of body i (None for the world), the joint frame (m), `size` and `rounded`.
+        """Return four values about body i of a joint.
 
-        The joint frame is relative to the body. Return None if the body does not exist.
+        The values are the path of the body (None for the world), the pose (m) of the joint frame in the body,
+        and the body's part of `_Edge.size` and `_Edge.rounded`. Return None if the body does not exist or is
+        in a prototype of a point instancer.
         """
         p = np.array(self._value(prim, f"physics:localPos{i}"), float)
         quaternion = self._value(prim, f"physics:localRot{i}")
@@ -654,7 +670,7 @@ class _StageReader:
             if prim.IsA(schema):
                 letter = str(self._value(prim, "physics:axis"))
                 if letter not in _AXES:
-                    raise InputError("the axis of a joint is X, Y or Z", where=path, found=letter)
+                    raise InputError("the axis of a joint must be X, Y or Z", where=path, found=letter)
                 ends = (float(self._value(prim, f"physics:{end}Limit")) for end in ("lower", "upper"))
                 return self._bounded(path, f"{'rot' if turns else 'trans'}{letter}", ends)
         if prim.IsA(physics.SphericalJoint):
@@ -693,7 +709,7 @@ class _StageReader:
         """Return a limit of a `PhysicsJoint`; refuse a blocked limit, which USD readers treat differently."""
         attribute = prim.GetAttribute(name)
         if attribute.HasFallbackValue() and attribute.Get() is None:
-            message = "a limit of a joint is blocked, and OpenUSD's readers use different values"
+            message = "a limit of a joint is blocked, and USD readers use different values instead"
             where, found = f"{self.source}: joint {prim.GetPath()}", f"{name} = None"
             remedy = "write a number; -inf and inf mean no limit"
             raise InputError(message, where=where, found=found, remedy=remedy)
@@ -750,7 +766,7 @@ class _StageReader:
         for path in self._bodies:
             if (key := top(path)) in groups:
                 groups[key].bodies.append(path)
-        # If the base is not a rigid body, an articulation can have several groups of connected bodies.
+        # Several groups of connected bodies can belong to one articulation if each is attached to the world.
         merged: dict[str, list[_Articulation]] = {}
         for group in groups.values():
             single = not group.path and len(group.bodies) == 1
@@ -903,7 +919,7 @@ class _StageReader:
         free = kind in (JointKind.PLANAR, JointKind.FLOATING)
         if free and (backwards or (kind is JointKind.FLOATING and parent is not None)):
             raise InputError(
-                "body0 of a floating joint must be the world, and body0 of a planar joint must be the parent",
+                "body0 must be the world for a floating joint, and the parent body for a planar joint",
                 where=f"{self.source}: joint {edge.path}",
                 found=kind.value,
                 remedy="exchange body0 and body1 of this joint, or write several joints",
@@ -918,7 +934,8 @@ class _StageReader:
         if (np.eye(4) == B).all():
             yield joint, here, there
             return
-        # In a URDF, the child link has the joint frame, so a different child frame needs a further link.
+        # In a URDF, the joint frame is also the frame of the child link.
+        # A child frame with another pose needs a further link.
         between = unique(f"{name}_link", self._link_names)
         yield joint, here, between
         yield fixed_joint(unique(f"{there}_fixed", self._joint_names), inverse(B)), between, there
@@ -947,7 +964,7 @@ class _StageReader:
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield the paths of each Xform prim that becomes a link and of the prim's body."""
+        """Yield the path of each Xform prim that becomes a link, with the path of the body above the prim."""
         body_api, shape = self.pxr.UsdPhysics.RigidBodyAPI, self.pxr.UsdGeom.Gprim
 
         def below(prim: Any, body: str) -> Iterator[tuple[str, str]]:
@@ -986,7 +1003,7 @@ class _StageReader:
                     what = f"this joint mimics {named}, which is not a joint with one coordinate"
                     self._report("lost-mimic", edge.path, what, "correct the relationship")
                 elif edge.path in rules or leads(rules, rule.leader, edge.path):
-                    what = "this joint has two mimic rules, or its rules form a circle"
+                    what = "this joint has two mimic rules, or mimics itself through other joints"
                     self._report("lost-mimic", edge.path, what, "remove a rule")
                 else:
                     rules[edge.path] = rule
@@ -1025,7 +1042,7 @@ class _StageReader:
     def _compare_units(self, edge: _Edge, leader: str) -> None:
         kind = next((one.kind for one in self._edges if one.path == leader), edge.kind)
         if (edge.kind is JointKind.PRISMATIC) != (kind is JointKind.PRISMATIC):
-            what = "a mimic rule between an angle and a length has no unit in the schema; m and rad are used"
+            what = "USD defines no unit for mimic rules between an angle and a length; urdfkin uses m and rad"
             self._report("lost-mimic", edge.path, what, "compare the joint with the simulator")
 
     # -- the whole stage -----------------------------------------------------------------------------

@@ -10,7 +10,8 @@ urdfkin accepts a fix if three conditions hold:
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
 a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
-lines. The patch is then a git binary patch, after a comment with the escaped lines.
+lines. If a line must be escaped, urdfkin therefore writes a git binary patch. A comment before this patch
+shows the escaped lines.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def mend(
 
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
-    # The reporter stores only some findings of a code that is very frequent, so such codes are not compared.
+    # `findings` contains only some findings of a very frequent code. Such codes are not compared.
     many = {finding.code for finding in before.findings if finding.also}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
@@ -102,7 +103,11 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
 
 
 def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
-    """Yield differences in version, links and used joint values; `turns` has the allowed rotations (rad)."""
+    """Yield a message for each difference between two robots.
+
+    The function compares the version, the links, and the joint values that URDF readers use. `turns`
+    contains the angle (rad) by which a joint origin may rotate, by joint name.
+    """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return

@@ -1,10 +1,13 @@
 """Find a rule by its code, and return the documentation of each rule as data and as text.
 
-The rules are defined in the parser and in the modules of `lint.rules`. Beside each module, a TOML file with
-the name of the module contains a page for each rule. An entry `cure`, `others` or `question` at the top of
-the file is the default for all pages. The table `parts` defines texts that replace `{name}` in examples. Each
-entry is a string, or a pair [text, times] for a repeated text. In a repeated text, `{i}` is the index of the
-repetition. Line breaks in prose have no meaning.
+The rules are defined in the parser and in the modules of `lint.rules`. The folder of each module also
+contains a TOML file with the name of the module. The file documents each rule of the module in a table, the
+page of the rule. If an entry such as `cure`, `others` or `question` is at the top of the file, the entry is
+the default for all pages.
+
+The table `parts` defines texts that replace `{name}` in examples. Each entry is a string, or a pair
+[text, times] for a repeated text. In a repeated text, `{i}` is the index of the repetition. Line breaks in
+prose have no meaning.
 """
 
 from __future__ import annotations
@@ -48,8 +51,8 @@ class Page:
     """The documentation of a rule.
 
     Attributes:
-        example: A minimal example with the problem: a whole document, or the content of `<robot>`. An example
-            that begins with a joint or a comment lacks the links `base` and `tip`.
+        example: A minimal example with the problem: a whole document, or the content of `<robot>`. If the
+            example begins with a joint or a comment, the links `base` and `tip` must be added.
         cure: The corrected example.
         others: The behaviour of Pinocchio (urdfdom) and yourdfpy for the example.
     """

@@ -97,7 +97,11 @@ def read_baseline(path: Path) -> Baseline:
 
 
 def baseline_text(findings: Iterable[Finding], files: Iterable[str], path: Path) -> str:
-    """Return a baseline as text; copy entries of the old baseline at `path` about other existing files."""
+    """Return a baseline as text.
+
+    If there is an older baseline at `path`, copy some of its entries: those about files that exist and are
+    not in `files`.
+    """
     counts = Counter(key_of(finding, relative(finding.file, path.parent)) for finding in findings)
     if path.exists():
         checked = {relative(file, path.parent) for file in files}
@@ -239,7 +243,7 @@ class Choice:
 
         def is_reported(finding: Finding) -> bool:
             selected = finding.code in codes and (self.notes or finding.severity is not Severity.NOTE)
-            # Each baseline must count the finding, but `any` would stop at the first match.
+            # Each baseline must count the finding. `any` would stop at the first baseline with the finding.
             return selected and not sum(baseline.knows(finding) for baseline in known)
 
         return is_reported
@@ -251,20 +255,22 @@ class Choice:
 
 
 def known_before(text: Text, version: Version, look: Callable[[Text], Examined]) -> Baseline | None:
-    """Return the findings in an older version of a file; None if no finding can be new.
+    """Return the findings in an older version of a file; return None if the file cannot have new findings.
 
-    If the text names a file that was deleted since the older version, findings about missing meshes are new.
+    An unchanged file has no new findings, with two exceptions. A xacro file can have new findings if a file
+    that it could include has changed. Findings about missing meshes are new if the text contains the name of
+    a file that was deleted since the older version.
     """
     path = Path(text.source) if is_xacro(text.source) else file_of(text)
     if path is None:
         return Baseline(Counter())
     if is_xacro(text.source):
-        # An older xacro file cannot be expanded, so every finding is new if a possible include has changed.
+        # urdfkin cannot expand the older xacro file. If a file has changed that the xacro file could include,
+        # every finding is new.
         return Baseline(Counter()) if version.changed(_PARTS) else None
     same = version.holds(text.data)
     old = text.data if same else version.read(path)
     found = () if old is None else look(replace(text, data=old)).findings
-    # The finding about a mesh is new if the mesh file was deleted after the older version.
     if any(os.fsencode(name) in text.data for name in version.gone):
         found = tuple(finding for finding in found if finding.code != MESH_MISSING.id)
     elif same:
@@ -272,7 +278,7 @@ def known_before(text: Text, version: Version, look: Callable[[Text], Examined])
     return Baseline(Counter(key_of(finding, relative(finding.file, Path())) for finding in found))
 
 
-#: Names of files that make ROS's build tools and urdfkin skip a folder.
+#: ROS's build tools and urdfkin skip a folder that contains a file with one of these names.
 LEFT_ALONE = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 
 

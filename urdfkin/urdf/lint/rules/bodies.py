@@ -18,7 +18,7 @@ INERTIAL_SCALE = Rule("URDF703", "inertial-scale", WARNING)
 #: Largest mass (kg) and largest coordinate (m) of a centre of mass that are not reported.
 HEAVIEST, FARTHEST = 1e9, 1e6
 
-#: For a mass (kg) below this number, the moments of inertia are not checked: it is probably a placeholder.
+#: A mass (kg) below this number is probably a placeholder. The moments of inertia are then not checked.
 NEGLIGIBLE = 1e-3
 
 #: Largest moment of inertia per kg (m^2) that is treated as a rounding error.
@@ -238,7 +238,8 @@ MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
     """Report missing meshes and packages.
 
-    If the path `beside` of the URDF file is unknown, only `package://` meshes are checked.
+    `beside` is the path of the URDF file. If `beside` is None, only `package://` and `model://` meshes are
+    checked.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}

@@ -100,7 +100,7 @@ _Place = tuple[Element, str | None]
 def _report_xacro(
     report: Reporter, what: str, places: Sequence[_Place], is_used: Callable[[Element], bool]
 ) -> bool:
-    """Report unexpanded xacro; return whether kinematics uses any of the `places`."""
+    """Report the unexpanded xacro at `places`; return whether kinematics uses any of these elements."""
     used = [place for place in places if is_used(place[0])]
     unused = [place for place in places if not is_used(place[0])]
     for group, severity, message in (
@@ -355,7 +355,10 @@ def _undeclared_prefixes(root: Element) -> dict[str, list[_Place]]:
 
 
 def _prefixes_of(element: Element) -> Iterator[tuple[str, str | None]]:
-    """Yield each namespace prefix with the attribute that contains it, or None for a prefix of the tag."""
+    """Yield each namespace prefix of an element, with the name of the attribute that contains the prefix.
+
+    For a prefix of the tag, yield None instead of an attribute name.
+    """
     if ":" in element.tag and not element.tag.startswith(_REPORTED):
         yield element.tag.partition(":")[0], None
     for key in element.attributes:

@@ -1,8 +1,8 @@
 """Findings of `load` about MJCF and USD: parts that a tree cannot represent, and probable mistakes.
 
-A finding names an MJCF element by the tag and the name of the element, or a USD prim by its path. The finding
-also contains the line of the element, unless the element is in an included file, in another layer, in a
-binary file, or after the first 10 MB.
+A finding names an MJCF element by the tag and the name of the element, or a USD prim by its path. urdfkin
+searches for the element in the first 10 MB of the file, and adds the line of the element to the finding. In
+included files, other layers and binary files, urdfkin does not search for elements.
 """
 
 from __future__ import annotations
@@ -43,9 +43,10 @@ MIRRORED_BODY = Rule("USD305", "mirrored-body", WARNING)
 _SEARCHED = 10_000_000
 #: Beginnings and ends of XML markup that is not an element.
 _NO_ELEMENT = {b"<!--": b"-->", b"<![CDATA[": b"]]>", b"<?": b"?>", b"<!": b">"}
-#: Tags of MJCF elements that findings mention without a name, each with the printed tag.
+#: MJCF elements that findings mention without a name: the tag in the file, and the tag in the finding.
 _NAMELESS = {"compiler": "compiler", "tendon": "tendon", "flex": "flex", "flexcomp": "flex"}
-#: Pattern for the start of a prim in a USD text file, or for a delimiter of other content.
+#: Pattern for the start of a prim in a USD text file.
+#: The pattern also matches delimiters of comments, strings, references, arrays and blocks.
 _USDA = re.compile(rb'''\b(?:def|over|class)\s+(?:[\w:]+\s+)?"([^"]*)"|#|"""|\'\'\'|"|\'|@@@|@|\[|[(){}]''')
 #: Beginnings and ends of comments, arrays, strings and references in a USD text file.
 _NO_PRIM = {
