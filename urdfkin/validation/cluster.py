@@ -61,10 +61,11 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
         threads = client.nthreads()
         dashboard = f"; dashboard: {client.dashboard_link}" if client.dashboard_link else ""
         tell(f"{len(threads)} workers{dashboard}")
-        if scheduler.startswith("tcp://"):
+        address = str(getattr(client.scheduler, "address", scheduler))
+        if not scheduler.startswith("local:") and not address.startswith("tls://"):
             tell(
-                "an address with tcp:// is not protected: anyone who reaches the scheduler can run programs;"
-                " docs/campaigns.md describes tls://"
+                "a connection without tls:// is not protected: anyone who reaches the scheduler can run"
+                " programs; docs/campaigns.md describes tls://"
             )
         yield Cluster(client)
 
