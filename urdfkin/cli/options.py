@@ -118,7 +118,10 @@ _LOAD_OPTIONS = "urdfkin.load_options"
 
 
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
-    """Return a callback that stores an option for `load_options`; `always` also stores a missing option."""
+    """Return a callback that stores an option's value for `load_options`.
+
+    With `always`, the callback also stores the value of an option that is not given.
+    """
 
     def store(context: click.Context, _: click.Parameter, value: Any) -> None:
         if always or value not in (None, ()):
@@ -399,7 +402,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that turn off the options for another robot's file format."""
+        """Return arguments of `load` that disable xacro or USD options if `source` has another format."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -441,7 +444,10 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat single rows until all arrays have the same length; raise InputError for other lengths."""
+    """Repeat each single row to the length of the longest array.
+
+    Raise InputError if an array with another number of rows is shorter than the longest array.
+    """
     import numpy as np
 
     n = max(map(len, batches))
@@ -540,7 +546,10 @@ _BASE_OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options for the motion of the root link; "qv" means pose and velocity."""
+    """Make the options for the motion of the root link.
+
+    `inputs` contains q for the pose, v for the velocity and a for the acceleration.
+    """
     return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
 
 
