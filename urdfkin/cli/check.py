@@ -135,7 +135,7 @@ def _print_summary(outcome: CheckOutcome) -> None:
         (len(outcome.silenced), "silenced by comments: {}"),
         (outcome.unchanged, "unchanged files: {}"),
         (outcome.known, "already known: {}"),
-        (outcome.gone, "in the baseline but already fixed: {}; write the baseline again"),
+        (outcome.gone, "listed in the baseline but no longer found: {}; write the baseline again"),
     ]
     details = ", ".join(text.format(count) for count, text in counts if count)
     say(summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
@@ -266,7 +266,7 @@ limit_options = combine(
 )
 @mimic_option("Check mimic joints as coupled joints, or as free joints.", "mimic")
 @root_joint_option(
-    "Also check that this root joint can be added, that is, that no joint or link has its name."
+    "With this root joint, a joint with the name root_joint or a link with the name universe is an error."
 )
 @source_options
 @settings_options

@@ -204,7 +204,7 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be a pose, such as ready.",
+        " With --joints, the first --lock may name a pose, such as ready, whose values then replace 0.",
     ),
     click.option(
         "--joints",
@@ -270,8 +270,8 @@ q_option = _values_option(
     "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready', a"
     " pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'.",
 )
-v_option = _values_option("--v", "Joint velocities, written like --q; 'neutral' is zero.")
-a_option = _values_option("--a", "Joint accelerations, written like --q; 'neutral' is zero.")
+v_option = _values_option("--v", "Joint velocities, in the format of --q; 'neutral' means zero.")
+a_option = _values_option("--a", "Joint accelerations, in the format of --q; 'neutral' means zero.")
 digits_option = click.option(
     "--digits", type=WholeNumber(3, 17), default=10, help="Number of significant digits in printed tables."
 )

@@ -120,7 +120,7 @@ def _study(
             base = draw_base(settings.samples, rng) if settings.moving_base else None
             return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
         raise InputError(
-            "the robot file has changed since its results were compared",
+            "the robot file has changed since the validation read the file",
             remedy="start the validation again when the file no longer changes",
         )
     except Exception as error:
@@ -227,7 +227,9 @@ def command(
             "--scheduler cannot be combined with --jobs or --isolate, which start processes on this machine"
         )
     if shard and any(files.values()):
-        raise click.UsageError("a shard has no report; run `urdfkin report merge`, then `urdfkin report`")
+        raise click.UsageError(
+            "--shard cannot be combined with a report file; run `urdfkin report merge`, then `urdfkin report`"
+        )
     from urdfkin.report.terminal import print_report
     from urdfkin.urdf.sources import is_xacro
     from urdfkin.validation.accuracy_store import StudySettings
