@@ -285,7 +285,7 @@ def test_findings_in_a_baseline_do_not_fail_the_check_and_new_findings_do(here: 
     arm.write_text(LONG.replace("0 0 2", "0 0 3"))  # a finding of a changed element is new
     assert found("--baseline", "known.json") == [("robots/arm.urdf", "URDF503")]
     arm.write_text(GOOD)
-    known = "already known: 1, in the baseline but already fixed: 1; write the baseline again"
+    known = "already known: 1, listed in the baseline but no longer found: 1; write the baseline again"
     assert f"({known})" in check("--baseline", "known.json").text
 
 

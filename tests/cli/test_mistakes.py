@@ -77,7 +77,7 @@ MISTAKES = {
     "export planar_two_link --frame nowhere": "nowhere",
     "validate ur5 --retry failed": "need --store",
     "validate ur5 --shard 1/2": "need --store",
-    "validate ur5 --store s --shard 1/2 --json x": "a shard has no report",
+    "validate ur5 --store s --shard 1/2 --json x": "--shard cannot be combined with a report file",
     "validate ur5 --store s --shard 3/2": "must have the form i/n",
     "validate ur5 --scheduler local:2 --jobs 2": "--scheduler cannot be combined",
     "validate ur5 --scheduler local:none": "N in local:N must be the number",

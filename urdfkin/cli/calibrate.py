@@ -144,7 +144,7 @@ def command(
 
     def answer(check: str = "", code: int = 0) -> NoReturn:
         whole = TextDocument(report.title, parts)
-        # `Answer` would add an entry `check` to a mapping, but not to a text.
+        # `data` is converted to text, because `Answer` would add an entry `check` to a mapping.
         Answer(lambda: whole, {"json": lambda: json_text(data) + "\n"}, check, code).write(format_, _FORMS)
         context.exit(code)
 

@@ -135,7 +135,7 @@ def _print_summary(outcome: CheckOutcome) -> None:
         (len(outcome.silenced), "silenced by comments: {}"),
         (outcome.unchanged, "unchanged files: {}"),
         (outcome.known, "already known: {}"),
-        (outcome.gone, "in the baseline but already fixed: {}; write the baseline again"),
+        (outcome.gone, "listed in the baseline but no longer found: {}; write the baseline again"),
     ]
     details = ", ".join(text.format(count) for count, text in counts if count)
     say(summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
@@ -266,7 +266,7 @@ limit_options = combine(
 )
 @mimic_option("Check mimic joints as coupled joints, or as free joints.", "mimic")
 @root_joint_option(
-    "Also check that this root joint can be added, that is, that no joint or link has its name."
+    "With this root joint, a joint with the name root_joint or a link with the name universe is an error."
 )
 @source_options
 @settings_options
@@ -290,7 +290,7 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
       urdfkin check --statistics
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
-    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
+    """  # noqa: D301  not a raw string, because click needs the backspace to leave the paragraph unwrapped
     if options["fix"] and options["diff"]:
         reject_unused_options(context, ("fix",), "with --diff")
     if not (options["fix"] or options["diff"]):
@@ -368,7 +368,7 @@ class CheckRun:
 
     Attributes:
         fold: Whether findings with the same code share a line of output.
-        accepts_all: Whether --write-baseline accepts all findings, so that no finding is a failure.
+        accepts_all: True with --write-baseline. A finding then does not change the exit code.
     """
 
     look: partial[Examined]
@@ -443,10 +443,10 @@ class CheckRun:
         self.outcome.add(file, Examined(text, data, None, findings, ()))
 
     def _is_unchanged(self, file: str, suffixes: tuple[str, ...], version: Version) -> bool:
-        """Return whether a file and all files that the file may include are the same as in `version`.
+        """Return whether a file, and each file that it may include, is the same as in `version`.
 
-        The function assumes that the file includes every file of the repository with a suffix in `suffixes`,
-        and every deleted file whose name occurs in the text.
+        Every file of `version` with a suffix in `suffixes` counts as included. A deleted file also counts as
+        included if its name occurs in the text.
         """
         if suffixes not in self._changed:
             self._changed[suffixes] = version.changed(suffixes)

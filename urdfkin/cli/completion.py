@@ -1,4 +1,4 @@
-"""Complete commands, options, robots, files, frames, tables, codes and equations in a shell.
+"""Complete commands, options, robots, files, frames, tables, finding codes and equation numbers in a shell.
 
 Completion runs at each press of the Tab key, so completion imports no large package. A name in a malicious
 file, such as `$(...)`, could make the shell run a command. Completion therefore offers only names without
@@ -97,9 +97,10 @@ def _frames(word: str) -> Iterator[str]:
 def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> None:
     """Print the completion script for a shell.
 
-    The script completes commands, options and their choices, robots and files, the frames of the robot on the
-    command line, reference tables, codes and equations. Frames are read from a URDF or MJCF file; a .xacro
-    file is not expanded. To activate the script, add the line for your shell to its startup file:
+    The script completes commands, options and the choices of options. It also completes robots, files, the
+    frames of the robot on the command line, reference tables, codes of findings and numbers of equations.
+    Frames are read from a URDF or MJCF file; a .xacro file is not expanded. To activate the script, add the
+    line for your shell to its startup file:
 
     \b
     bash  ~/.bashrc   eval "$(urdfkin completion bash)"
@@ -109,7 +110,7 @@ def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> No
     \b
     Example:
       urdfkin completion bash
-    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
+    """  # noqa: D301  not a raw string, because click needs the backspace to leave the paragraph unwrapped
     script = get_completion_class(shell)
     # The script sets the variable _URDFKIN_COMPLETE, so that click prints completions.
     say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())

@@ -43,7 +43,8 @@ _FORMATS_OF_SEVERAL = ("terminal", "markdown", "latex", "json")
 #: Formats in which the result of the check is printed below the table
 _PRINTED = ("terminal", "markdown")
 _TEXTS = (*_PRINTED, "html", "latex")
-#: Number of digits of the base and tool transforms in formats with rounded numbers; None: as in --digits
+#: Number of significant digits of the base and tool transforms in formats with rounded numbers.
+#: None means the value of --digits.
 _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 
 
@@ -51,7 +52,8 @@ _ROUNDED = {"terminal": None, "markdown": None, "latex": 6}
 class DHRequest:
     """The options of `urdfkin dh`; `choices` are arguments of `Robot.dh`.
 
-    If ROBOT is a table file, and no option changes the rows, `unchanged` is this file.
+    `unchanged` is the table file if ROBOT is a table file and no option changes the rows. Otherwise,
+    `unchanged` is None.
     """
 
     robot: Robot
@@ -131,7 +133,7 @@ def _make_table(request: DHRequest, tip: str | None, snap: float) -> DHTable:
     robot, base = request.robot, request.base
     if request.unchanged is not None:
         table = read_table_or_screws(at_home(request.unchanged))
-        # For screws, the code below derives a table with `Robot.dh`, as for a URDF.
+        # If the file contains screws, `Robot.dh` derives a table at the end of this function.
         if isinstance(table, DHTable):
             return to_convention(table, request.convention or table.convention)
     like = None

@@ -41,8 +41,8 @@ from urdfkin.export import FORMS, LANGUAGES, QUANTITIES
     "--form",
     type=click.Choice(tuple(FORMS)),
     default="tree",
-    help="Description of the robot on which the code is based: the joints of the URDF (tree), a"
-    " Denavit-Hartenberg table (dh), or screws.",
+    help="Robot description from which the code is made: the joints of the URDF (tree), a Denavit-Hartenberg"
+    " table (dh), or screws.",
 )
 @click.option(
     "--name",

@@ -118,7 +118,10 @@ _LOAD_OPTIONS = "urdfkin.load_options"
 
 
 def _store_as(name: str, read: Callable[[Any], Any] | None = None, *, always: bool = False) -> Any:
-    """Return a callback that stores an option for `load_options`; `always` also stores a missing option."""
+    """Return a callback that stores an option's value for `load_options`.
+
+    With `always`, the callback also stores the value of an option that is not given.
+    """
 
     def store(context: click.Context, _: click.Parameter, value: Any) -> None:
         if always or value not in (None, ()):
@@ -201,7 +204,7 @@ robot_options = combine(
         expose_value=False,
         callback=_store_as("lock", ", ".join),
         help="Fix a joint at a value, so that q, v and the Jacobian have no entry for this joint; repeatable."
-        " With --joints, the first --lock may be a pose, such as ready.",
+        " With --joints, the first --lock may name a pose, such as ready, whose values then replace 0.",
     ),
     click.option(
         "--joints",
@@ -267,8 +270,8 @@ q_option = _values_option(
     "Configuration: numbers '0,30deg,pi/2', names 'shoulder=30deg,elbow=0.5', a pose 'neutral' or 'ready', a"
     " pose with changes 'ready,elbow=0.5', a batch '@FILE.csv', 'random' or 'random:N'.",
 )
-v_option = _values_option("--v", "Joint velocities, written like --q; 'neutral' is zero.")
-a_option = _values_option("--a", "Joint accelerations, written like --q; 'neutral' is zero.")
+v_option = _values_option("--v", "Joint velocities, in the format of --q; 'neutral' means zero.")
+a_option = _values_option("--a", "Joint accelerations, in the format of --q; 'neutral' means zero.")
 digits_option = click.option(
     "--digits", type=WholeNumber(3, 17), default=10, help="Number of significant digits in printed tables."
 )
@@ -399,7 +402,7 @@ def load_several(*sources: str) -> tuple[Robot, ...]:
         raise click.UsageError("only one of the robots can come from standard input")
 
     def without_options_of_others(source: str) -> dict[str, Any]:
-        """Return arguments of `load` that turn off the options for another robot's file format."""
+        """Return arguments of `load` that disable xacro or USD options if `source` has another format."""
         none: dict[str, Any] = {}
         if not is_xacro(source) and any(map(is_xacro, sources)):
             none["xacro_args"] = None
@@ -441,7 +444,10 @@ def read_inputs(
 
 
 def _repeat_single(problem: str, batches: Sequence[FloatArray]) -> list[FloatArray]:
-    """Repeat single rows until all arrays have the same length; raise InputError for other lengths."""
+    """Repeat each single row to the length of the longest array.
+
+    Raise InputError if an array with another number of rows is shorter than the longest array.
+    """
     import numpy as np
 
     n = max(map(len, batches))
@@ -540,7 +546,10 @@ _BASE_OPTIONS = {
 
 
 def base_options(inputs: str) -> Callable[[_F], _F]:
-    """Make the options for the motion of the root link; "qv" means pose and velocity."""
+    """Make the options for the motion of the root link.
+
+    `inputs` contains q for the pose, v for the velocity and a for the acceleration.
+    """
     return combine(*(_BASE_OPTIONS[letter] for letter in inputs))
 
 

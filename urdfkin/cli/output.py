@@ -60,11 +60,12 @@ class Answer:
     """The result of a command.
 
     Attributes:
-        document: Returns the result as text and tables, for the formats in `TEXTS`.
-        data: For each other format, a function that returns the result: a mapping for JSON, rows for CSV, an
-            array for npy, otherwise text. A function for a format in `TEXTS` replaces `document`.
+        document: Function that returns a document with texts and tables, for the formats in `TEXTS`.
+        data: A function for each other format. The function returns a mapping for JSON, rows for CSV, an
+            array for npy, or the output as text. If `data` has a function for a format in `TEXTS`, this
+            function is used instead of `document`.
         check: Last line of the output, for example "verified by Pinocchio: ..."; "" if nothing is checked.
-        fitted: Returns a document that fits the width of a terminal. None: use `document`.
+        fitted: Function that returns a document that fits the width of a terminal. None: use `document`.
     """
 
     document: Callable[[], TextDocument]
@@ -81,7 +82,7 @@ class Answer:
             out.print(self.check, style="bold yellow" if self.code else "green")
 
     def convert(self, form: str) -> tuple[bytes | str, bool]:
-        """Return the result in the format `form`, and whether this result contains `check`."""
+        """Return the result in the format `form`, and whether the result includes the line `check`."""
         if form in self.data:
             data = self.data[form]()
             has_check = form == "json" and isinstance(data, Mapping)
@@ -183,7 +184,7 @@ def check_writable(*paths: Path | None) -> None:
     """Raise SourceError before a long computation if an output file cannot be written."""
     for path in filter(None, paths):
         try:
-            # A device is written without a temporary file.
+            # `write_file` writes to a device or a pipe directly, without a temporary file.
             if path.exists() and not path.is_file():
                 continue
             with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}."):
@@ -214,7 +215,7 @@ def exit_code(certificate: Certificate) -> int:
 
 
 def check_of_path(check: object | None) -> tuple[str, int]:
-    """Return the last line of the output and the exit code for a `TableCheck` or a similar result."""
+    """Return the last line of the output and the exit code; `check` is None if nothing was checked."""
     from urdfkin.verify.pinocchio import version
 
     by = f"Pinocchio {version()}"

@@ -50,13 +50,13 @@ PANELS = (
     "start",
     default="neutral",
     metavar="VALUES",
-    help="With --to: start of the line in joint space, written like --q of other commands.",
+    help="With --to: configuration at the start of the line, in the format of --q of other commands.",
 )
 @click.option(
     "--to",
     "end",
     metavar="VALUES",
-    help="Plot a straight line in joint space that ends at this configuration, written like --q of other"
+    help="Plot a straight line in joint space that ends at this configuration, in the format of --q of other"
     " commands.",
 )
 @click.option(
@@ -65,7 +65,7 @@ PANELS = (
     default=1.0,
     help="With --to: duration of the motion in seconds.",
 )
-@samples_option(201, "With --to: number of samples of the line.", least=3)
+@samples_option(201, "With --to: number of samples along the line.", least=3)
 @seed_option
 @click.option(
     "--panel",

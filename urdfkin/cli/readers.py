@@ -33,9 +33,9 @@ def command(robot: str, libraries: str | None, samples: int, seed: int) -> Answe
 
     The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
     Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each
-    library reads the file in its own process. The poses of all links are compared with urdfkin's. If a
-    library reads a joint differently, the command names the element of the file that causes the difference,
-    for example the joint's `axis`.
+    library reads the file in its own process. The command compares the poses of all links with urdfkin's
+    poses. If a library reads a joint differently, the command names the element of the file that causes the
+    difference, for example the joint's `axis`.
 
     Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
     """

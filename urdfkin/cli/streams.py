@@ -1,4 +1,4 @@
-"""Protect the standard streams against failures, and against control characters in names.
+"""Write to the standard streams without tracebacks, and escape control characters in names.
 
 Standard output may be closed, a file on a full disk, or a pipe to a program that exits early. The
 encoding of standard output may not support every character of a joint's name. In each of these cases, the
@@ -34,12 +34,13 @@ def prepare() -> None:
     sys.stdout = _with_errors(sys.stdout, 1)
     sys.stderr = _with_errors(sys.stderr, 2)
     warnings.showwarning = _show_warning
-    # Commands print their own line about joint values that look like degrees, so the warning is hidden.
+    # Commands print their own line about joint values that look like degrees. Therefore, DegreesWarning is
+    # hidden.
     warnings.filterwarnings("ignore", category=DegreesWarning)
 
 
 def finish() -> None:
-    """Flush standard output while a SourceError can still be reported."""
+    """Flush standard output now, so that the caller can report a failed write."""
     sys.stdout.flush()
 
 
@@ -88,8 +89,8 @@ def _with_errors(stream: Any, descriptor: int) -> Any:
 def _open_closed_streams() -> None:
     """Open the null device for each closed stream, so that no other file gets the stream's descriptor.
 
-    The null device is opened for writing as standard input, and for reading as standard output. Reading and
-    writing therefore fail as on a closed stream. Text for standard error is lost.
+    Standard input becomes write-only, and standard output becomes read-only. Reading from standard input and
+    writing to standard output therefore fail, as on a closed stream. Text for standard error is lost.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -113,15 +114,17 @@ def _show_warning(
 
 #: Escape sequences that the package rich writes for colours and for progress bars
 _STYLE = re.compile(r"(\x1b\[[0-9;?]*[A-Za-z]|\r)")
-#: Maximum length of a stored unfinished line; the next piece of text may complete a CI command
+#: Maximum length of an unfinished line that is stored whole. The next piece of text may complete a CI command
+#: that begins in this line.
 _MOST_STORED = 64
 
 
 class SafeStream:
     """A text stream that escapes control characters and CI commands.
 
-    With `styled`, escape sequences for colours are kept, so the caller must escape names first. `encoding` is
-    the encoding that this stream reports. Bytes can be written to the attribute `buffer`, without escapes.
+    With `styled`, the stream does not escape the escape sequences for colours. The caller must therefore
+    escape control characters in names. `encoding` is the encoding that this stream reports. Bytes can be
+    written to the attribute `buffer`, without escapes.
     """
 
     def __init__(self, stream: TextIO, *, styled: bool = False, encoding: str | None = None) -> None:
@@ -146,7 +149,10 @@ class SafeStream:
         self.stream.buffer.flush()
 
     def escaped_file(self, text: str) -> str:
-        """Return the text that `write_file` writes; a carriage return at the end of a line is not escaped."""
+        """Return the text that `write_file` writes for `text`.
+
+        A carriage return at the end of a line is not escaped.
+        """
         *lines, last = text.split("\n")
         plain = [_plain(line.removesuffix("\r")) + "\r" * line.endswith("\r") for line in lines]
         return self._without_commands("\n".join([*plain, _plain(last)]))
@@ -213,7 +219,7 @@ def say_file(text: str) -> None:
 
 
 def harmless(text: str) -> str:
-    """Return a text as `say_file` would print it."""
+    """Escape a text in the same way as `say_file`, but do not print the text."""
     return SafeStream(sys.stdout).escaped_file(text)
 
 

@@ -51,8 +51,9 @@ def study_all(
 ) -> ValidationReport:
     """Run the accuracy study of each compared robot, and return the report with the results of the study.
 
-    `report` is the report of `validate` for the robots `given`. `how` are arguments of `load`. With `shard`,
-    only robots whose first samples belong to the shard are studied. An interrupt skips the remaining robots.
+    `given` are the validated robots, and `report` is their validation report. `how` are arguments of `load`.
+    `shard` is a part of the validation, for example "1/4". With `shard`, only robots whose first samples
+    belong to this part are studied. An interrupt skips the remaining robots.
     """
     from urdfkin.validation.accuracy_store import FailedStudy
     from urdfkin.validation.campaign import chunks_of_shard
@@ -84,7 +85,7 @@ def study_all(
 def _open_results(
     folder: Path | None, settings: StudySettings, shard: str | None
 ) -> Iterator[AccuracyResult | None]:
-    """Lock a store, or one shard of the store, and yield the stored accuracy results."""
+    """Lock the results in `folder`, or only those of `shard`, and yield the stored accuracy results."""
     if folder is None:
         yield None
         return
@@ -119,7 +120,7 @@ def _study(
             base = draw_base(settings.samples, rng) if settings.moving_base else None
             return accuracy_study(robot.read(), samples=settings.samples, seed=settings.seed, base=base), True
         raise InputError(
-            "the robot file has changed since its results were compared",
+            "the robot file has changed since the validation read the file",
             remedy="start the validation again when the file no longer changes",
         )
     except Exception as error:
@@ -199,13 +200,15 @@ def command(
 ) -> None:
     """Compare every frame and joint with Pinocchio in all three reference frames, on many samples.
 
-    Compared: {compared}. Not compared: {not_compared}. Quantities that are not compared here are checked
-    whenever urdfkin computes them.
+    Compared: {compared}. Not compared: {not_compared}. By default, urdfkin checks each of these quantities
+    whenever a command computes the quantity.
 
     Configurations are random within the joint limits. The command adds the neutral configuration, and the
     configurations in which all joints are at their lower or upper limits. In every eighth sample, joint
-    velocities and accelerations are a hundred times larger than in the others. Disagreements are in multiples
-    of eps * scale, where eps is 2.2e-16; rounding alone gives 1 to 10.
+    velocities and accelerations are a hundred times larger than in the others.
+
+    Disagreements are in multiples of eps * scale. Here eps is 2.2e-16, and scale is the size of the terms
+    that are added to compute the number. Rounding alone gives 1 to 10.
 
     With --store, the same command resumes an interrupted run, and `urdfkin report DIR` shows the report at
     any time.
@@ -224,7 +227,9 @@ def command(
             "--scheduler cannot be combined with --jobs or --isolate, which start processes on this machine"
         )
     if shard and any(files.values()):
-        raise click.UsageError("a shard has no report; run `urdfkin report merge`, then `urdfkin report`")
+        raise click.UsageError(
+            "--shard cannot be combined with a report file; run `urdfkin report merge`, then `urdfkin report`"
+        )
     from urdfkin.report.terminal import print_report
     from urdfkin.urdf.sources import is_xacro
     from urdfkin.validation.accuracy_store import StudySettings

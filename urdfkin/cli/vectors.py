@@ -37,7 +37,8 @@ def vectors_command() -> None:
 @click.option(
     "--catalogue/--no-catalogue",
     default=True,
-    help="Without ROBOT: also write the robots of the catalogue; they refer to files of example-robot-data.",
+    help="Without ROBOT: also write test vectors for the robots of the catalogue. These test vectors refer to"
+    " files of example-robot-data.",
 )
 @samples_option(3, "Number of configurations of each robot; the first one is zero.", least=1, most=1000)
 @schema_option("urdfkin.validation.vectors:VECTORS", "the files")

@@ -57,8 +57,8 @@ _QUANTITIES = ("placement", "velocity", "jacobian", "jacobian-rate", "hessian", 
     "--factor",
     type=NumberInRange(min=0, min_open=True),
     default=1.0,
-    help="Multiply the error bound by this factor, for a function with more rounding operations than the"
-    " textbook's recursion.",
+    help="Multiply the error bound by this factor. A function with more rounding operations than urdfkin's"
+    " recursion may need a factor above 1.",
 )
 @click.option(
     "--batch", is_flag=True, help="Call the function with n configurations at once: q is an array (n, nq)."
