@@ -325,7 +325,7 @@ def locked_values(
             raise InputError("a joint to lock is also in the list joints", where="lock", found=listed(twice))
         chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
-        remedy = "write NAME=VALUE, or name the joints that remain movable in joints (--joints)"
+        remedy = "write NAME=VALUE, or use joints (--joints) to list the joints that remain movable"
         raise InputError(
             "a pose does not state which joints to lock",
             where="lock",
