@@ -40,7 +40,8 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Largest absolute value of an end of a sampled range (rad or m); this value also replaces a missing limit.
+#: Sampled ranges are cut off at +-`WIDEST` (rad or m). A missing limit is replaced by +-`WIDEST`.
+#: The range of a continuous joint is -pi to pi.
 WIDEST = 10.0
 
 
@@ -170,7 +171,8 @@ def _rounded_outwards(limit: Limit) -> tuple[float, float]:
 _MIMIC_TOLERANCE = 1e-9
 
 
-#: Suffix and unit of each number of a joint with several numbers in q or v.
+#: Suffix and unit of each coordinate of a planar or floating joint.
+#: `_OF_RATES` contains the suffixes and units of the joint velocities of these joints.
 _OF_Q = {
     JointKind.PLANAR: {"x": "m", "y": "m", "angle": "rad"},
     JointKind.FLOATING: {"x": "m", "y": "m", "z": "m", "qx": "", "qy": "", "qz": "", "qw": ""},
@@ -247,7 +249,10 @@ def _without_coordinate(tree: KinematicTree) -> dict[str, Hint]:
 
 
 def _other_lengths(tree: KinematicTree, what: str) -> dict[int, Hint]:
-    """Return hints for wrong lengths: the lengths in Pinocchio, and the length with all mimic joints."""
+    """Return hints for wrong lengths of q, v or a that users often pass.
+
+    These are the lengths of Pinocchio's vectors, and the length of a vector that includes the mimic joints.
+    """
     has_mimic_joints = any(joint.mimic for joint in tree.joints)
     leave_out = Hint(
         "leave out the mimic joints, which have no coordinate, or load with mimic=False (--no-mimic)",
@@ -308,7 +313,7 @@ def locked_values(
 
     Without `joints`, only the joints in `lock` are locked. `joints` lists the joints that stay movable. Every
     other joint is then locked at its value in `lock`, or at 0 if `lock` has no value. If `joints` is given,
-    `lock` may begin with the name of a pose, whose values then replace 0. An unknown name raises
+    `lock` may begin with the name of a pose. The values of the pose then replace 0. An unknown name raises
     UnknownNameError. Any other invalid lock, for example a value outside the limits, raises InputError.
     """
     layout = coordinate_layout(tree, "q")
@@ -320,7 +325,7 @@ def locked_values(
             raise InputError("a joint to lock is also in the list joints", where="lock", found=listed(twice))
         chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
-        remedy = "write NAME=VALUE, or name the joints that remain movable in joints (--joints)"
+        remedy = "write NAME=VALUE, or use joints (--joints) to list the joints that remain movable"
         raise InputError(
             "a pose does not state which joints to lock",
             where="lock",

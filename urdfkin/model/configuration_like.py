@@ -50,7 +50,7 @@ class CoordinateLayout:
         what: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and their count.
-        otherwise: Returns a hint for each name that is not a coordinate, such as a fixed joint.
+        otherwise: Returns a hint for each joint without a coordinate, such as a fixed joint.
         lengths: Returns a hint for wrong lengths that users often pass, such as the length of Pinocchio's q.
     """
 
@@ -85,7 +85,9 @@ with a configuration: 'neutral, elbow=...'
     def named(
         self, value: str | Mapping[str, ArrayLike], where: str
     ) -> tuple[dict[str, ArrayLike], FloatArray | None]:
-        """Return the values of a text or mapping by name, and the pose that begins the text, or None.
+        """Return the values of a text or mapping by name, and the named pose (n,) or None.
+
+        A text such as `ready, elbow=pi/2` begins with the name of a pose.
 
         >>> CoordinateLayout("q", ("elbow",), ("rad",)).named("elbow=30deg", "q")
         ({'elbow': '30deg'}, None)
@@ -280,5 +282,8 @@ def _pair(cell: str) -> tuple[str | None, str]:
 
 
 def _is_word(text: str) -> bool:
-    """Return whether a text can be the name of a pose, because the text does not look like a number."""
+    """Return whether a text can be the name of a pose.
+
+    Such a text begins with a letter, contains no `=`, and does not look like a number.
+    """
     return text[:1].isalpha() and "=" not in text and parse_quantity(text) is None and remedy(text) is None

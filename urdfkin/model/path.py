@@ -7,7 +7,8 @@ form. The amounts x_k (rad or m) are joint values, cells of a table, or paramete
 the path's end. The derivative of the end's pose with respect to x_k is a twist (dp/dx_k, w). Let e be the
 direction of the axis of E_k, and O a point of this axis, both in the first frame of the path. The twist is
 
-    rotation   dp/dx = e x (p - O),   w = e;       translation   dp/dx = e,   w = 0
+    for a rotation:      dp/dx = e x (p - O),   w = e
+    for a translation:   dp/dx = e,             w = 0
 
 This twist is a column of the Jacobian in equation 7.85.
 """
@@ -29,7 +30,10 @@ _IDENTITY = np.eye(4)
 
 @dataclass(frozen=True, slots=True)
 class ElementaryMotion:
-    """A rotation about a coordinate axis (0 is x, 1 is y, 2 is z) of the current frame, or a translation."""
+    """A rotation about, or a translation along, a coordinate axis of the current frame.
+
+    The value of `axis` is 0 for the x axis, 1 for y and 2 for z.
+    """
 
     axis: int
     turns: bool
@@ -49,7 +53,7 @@ class Path:
     steps: tuple[FloatArray | ElementaryMotion, ...]
 
     def frames(self, amounts: ArrayLike) -> FloatArray:
-        """Return the poses (..., steps, 4, 4) after each step, for amounts (..., motions) in rad or m."""
+        """Return the poses (..., steps, 4, 4) after each step; `amounts` (..., motions) are in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         frames = np.empty((*amounts.shape[:-1], len(self.steps), 4, 4))
         for i, T in enumerate(self._after_each_step(amounts)):
@@ -72,7 +76,7 @@ class Path:
             yield T
 
     def poses(self, amounts: ArrayLike) -> FloatArray:
-        """Return the pose (..., 4, 4) at the end of the path, for amounts (..., motions) in rad or m."""
+        """Return the pose (..., 4, 4) at the end of the path; `amounts` (..., motions) are in rad or m."""
         amounts = np.asarray(amounts, np.float64)
         T: FloatArray = np.broadcast_to(_IDENTITY, (*amounts.shape[:-1], 4, 4))
         for T in self._after_each_step(amounts):  # noqa: B007

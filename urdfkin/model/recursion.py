@@ -1,7 +1,7 @@
 """The forward recursion of section 7.7, and the quantities of a frame, for any kind of number.
 
-The attribute `Recursion.eq` contains the textbook's equations for one kind of number
-(`urdfkin.kinematics.arithmetic.bound`).
+The kind of number depends on the attribute `Recursion.eq`. This attribute contains the textbook's equations;
+`urdfkin.kinematics.arithmetic.bound` makes them for a kind of number.
 """
 
 from __future__ import annotations

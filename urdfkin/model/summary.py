@@ -11,7 +11,7 @@ from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
-#: Indices of the text columns in the table whose first columns are link and joint.
+#: Indices of the left-aligned columns in the table of `described`. Its first columns are link and joint.
 WORDS = (0, 1, 2, 3, 4, 5, 9)
 _WORDS_OF_JOINTS = (0, 1, 2, *(i + 1 for i in WORDS[2:]))
 

@@ -3,11 +3,11 @@
 Joints at two matched bodies are paired by the names that the user gives, by equal names, or by geometry.
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
-the other subtree. Links with equal labels must also coincide. The multipliers of the mimic rules must
-correspond, unless `Congruence.ignore_rules` was called. The value of the joint before a subtree does not
-matter, because the joint's zero offset can compensate any value. Therefore, the result depends only on the
-two joints before the subtrees, and on the pose of one joint's axis relative to the other. `Congruence` stores
-the result of each such case, so that the search is fast even for long chains.
+the other subtree. Links with equal labels (by default, equal names) must also coincide. The multipliers of
+the mimic rules must correspond, unless `Congruence.ignore_rules` was called. The value of the joint before a
+subtree does not matter, because the joint's zero offset can compensate any value. Therefore, the result
+depends only on the two joints before the subtrees, and on the pose of one joint's axis relative to the other.
+`Congruence` stores the result of each such case, so that the search is fast even for long chains.
 """
 
 from __future__ import annotations
@@ -245,7 +245,7 @@ class Axis:
         return Axis(self.screw.moved(T), self.turns, self.reference.moved(T))
 
     def height(self, u: FloatArray) -> float | None:
-        """Return the coordinate (m) along u of the reference line's point nearest to the axis.
+        """Return the coordinate u . p (m), where p is the point of the reference line nearest to the axis.
 
         The result is None for a prismatic joint, and for parallel lines.
         """
@@ -259,7 +259,10 @@ class Axis:
 
 
 def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield values (rad or m) for which a joint with the axis u may move the axis `theirs` to `ours`."""
+    """Yield values (rad or m) of a joint that may move the axis `theirs` to the axis `ours`.
+
+    The axis of this joint is u.
+    """
     if not turns:
         heights = ours.height(u.direction), theirs.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
@@ -280,7 +283,10 @@ def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator
 def later_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], reference: Both[Screw]
 ) -> Iterator[Both[Axis]]:
-    """Yield pairs of axes at two bodies; after an axis parallel to `reference`, also the next axes."""
+    """Yield the pairs of joint axes at two bodies.
+
+    If the axis of A is parallel to its `reference` line, the pairs at the bodies after the two joints follow.
+    """
     for e, f in _next_joints(mechanisms, via, bodies):
         axes = _axis(mechanisms[0], e, reference[0]), _axis(mechanisms[1], f, reference[1])
         yield axes
@@ -291,7 +297,10 @@ def later_axes(
 
 
 def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align an axis of B, and if possible later axes, with axes of A."""
+    """Yield poses of B's root that align an axis of B with an axis of A.
+
+    If possible, the poses also align the axes of other joints.
+    """
     firsts = _first_axes((a, b), (None, None), bodies, ())
     for (ours, theirs), before, after in firsts:
         lines = ours.screw, theirs.screw
@@ -308,7 +317,10 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
 def root_poses_by_siblings(
     a: Mechanism, b: Mechanism, bodies: Both[int], alike: Callable[[Edge, Edge], bool]
 ) -> Iterator[FloatArray]:
-    """Yield poses of B's root that align up to three joint axes at two bodies."""
+    """Yield poses of B's root that align up to three joint axes of a body of B with axes of a body of A.
+
+    If these axes do not determine the shift along the first axis, the axes of later joints determine it.
+    """
     edges = _with_axes(a, bodies[0])
     ours = [_axis(a, edge) for edge in edges]
     turning = [i for i, axis in enumerate(ours) if axis.turns]
@@ -332,7 +344,8 @@ def root_poses_by_siblings(
             more = [
                 pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
             ]
-            # `Axis.height` is None for a prismatic joint, so later axes must determine the shift.
+            # The axis of a prismatic joint has no position.
+            # So the axes of the next joints must determine the shift along u.
             if not ours[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
@@ -360,9 +373,10 @@ def _guesses(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: boo
 def _first_axes(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int], near: tuple[Both[Axis], ...]
 ) -> list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]:
-    """Return the first pairs of revolute axes, each with the pairs of axes before and after this pair.
+    """Return the first pair of revolute axes of each pair of branches of A and B.
 
-    If only pairs of prismatic axes follow, the function returns the last pair.
+    Each item contains this pair, the pairs of prismatic axes before it, and the pairs of axes after it. If
+    two branches have only pairs of prismatic axes, the last of these pairs replaces the revolute pair.
     """
     found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
@@ -397,7 +411,7 @@ def _axis(mechanism: Mechanism, edge: Edge, reference: Screw | None = None) -> A
 #: The arguments are the bodies after the joints, the joints, and the pose of B's body before the joints.
 Poses = Callable[[tuple[int, int], Pair, FloatArray], Iterable[FloatArray]]
 
-#: Maximum number of joint pairs at two bodies that the search for exact matches tries.
+#: Maximum number of joint pairs that the search for an exact match tries at two bodies.
 MOST_ASSIGNMENTS = 5000
 
 #: For each coordinate of A: the matching coordinate of B, and B's velocity divided by A's velocity.

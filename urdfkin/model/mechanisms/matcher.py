@@ -58,7 +58,7 @@ AHEAD = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
 #: If two scores have equally many matches, their largest differences are compared.
-#: The better score has less than this fraction of the other score's difference.
+#: A score is better if its difference is less than `TWICE_AS_WELL` times the difference of the other score.
 TWICE_AS_WELL = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -69,7 +69,10 @@ Score = tuple[int, float]
 
 @dataclass(slots=True)
 class LookAhead:
-    """Remaining number of joint pairs that one or several matchers together may compare ahead."""
+    """Number of joint pairs beyond the current joint that may still be compared.
+
+    Several matchers can share this number.
+    """
 
     left: int
 
@@ -131,7 +134,10 @@ class MechanismMatcher:
         return best
 
     def _starts(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
-        """Yield pairs of first bodies, each with a pose of B's root in A's root frame."""
+        """Yield the bodies of A and B from which the matcher may start.
+
+        Each pair of bodies comes with a pose (4, 4) of B's root in A's root frame.
+        """
         if self.choices is not None:
             names = self.choices.base
             base = next(self._start_bodies())
@@ -159,10 +165,11 @@ class MechanismMatcher:
                     yield base, X
 
     def _most_matches(self, base: tuple[int, int]) -> int:
-        """Return an upper bound on the number of matches from the first bodies `base`.
+        """Return an upper bound on the number of matches if the matcher starts at the bodies `base`.
 
-        Two matched branches have at most as many matches as the smaller branch has joints and links. The sum
-        of matches over all branches is largest if the branches are matched in the order of their sizes.
+        In two matched branches, the number of joint pairs is at most the smaller number of joints. The same
+        holds for links. The sum over all branches is largest if the branches are matched in the order of
+        their sizes.
         """
         most = min(len(self.a.bodies[base[0]]), len(self.b.bodies[base[1]]))
         for k in (0, 1):
@@ -210,7 +217,7 @@ class MechanismMatcher:
             yield 0, theirs
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
-        # B's root body can correspond to a later body of A, for example after a floating root joint.
+        # B's root body can correspond to a body of A that follows a joint, such as a floating root joint.
         ours = _most_shared(self.b, self.a)
         if ours is not None:
             yield ours, 0
@@ -283,9 +290,10 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, distance))
 
     def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """If no links match, return two links as different end-effector frames.
+        """Return two links as a pair of different end-effector frames if no links of two bodies match.
 
-        The result is None if links match, or if the other model has all link names of a body.
+        The result is None if links of the two bodies match. The result is also None if every link name of one
+        body occurs in the other model.
         """
         ours, theirs = self._own_links(place)
         if matched or not ours or not theirs:
@@ -390,8 +398,8 @@ class MechanismMatcher:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
         `at` (4, 4) is the frame of A's joint after the motion G. `home_b` (4, 4) is the frame of B's joint in
-        B's zero configuration. `plane` is one possible N of a planar joint, and None for a floating joint.
-        Every possible N of a planar joint is the product of `plane` and a planar pose.
+        B's zero configuration. For a floating joint, `plane` is None. For a planar joint, `plane` (4, 4) is
+        one possible motion N, and every possible N is the product of `plane` and a planar pose.
         """
         yield IDENTITY if plane is None else plane
         wanted = [there.XC]
@@ -425,7 +433,7 @@ class MechanismMatcher:
                 zero = 0.0 if self.tolerance.holds(*pose_difference(place.XC, exact)) else zero
             offset, there, score = self._best_zero(there, place.G, t, turns, zero, depth)
             return replace(step, offset=offset), there, score
-        # Either all bodies after the joint also have a different pose in B, or only the axis differs.
+        # In B, either the axis and all later bodies are moved by K, or only the axis is moved.
         step, back = replace(step, tilt=tilt, shift=shift), inverse(place.G)
         with_bodies = self._best_zero(there, K @ place.G, t, turns, zero, depth)
         if depth == AHEAD:
@@ -544,7 +552,7 @@ def better(score: Score, than: Score) -> bool:
 
 
 def _outwards(screw: Screw, backwards: bool) -> Screw:
-    """Return the screw that describes the motion of the body farther from the base."""
+    """Return a joint's screw, reversed if the matcher crosses the joint from the child to the parent."""
     return screw.reversed() if backwards else screw
 
 
@@ -566,9 +574,10 @@ def _all_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[
 
 
 def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return the smallest rotation between two planes, its angle (rad), and a shift of 0 m.
+    """Return the smallest rotation (4, 4) that makes two planes parallel, its angle (rad), and 0.0.
 
-    The signs of the normals and the distance of the planes do not count.
+    The angle does not depend on the signs of the normals or the distance between the planes. The last value
+    is the shift (m), which is always 0 for planes.
     """
     start, end = (Screw(T[:3, 2], T[:3, 3]) for T in (at, seen))
     return smallest_motion(
@@ -578,7 +587,7 @@ def _normals_apart(at: FloatArray, seen: FloatArray) -> tuple[FloatArray, float,
 
 #: Maximum number of joint orders that are tried; five prismatic joints have 120 possible orders.
 MOST_ORDERS = 120
-#: Maximum number of joint pairs that one search compares ahead of the current joint.
+#: After this number of joint pairs, a search no longer compares joints beyond the current joint.
 #: Without names, the robot TALOS needs 500 pairs, and Baxter needs 1,000.
 MOST_AHEAD = 2000
 #: Larger angle tolerances (rad) that are tried in this order if A and B differ.
@@ -704,8 +713,8 @@ class _Rule:
     Attributes:
         slope: The product s m.
         constant: The product s c.
-        free: Whether any o is possible, because no link and no axis after the joint determines o.
-        meets: Whether matched links, or an axis that the joint moves, follow the joint.
+        free: Whether o can have any value, because no link and no axis after the joint determines o.
+        meets: Whether the joint moves a pair of matched links, or the axis of a later joint.
     """
 
     step: int
@@ -738,7 +747,8 @@ def zeros_by_rules(alignment: Alignment, tolerance: Tolerance) -> Mapping[str, t
     zeros = dict[str, tuple[int, float]]()
     for rules in _groups(alignment):
         alphas = [rule.slope / rule.n for rule in rules if rule.n]
-        # Only joint pairs with the most frequent alpha (of y = alpha x + beta) get a new zero offset.
+        # The rules of each joint pair require y = alpha x + beta.
+        # Only the joint pairs with the most frequent alpha get a new zero offset.
         alpha = max(
             alphas, key=lambda one: sum(_near(one, other, tolerance) for other in alphas), default=0.0
         )
@@ -781,7 +791,10 @@ def _as_rule(joint: Joint) -> tuple[str, float, float]:
 
 
 def _is_determined(alignment: Alignment, i: int) -> tuple[bool, bool]:
-    """Return whether later axes or links determine a zero offset, and `_Rule.meets`."""
+    """Return whether later axes or links determine the zero offset of joint pair i.
+
+    The second result is the value of `_Rule.meets`.
+    """
     names = set(alignment.a.labels) & set(alignment.b.labels)
     behind = {i}
     for k, step in enumerate(alignment.steps):

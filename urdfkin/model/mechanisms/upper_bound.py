@@ -145,9 +145,10 @@ class Support:
     def rotated_values(self, axis: FloatArray, angles: FloatArray, factors: FloatArray | float) -> FloatArray:
         """Return the support function at the n grid points after a rotation by each angle; shape (angles, n).
 
-        For each angle (rad), a rotation R about `axis` moves the original set. Since h'(u) is h(R^T u), the
-        method rotates the grid points by the opposite angle. `factors` contains a multiplier for each angle.
-        The method multiplies the grid points' components perpendicular to the axis by this multiplier.
+        For each angle (rad), let R be the rotation of the set of points about `axis`. Since h'(u) is
+        h(R^T u), the method rotates the grid points by the opposite angle. `factors` contains a multiplier
+        for each angle, or one multiplier for all angles. The method multiplies the grid points' components
+        perpendicular to the axis by this multiplier.
         """
         G = self.grid.points
         along = (G @ axis)[:, np.newaxis] * axis
@@ -240,7 +241,10 @@ def upper_bounds(
 def from_first_difference(
     alignment: Alignment, variables: Variables, frame: FramePair
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
-    """Return the joint pairs and values on the path to a frame, from the first pair that differs."""
+    """Return the matched joints on the path to a frame, and their values.
+
+    Both lists begin with the first joint that differs between A and B.
+    """
     steps = alignment.path(frame.previous)
     pairs = [variables.pairs[i] for i in alignment.indices(frame.previous)]
     first = next((i for i, (s, p) in enumerate(zip(steps, pairs, strict=True)) if _differs(s, p)), len(steps))
@@ -301,7 +305,7 @@ def _product(factor: float, reach: float) -> float:
 
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return d and y of the recursion (module docstring) at the frame."""
+    """Return the support functions of d and y at the frame, where the recursion (module docstring) starts."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
@@ -310,7 +314,7 @@ def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
 def after_joint(
     step: MatchedJoints, pair: MatchedValues | None, variables: Variables, d: Support, y: Support
 ) -> tuple[Support, Support]:
-    """Return d and y of the recursion (module docstring) after one more joint."""
+    """Return the support functions of d and y (module docstring) after the motions of the next joint."""
     # A planar or floating joint has no limits, so it may rotate d into any direction.
     # Therefore, the new support function of d is h(u) = |u| max |d|.
     if pair is None:
@@ -324,7 +328,7 @@ def after_joint(
 
 
 def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[Support, Support]:
-    """Return d and y of the recursion (module docstring) after the constant rigid motion L of a step."""
+    """Return the support functions of d and y (module docstring) after the constant rigid motion L."""
     if step.before is IDENTITY:
         return d, y
     G, L = d.grid.points, step.before
@@ -334,7 +338,7 @@ def after_constant_motion(step: MatchedJoints, d: Support, y: Support) -> tuple[
 def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
-    """Return the vector d of the recursion (module docstring) at the next joint, before the motion L."""
+    """Return the support function of d (module docstring) after a joint's motion, without the motion L."""
     same = step.other is step.axis and pair.a == pair.b
     if step.kind == "turns":
         about = Screw(step.axis.direction, np.zeros(3))
@@ -438,8 +442,8 @@ def _independent_difference(
     """Return the change of d that two revolute joints cause if their angles are treated as independent.
 
     If A and B have the same axis, the positions of a point in A and B differ at most by the chord of the
-    largest difference of the angles. If the axes differ, the result is the sum of the support functions of
-    e(S' t') y and -e(S t) y.
+    largest difference of the angles. If the axes differ, the change of d is e(S' t') y - e(S t) y (module
+    docstring). The result is then the sum of the support functions of e(S' t') y and of -e(S t) y.
     """
     G, u = y.grid.points, step.axis.direction
     if step.other is not step.axis:
@@ -470,7 +474,7 @@ def curvature(
         if not all(one.a.slope or one.b.slope for one in both):
             continue
         alike = [one.variable is not None and one.a.slope == one.b.slope for one in both]
-        # If joint i is prismatic, `bound` does not include the difference of the values in A and B.
+        # For a prismatic joint i, `bound` can be 0 although the joint values in A and B differ.
         if not all(alike) and (bound or (steps[i].kind != "turns" and not alike[0])):
             return names, np.full_like(M, math.inf)
         if not bound:
@@ -520,9 +524,9 @@ def _pass_to_front(
 def _derivatives(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, d: Support, y: Support
 ) -> _Vectors:
-    """Return the derivatives of d and y with respect to a joint's value, before the motion L.
+    """Return the derivatives of d and y with respect to a joint's value, without the motion L.
 
-    The module docstring defines the symbols.
+    The module docstring defines the symbols. The callers apply L to the result.
     """
     if step.kind != "turns":
         u, other = step.axis.direction, step.other.direction
@@ -548,7 +552,10 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
 
 
 def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
-    """Return a joint pair without translations, because translations do not affect free vectors."""
+    """Return a joint pair with both axes through the origin, and with no translation in L.
+
+    Translations do not affect free vectors.
+    """
     axis = Screw(step.axis.direction, np.zeros(3))
     other = axis if step.other is step.axis else Screw(step.other.direction, np.zeros(3))
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
@@ -560,9 +567,9 @@ def relevant_joints(
 ) -> tuple[list[MatchedJoints], list[MatchedValues | None]]:
     """Return the matched joints on a frame's path that have an effect on the length of D = p_B - p_A.
 
-    Most joints before the first difference of the models only rotate D. But an earlier joint changes the
-    length of D if a joint after the first difference mimics it. So the result begins with the first joint
-    that differs, or with an earlier joint whose variable also moves a joint after the first difference.
+    Most joints before the first difference of the models only rotate D. But such a joint also changes the
+    length of D if its variable moves a later joint of the result. The result begins with the first joint of
+    this kind. If there is none, the result begins with the first joint that differs.
     """
     steps, pairs = (
         alignment.path(frame.previous),
