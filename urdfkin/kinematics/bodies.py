@@ -244,7 +244,10 @@ def tool_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
 
 
 def frame_velocity(velocity: ArrayLike, d_n_tool: ArrayLike) -> FloatArray:
-    """Return the velocity of frame n from that of the tool frame (7.115): the inverse of `tool_velocity`."""
+    """Return the velocity of frame n from the velocity of the tool frame (7.115).
+
+    This function is the inverse of `tool_velocity`.
+    """
     return tool_velocity(velocity, -vectors(d_n_tool, "d_n_tool"))
 
 

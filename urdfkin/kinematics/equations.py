@@ -112,7 +112,11 @@ def tangential(w, d):
 
 
 def point_velocity(vel, w, d):
-    """7.59, 7.115, 7.128: velocity of the point P + d of a link whose point P has the velocity vel."""
+    """7.59, 7.115, 7.128: velocity of a point Q of a link.
+
+    The point P of the same link has the velocity vel. The vector d leads from P to Q, and w is the link's
+    angular velocity.
+    """
     return plus(vel, tangential(w, d))
 
 
@@ -145,17 +149,23 @@ def coriolis(w, u):
 
 
 def angular_acceleration(alpha, w, z, v, a):
-    """7.129, rotary: angular acceleration of the link after a joint; the link before it has w and alpha."""
+    """7.129, rotary: angular acceleration of the link after a joint.
+
+    The link before the joint has the angular velocity w and the angular acceleration alpha.
+    """
     return plus(plus(alpha, times(a, z)), times(v, cross(w, z)))
 
 
 def point_acceleration(acc, alpha, w, d):
-    """7.123, 7.130: acceleration of a link's point P + d, if the link's point P has the acceleration acc."""
+    """7.123, 7.130: acceleration of a point Q of a link.
+
+    The point P of the same link has the acceleration acc, and the vector d leads from P to Q.
+    """
     return plus(plus(acc, transverse(alpha, d)), centripetal(w, d))
 
 
 def sliding_acceleration(acc, w, z, v, a):
-    """7.130, prismatic: acceleration of the link after a joint; z is fixed to the link before it."""
+    """7.130, prismatic: acceleration of the link after a joint; z is fixed to the link before the joint."""
     return plus(plus(acc, times(a, z)), coriolis(w, times(v, z)))
 
 
@@ -164,16 +174,24 @@ def moving_point_acceleration(acc, alpha, w, p, u, b):
     return plus(plus(point_acceleration(acc, alpha, w, p), coriolis(w, u)), b)
 
 
-# -- planar and floating joints: b contains derivatives of components in axes that turn with w + o -----
+# -- planar and floating joints -----------------------------------------------------------------------
+# The vector b contains time derivatives of components in the axes of the link after the joint.
+# These axes turn with the angular velocity w + o.
 
 
 def free_angular_acceleration(alpha, w, o, b):
-    """7.129: angular acceleration after a joint with angular velocity o; b: derivative of o's components."""
+    """7.129: angular acceleration of the link after a joint with angular velocity o.
+
+    The vector b contains the time derivatives of the components of o.
+    """
     return plus(plus(alpha, b), cross(w, o))
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration after a joint with velocities u and o; b: derivative of u's components."""
+    """7.130: acceleration of the link after a joint with linear velocity u and angular velocity o.
+
+    The vector b contains the time derivatives of the components of u.
+    """
     return plus(plus(acc, b), cross(plus(w, plus(w, o)), u))
 
 
@@ -200,7 +218,9 @@ def rate_in_turning_axes(rate, w, x):
     return minus(rate, cross(w, x))
 
 
-# -- derivative of a Jacobian column with respect to one joint; 7.126 sums it over the joint velocities ------
+# -- derivatives of Jacobian columns with respect to one joint -----------------------------------------
+# The product of this derivative and the joint velocity, summed over the joints, is the time derivative of the
+# column (7.126).
 
 
 def turned_along(w, linear, angular):

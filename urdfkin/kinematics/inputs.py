@@ -20,7 +20,7 @@ UNIT_TOLERANCE = 1e-12
 #: An entry of R R^T - I is then at most 1e-9 times the sum of the absolute values of a row of R.
 #: The sum of the absolute values of a row is at most sqrt(3).
 ROTATION_TOLERANCE = 2e-9
-#: NumPy's codes for complex, bytes, text, timedelta, datetime and void.
+#: The letters of NumPy's `dtype.kind` for complex numbers, bytes, text, timedelta, datetime and void.
 #: NumPy converts these kinds of data to floats without an error, although they are not real numbers.
 _NOT_NUMBERS = "cSUmMV"
 _DOUBLE = np.dtype(np.float64)

@@ -9,7 +9,8 @@ from typing import Any
 from urdfkin.kinematics import equations
 from urdfkin.kinematics.arithmetic import bound
 
-#: The textbook's symbols for parameter names of the functions in `equations`.
+#: The textbook's LaTeX symbol for a parameter of a function in `equations`, by the parameter's name.
+#: A parameter without an entry is its own symbol.
 _SYMBOLS = {
     "vel": r"\dot{d}",
     "acc": r"\ddot{d}",
@@ -24,7 +25,7 @@ _SYMBOLS = {
     "zero": "0",
     "one": "1",
 }
-#: Symbols of some functions of `equations` that differ from the symbols in `_SYMBOLS`.
+#: Symbols for the parameters of single functions of `equations`; they replace the symbols in `_SYMBOLS`.
 _SYMBOLS_BY_FUNCTION = {
     "sliding_velocity": {"v": r"\dot{d}_i"},
     "sliding_acceleration": {"v": r"\dot{d}_i", "a": r"\ddot{d}_i"},
@@ -46,7 +47,7 @@ _ATOM, _CROSS, _SUM = 0, 1, 2
 
 @dataclass(frozen=True)
 class LatexTerm:
-    """A LaTeX expression; `kind` decides whether the text has brackets inside a larger expression."""
+    """A LaTeX expression; `kind` decides whether a larger expression encloses the text in brackets."""
 
     text: str
     kind: int = _ATOM

@@ -17,7 +17,7 @@ Intermediate = TypeVar("Intermediate")
 _MOST_STEPS = 100
 #: First, smallest and largest damping, relative to the largest singular value.
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-14, 1e3
-#: Factors of the damping after a step that reduces the error, and after a step that does not.
+#: Factors of the damping after a step that reduces the error, and after a rejected step.
 _EASIER, _HARDER = 0.03, 10.0
 #: A step is slow if the error after the step is more than this fraction of the error before the step.
 _SLOW = 0.99
@@ -38,9 +38,9 @@ def least_squares(
 ) -> tuple[State, float]:
     """Return the state with the smallest residuals near `start`, and the norm of these residuals.
 
-    `derivatives` returns the negative derivatives (rows, parameters) of the residuals (rows,). `longest`
-    limits each component of a step (parameters,). The iteration ends after `patience` consecutive slow steps;
-    0 means no limit.
+    `derivatives` returns the negative derivatives (rows, parameters) of the residuals (rows,). A step
+    (parameters,) is rejected if the absolute value of a component is more than `longest`. The iteration ends
+    after `patience` consecutive slow steps; 0 means no limit.
     """
     state, damping, slow = start, _FIRST_DAMPING, 0
     r, intermediate = residuals(start)

@@ -23,20 +23,29 @@ def carried(state: State, d: Length) -> State:
 
 
 def turned(state: State, d: Length, o: Length, o_rate: Length) -> State:
-    """Return the bounds after a revolute joint with offset length d and joint velocity o (7.127, 7.129)."""
+    """Return the bounds of the link after a revolute joint (7.127, 7.129).
+
+    The offset of the joint has the length d, and o is the absolute value of the joint velocity.
+    """
     p, w, vel, alpha, acc = carried(state, d)
     w = eq.angular_velocity(w, _Z, o)
     return p, w, vel, eq.angular_acceleration(alpha, w, _Z, o, o_rate), acc
 
 
 def slid(state: State, d: Length, u: Length, u_rate: Length) -> State:
-    """Return the bounds after a prismatic joint; d includes the joint's displacement (7.128, 7.130)."""
+    """Return the bounds of the link after a prismatic joint (7.128, 7.130).
+
+    The length d includes the joint's displacement.
+    """
     p, w, vel, alpha, acc = carried(state, d)
     return p, w, eq.sliding_velocity(vel, _Z, u), alpha, eq.sliding_acceleration(acc, w, _Z, u, u_rate)
 
 
 def freed(state: State, d: Length, o: Length, u: Length, o_rate: Length, u_rate: Length) -> State:
-    """Return the bounds after a planar or floating joint; d includes the joint's displacement."""
+    """Return the bounds of the link after a planar or floating joint.
+
+    The length d includes the joint's displacement.
+    """
     p, w, vel, alpha, acc = carried(state, d)
     alpha = eq.free_angular_acceleration(alpha, eq.plus(w, o), o, o_rate)
     acc = eq.free_acceleration(acc, w, o, u, u_rate)

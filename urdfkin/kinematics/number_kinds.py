@@ -9,9 +9,10 @@ sum, a cross product becomes the product of two lengths, and a rotation changes 
 as large as every term, every partial sum and the result. Rounding errors are proportional to the scale.
 Rounding errors are not proportional to the result, because the result is small where large terms cancel.
 
-A scale that is not zero is at least `SMALLEST`, the smallest normal number, for two reasons. First, every
-product up to `SMALLEST` has an error of half the smallest subnormal number. Second, a product of two small
-numbers may underflow to zero, and a later operation may multiply the lost product by a large number.
+A scale is 0 or at least `SMALLEST`, the smallest normal number. This lower bound has two reasons. First, a
+product below `SMALLEST` has an absolute error of up to half the smallest subnormal number. Second, a product
+of two small numbers may underflow to zero, and a later operation may multiply the lost product by a large
+number.
 """
 
 from __future__ import annotations
@@ -68,7 +69,8 @@ def norm(x: FloatArray) -> FloatArray:
     return counted(np.hypot.reduce(x, axis=-1))  # Squares could underflow or overflow, but np.hypot does not.
 
 
-#: The equations with lengths instead of vectors and absolute values instead of numbers; arrays broadcast.
+#: The textbook's equations for scales: the arguments are lengths of vectors and absolute values of numbers.
+#: Arguments that are arrays follow NumPy's broadcasting rules.
 length_equations = bound(
     plus=add,
     minus=add,

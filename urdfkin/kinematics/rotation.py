@@ -353,7 +353,7 @@ def log_rotation(R: ArrayLike) -> FloatArray:
     vector, scalar = quat[..., :3], quat[..., 3:]
     sine = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, scalar)
-    # Squares of tiny components lose digits, so the rotation vector is then computed as 2 times `vector`.
+    # Squares of components below 1e-150 may lose digits. For such a vector, the result is 2 times `vector`.
     small = sine < 1e-150
     return np.where(small, 2.0 * vector, vector * (angle / np.where(small, 1.0, sine)))
 
@@ -397,7 +397,7 @@ class Sequence:
         return self.first == self.third
 
     def turning(self, values: FloatArray) -> FloatArray:
-        """Convert between the order of the name and the order of the body-fixed axes."""
+        """Convert values from the order of the letters in `name` to the order of the body's axes, or back."""
         return values[..., ::-1] if self.fixed else values
 
 

@@ -1,9 +1,10 @@
 """Bounds on the rounding errors by which two correct computations differ; all tolerances use these bounds.
 
 The unit of an error is eps = 2^-52 times the rounded number. Each operation has an error of at most half an
-eps. Errors are counted to first order. A tolerance is `count * eps * scale`. This module defines the counts.
-`urdfkin.verify.bounds` computes the scales for the forward recursion, and the modules of `urdfkin.dh` compute
-the scales for tables.
+eps. Errors are counted to first order. A tolerance is `count * eps * scale`. The scale of a result is an
+upper bound on the sum of the absolute values of the terms of the result (`urdfkin.kinematics.number_kinds`).
+This module defines the counts. `urdfkin.verify.bounds` computes the scales for the forward recursion, and the
+modules of `urdfkin.dh` compute the scales for Denavit-Hartenberg tables.
 
 **A joint.** For each joint, the recursion multiplies the rotation so far by the joint's constant rotation and
 by its rotation about its axis. If *all* rounding errors have the same sign, the error of a component of a
@@ -16,18 +17,19 @@ rotated vector grows for each joint by
 | constant rotation from roll, pitch, yaw; Pinocchio: by a normalised quaternion | 3.1 | 12.5 |
 | all of a joint about a coordinate axis | 5.7 | 16.8 |
 
-The last row is computed for the whole joint; it is not the sum of the first three rows. It may be smaller,
-because their worst cases do not occur together. It may be larger, because a rotation adds the errors of
-several components. The errors of urdfkin and of Pinocchio may have opposite signs, so the bound for the
-difference is 5.7 + 16.8 = 22.5. `tests/kinematics/test_roundings.py` computes the counts of the table: it
-runs the equations on numbers that record each of their roundings.
+The last row is computed for the whole joint; it is not the sum of the first three rows. A count of the last
+row may be smaller than the sum, because the worst cases of the three rows do not occur together. A count may
+also be larger than the sum, because a rotation adds the errors of several components. The errors of urdfkin
+and of Pinocchio may have opposite signs, so the bound for the difference is 5.7 + 16.8 = 22.5.
+`tests/kinematics/test_roundings.py` computes the counts of the table: it runs the equations on numbers that
+record each of their roundings.
 
 The acceleration of a frame, for example, is a sum of terms such as w x (w x d); w, w and d are the three
 factors of this term. The sum of the terms over the joints and the cross products in a term have rounding
 errors too. In each implementation, the sum of these errors is at most 2 eps for each term, which has two or
 three factors (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count includes one more
-joint than the path has; this covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24
-instead of 22.5, which covers the other sums.
+joint than the path has. This joint covers the frame's own offset and the first sum. Second, `ROUNDINGS` is 24
+instead of 22.5. The difference of 1.5 covers the other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
 axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
@@ -76,17 +78,17 @@ The counts of an export's joint are
 | all of an export's joint | 6.5 | 7.2 |
 
 Each omitted component of an offset causes an error of 0.5; two components cause an error of 0.7 of the
-offset's length. The products with an omitted component, in a matrix row or in a cross product, are omitted
-too. The error of these products, 1.5, would be larger than the error of the omission. Without fused
-multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint, plus the errors
-of the sums over the joints. `ROUNDINGS` is 24.0 and does not cover these sums. The standard deviation is the
-same as for urdfkin. If an export is compared with true values (test vectors), the error is at most 7.2 eps,
-which is within `ROUNDINGS`.
+offset's length. In a matrix row and in a cross product, an export also omits each product that contains an
+omitted component. These products would have a rounding error of 1.5, so the omission causes a smaller error.
+Without fused multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint,
+plus the errors of the sums over the joints. `ROUNDINGS` is 24.0 and does not cover these sums. The standard
+deviation is the same as for urdfkin. If an export is compared with true values (test vectors), the error is
+at most 7.2 eps, which is within `ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
-2^-23. For each operation and each constant, `urdfkin.export.single` multiplies the error of its value by the
-derivative of the result with respect to this value. The bound is the sum of the absolute values of all these
-products. The error of one operation is
+2^-23. The value of each operation and of each constant has a rounding error. `urdfkin.export.single`
+multiplies each of these errors by the derivative of the result with respect to the value. The bound is the
+sum of the absolute values of all these products. The error of one operation is
 
 | | in eps of its value |
 |---|---|
@@ -111,20 +113,21 @@ converts it to a matrix. If all rounding errors have the same sign, the error is
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2, which covers the sums over the
-joints too. MuJoCo does not replace the file's axes by coordinate axes.
+With urdfkin's 5.7 the difference is 27.2. `MUJOCO` is 30 instead of 27.2. The difference of 2.8 covers the
+sums over the joints. MuJoCo does not replace the file's axes by coordinate axes.
 
 **A mimic joint** adds no rounding. urdfkin and the oracle compute a mimic joint's angle m q + c from the same
 doubles m and c. Both programs round the multiplication and then the addition, so IEEE 754 defines the result
 to the last bit. If a mimic joint mimics another mimic joint, urdfkin and the oracle combine the rules in the
-same order, from the mimicked joint outwards. The errors of sine and cosine are counted above. The functions
-sine and cosine first subtract multiples of pi/2 from the angle; this subtraction is exact for every angle,
-also for 1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
+same order. Both start with the rule that refers to the independent joint. The errors of sine and cosine are
+counted above. The functions sine and cosine first subtract multiples of pi/2 from the angle; this subtraction
+is exact for every angle, also for 1e12 rad. Therefore a mistake in a mimic joint's angle is always detected.
 
-**A base** with a rotation M adds one joint to the count. A base without a rotation adds no rounding. The
-user's matrix M has nine correct digits. Each of the two programs replaces M by the nearest rotation, with a
-method of its own. Therefore, the error does not depend on the distance of M from the nearest rotation. The
-counts, with u = eps/2, are
+**A base** (`urdfkin.BaseMotion`) gives the robot's root link a pose in the world. A base with a rotation M
+counts as one more joint of the path. A base without a rotation does not change the count. The entries of the
+user's matrix M have at least nine correct decimals. Each of the two programs replaces M by the nearest
+rotation, with a method of its own. Therefore, the error does not depend on the distance of M from the nearest
+rotation. The counts, with u = eps/2, are
 
 | | urdfkin | Pinocchio |
 |---|---|---|
@@ -136,8 +139,8 @@ counts, with u = eps/2, are
 | a base's velocity and acceleration, expressed in its axes: two cross products and two sums | | 6.0 |
 | sum | 3.2 | 17.0 |
 
-The sum 20.2 is within `ROUNDINGS`. The largest measured errors of the rotation are 0.6 and 5.1 (1,500
-matrices, compared with 50 digits).
+The sum 20.2 is within `ROUNDINGS`. The largest measured errors of the rotation are 0.6 (urdfkin) and 5.1
+(Pinocchio). They were measured with 1,500 matrices; the reference values have 50 digits.
 
 **An MJCF equality** is y - y0 = c0 + c1 (x - x0), with reference values y0 and x0. The tree's mimic rules
 satisfy it up to
@@ -151,13 +154,14 @@ satisfy it up to
 | sum | 7.5 |
 
 The tolerance is this sum, multiplied by the size of all terms in the table and by k + 1. Here k is the number
-of mimic rules from the mimic joint to the joint that has a coordinate of its own.
+of mimic rules between the mimic joint and the independent joint.
 
 **Numbers near zero.** A product below the smallest normal number loses bits. The error of such a product is
-2^-1075, half the smallest subnormal number, which is (eps/2) times the smallest normal number. Every scale
-that is not zero is therefore at least the smallest normal number (`urdfkin.kinematics.number_kinds`). The
-tolerance `count * eps * scale` is then larger than the error 2^-1075, even if the product is multiplied by
-large numbers later. The smallest unit is eps times the smallest normal number, 2^-1074.
+at most 2^-1075. This number is half the smallest subnormal number, or (eps/2) times the smallest normal
+number. Therefore, every scale except 0 is at least the smallest normal number
+(`urdfkin.kinematics.number_kinds`). The tolerance `count * eps * scale` is then larger than the error
+2^-1075, even if the product is multiplied by large numbers later. The smallest unit is eps times the smallest
+normal number, 2^-1074.
 
 **A row** of a Denavit-Hartenberg table has an error of at most 8:
 
@@ -186,21 +190,21 @@ EPS = sys.float_info.epsilon
 SINGLE = 2.0**-24
 #: The smallest normal number.
 SMALLEST = sys.float_info.min
-#: The smallest unit of rounding, which is the smallest subnormal number.
+#: Smallest positive value of the unit `eps * scale`; it is the smallest subnormal number.
 LEAST_UNIT = EPS * SMALLEST
 #: Least divisor: `max(x, NOT_ZERO)` avoids a division by 0. Every measured number is larger.
 NOT_ZERO = 1e-300
 
 #: Allowed difference (in eps) from Pinocchio, for each joint and each factor of a term such as w x (w x d).
 ROUNDINGS = 24.0
-#: Allowed difference (in eps) from MuJoCo, for each joint and each factor of a term.
+#: Allowed difference (in eps) from MuJoCo, for each joint and each factor of a term such as w x (w x d).
 MUJOCO = 30.0
 #: Allowed difference (in eps) between urdfkin and MuJoCo in a mimic rule of an MJCF file.
 MJCF_RULE = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW = 8.0
 
-# Exports in single precision (`urdfkin.export.single`); the docstring of this module derives the numbers.
+# Errors in exports in single precision (`urdfkin.export.single`); the module's docstring derives the errors.
 
 SINGLE_EPS = 2.0**-23
 #: The smallest normal number, and the largest number, of single precision.
@@ -220,26 +224,28 @@ CONSTANT = 13.7
 #: Error (in eps) of the directions of two joint axes.
 #: The division of an axis by its length has an error of 0.5, and Rodrigues' formula has an error of 2.0.
 AXES = 5.0
-#: Error (in eps) that the program that wrote the file causes for each joint.
+#: Error (in eps) of each joint in a file, because a program rounded the numbers when it wrote the file.
 #: A double that is written with fifteen digits (DBL_DIG) has an error of half a unit in the last digit.
 #: For an angle up to pi, half a unit in the last digit is 5e-15 rad, or 22.5 eps.
-#: Roll and pitch both tilt an axis, so the error of 22.5 eps counts twice; yaw does not tilt the axis.
+#: Roll and pitch both change the angle between a joint's z axis and the z axis of the joint before it.
+#: Yaw does not change this angle. Therefore, the error of 22.5 eps counts twice.
 WRITTEN = 45.0
 #: Error of a length along an axis, in units of eps times the length of the path.
 #: A dot product has an error of 2.4 eps; each sum of lengths has an error of 0.5 eps times the sum.
-#: Only a few sums of lengths are nearly as large as the path's length.
+#: Only a few of these sums are nearly as large as the path's length.
 SUMMED = 4.0
 
 # Tolerances for rounding: a number within the tolerance of a round number is replaced by the round number.
 
 #: Error (in eps) of an angle up to pi.
-#: A computed multiple of pi/12 has an error of 1.2, arctan2 has 1.1, and a number in a file has 1.0.
+#: A computed multiple of pi/12 has an error of 1.2, a value of arctan2 has an error of 1.1, and a number in
+#: a file has an error of 1.0.
 ANGLE = 4.0
 #: Error (in eps) of an entry of a rotation matrix.
 #: The entry is a difference of two products, which has an error of 0.75.
 #: One factor of each product is also a difference of two products, which adds an error of 0.75.
 ENTRY = 2.0
-#: Error of a length that is rounded to twelve digits, in the unit of `SUMMED`.
+#: Allowed change when a length is rounded to twelve digits, in units of eps times the length of the path.
 DIGITS = SUMMED / 2.0
 #: Error (in eps) of the angle between two rotations.
 #: The first rotation is computed from roll, pitch and yaw, with an error of 3.1 eps.
@@ -250,15 +256,16 @@ TURN = 8.0
 #: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.
 #: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
-#: The bound is twice the sum 2.0, so that a value exactly at the limits is accepted.
+#: The sum of the four errors is 2.0. `MIMIC_LIMIT` is twice this sum, so that both ends of the converted
+#: range are accepted.
 MIMIC_LIMIT = 4.0
 
 
 def of_joints(joints: ArrayLike, tilt: ArrayLike = 0.0) -> FloatArray:
     """Return the allowed difference (in eps) between urdfkin and Pinocchio, for each factor of a term.
 
-    `joints` is the number of joints on the path. `tilt` is the sum over these joints of the angle (radians)
-    between Pinocchio's axis and the file's axis.
+    For example, the term w x (w x d) has three factors. `joints` is the number of joints on the path. `tilt`
+    is the sum over these joints of the angle (radians) between Pinocchio's axis and the file's axis.
 
     >>> of_joints([7, 8]).tolist()
     [168.0, 192.0]

@@ -20,7 +20,7 @@ class BaseMotion:
     fields store exactly the given numbers, because a comparison with Pinocchio starts from the same numbers.
 
     Attributes:
-        placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded, even to one digit; the
+        placement: (..., 4, 4) T_world_base. The rotation matrix may be rounded to nine decimals; the
             computation uses the nearest exact rotation matrix
             (`urdfkin.kinematics.rotation.nearest_rotation`).
         velocity: (..., 6) velocity of the base's origin, [linear; angular], in world axes, m/s and rad/s.
