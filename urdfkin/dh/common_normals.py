@@ -11,9 +11,9 @@ joint's row. For skew axes, beta is 0, and the other six numbers are unique exce
 (Denavit and Hartenberg). docs/dh.md explains the numbers for parallel and for nearly parallel axes.
 
 The pose of the tip determines only the sum of the offsets d along parallel axes, and only the sum of the
-angles theta about coinciding axes. In all rows of such axes except one, `steps_like` copies d or theta from a
-reference table. It chooses d or theta of the remaining row so that the sum is correct. In a Hayati row, d can
-also be chosen freely, because the two axes do not determine it.
+angles theta about coinciding axes. `steps_like` copies these numbers from a reference table, except for one
+row. For this row, `steps_like` chooses the d or the theta that makes the sum correct. In a Hayati row, d can
+also be chosen freely, because the two axes do not determine d.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ class PairWithReference:
 
     @property
     def offset_is_free(self) -> bool:
-        """Whether the offset d of the row is free, because the next row can compensate for every d."""
+        """Whether d of the row can be chosen freely; the next row can then compensate for d."""
         return tilt_of(self.A) <= self.noise.radians or self._has_hayati_row
 
     @property
@@ -229,7 +229,10 @@ class PairWithReference:
         return replace(step, delta=step.delta + d) if d else step
 
     def offset_before(self, carry: float) -> float:
-        """Return the `carry` of this joint for d = 0 if the next joint has the given `carry`."""
+        """Return the offset (m) along the first axis from the DH frame to the joint's frame, for d = 0.
+
+        `carry` is the same offset along the second axis, for the next joint.
+        """
         return float(carry * self.A[2, 2] - self.A[2, 3])
 
 
@@ -239,8 +242,9 @@ def steps_like(
     """Return the transforms between the axes, and theta of each row, as close to a reference as possible.
 
     `phi_in` is the angle (rad) about the first axis from frame 0 to the first joint's frame. `carry` is the
-    offset (m) along this axis. `tip` is the `carry` (m) with which the last row has the reference's d; None
-    if d may differ.
+    offset (m) along the first axis between these frames. `tip` is the offset (m) along the last axis from the
+    DH frame to the joint's frame. With this offset, d of the last row equals the reference. If `tip` is None,
+    d of the last row may differ from the reference.
     """
     steps, inputs = list[AxisTransform](), list[tuple[float, float]]()
     for i, pair in enumerate(pairs):
@@ -259,7 +263,10 @@ def steps_like(
 
 
 def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: float | None) -> float:
-    """Choose d so that d of this row, or of a later row, equals d in the reference."""
+    """Return the reference's d, or the d for which another cell of the table equals the reference.
+
+    The other cell is d of a later row, or a of a Hayati row.
+    """
     pair = pairs[i]
     if not pair.offset_is_free or not (pair.is_prismatic or (i == 0 and pair.row.d)):
         return pair.row.d
@@ -270,8 +277,8 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
     if end < len(pairs):
         target = None if pairs[end].is_prismatic else pairs[end].row.d - pairs[end].normal_offset
     if target is None:
-        # Any d is possible, because a later prismatic joint or the tool compensates for it.
-        # If a row before that joint or tool is a Hayati row, its cell a in the reference determines d.
+        # Any d is possible, because a later prismatic joint or the tool compensates for d.
+        # If a row from i to end - 1 is a Hayati row, d is chosen so that a of this row equals the reference.
         end = max(range(i, end), key=lambda k: tilt_of(pairs[k].A))
         hayati_offset = pairs[end].hayati_offset
         if hayati_offset is None:
@@ -287,7 +294,7 @@ def _free_offset(pairs: Sequence[PairWithReference], i: int, carry: float, tip: 
 def _free_phi(
     pairs: Sequence[PairWithReference], steps: Sequence[AxisTransform], i: int, phi_in: float
 ) -> float:
-    """Choose phi so that theta of this row, or of later prismatic rows, equals the reference."""
+    """Return the phi that gives the reference's theta in this row, or in the next prismatic rows."""
     own = pairs[i].row.theta - phi_in
     if i > 0 and pairs[i].is_prismatic:
         return own
@@ -320,7 +327,7 @@ def theta_like(theta: float, reference: float) -> float:
     return reference if abs(angle_difference(theta, reference)) <= ANGLE * EPS else cleaned_angle(theta)
 
 
-#: Sums of the squares of longer lengths (m) may overflow.
+#: Longest permitted length (m). The sum of the squares of longer lengths may overflow.
 LONGEST = 1e150
 
 
@@ -358,7 +365,7 @@ class PoseTolerance:
 
 
 def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
-    """Return the rounding tolerance of a constant pose that is the product of `joints` joint origins.
+    """Return the tolerance for rounding errors in the product of the origins of `joints` joints.
 
     `length` is the sum of the offsets of these joints (m), and `reach` is the length of the whole path. The
     tolerance covers angles that a program rounded to fifteen digits.

@@ -139,7 +139,7 @@ def parse_row(row: Any, index: int, units: Units) -> DHRow:
 def _check_order(rows: Sequence[Any]) -> None:
     """Raise InputError for lists that seem to have the Robotics Toolbox's order theta, d, a, alpha.
 
-    Angles in a table are nearly always multiples of 15 degrees; lengths hardly ever look like such multiples.
+    Nearly all angles in tables are multiples of 15 degrees. Most lengths are not multiples of 15 or of pi/12.
     """
     lists = [row for row in rows if isinstance(row, Sequence) and not isinstance(row, str)]
     if len(lists) < len(rows) or not all(_has_order(row) for row in lists):

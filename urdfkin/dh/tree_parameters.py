@@ -6,10 +6,11 @@ towards the root is the antecedent of link j; i = a(j) is its index. The pose of
 
     T(i, j) = Rz(gamma) Tz(b) . Tx(d) Rx(alpha) Ry(beta) . Rz(theta) Tz(r)
 
-The common normal to the first moving child of link i defines x_i, so gamma and b of this child are zero. For
-a chain without branches, the table equals the modified Denavit-Hartenberg table; d is then a(i-1), and r is
-d(i). The angle beta is not part of the original notation. It is zero except between nearly parallel axes,
-which would otherwise need offsets of kilometres (Hayati).
+The axis x_i is along the common normal between the axes of link i and of its first moving child. Therefore,
+gamma and b of this child are zero. For a chain without branches, the table equals the modified
+Denavit-Hartenberg table; d is then a(i-1), and r is d(i). The angle beta is not part of the original
+notation. It is zero except between nearly parallel axes. Without beta, such axes may need offsets of
+kilometres (Hayati).
 """
 
 from __future__ import annotations
@@ -78,10 +79,11 @@ class TreeParameters:
     """The table of a whole robot, with a row for each joint, including fixed joints.
 
     Attributes:
-        path_lengths: (joints,) sum of the URDF's offsets (metres) from the root to each joint.
+        path_lengths: (joints,) length (metres) of the URDF's path from the root to each joint's origin. The
+            method `reach` adds the travel of prismatic joints.
         T_frame_link: (joints, 4, 4) pose of each row's URDF link frame in the frame of the row.
-        left_out: Largest sum (rad), on a path from the root, of tilts that are set to zero as rounding
-            errors.
+        left_out: A tilt that may be a rounding error is set to zero. `left_out` is the largest sum (rad) of
+            such tilts on a path from the root.
     """
 
     robot: str
@@ -188,7 +190,8 @@ class _LinkAxis:
     """The axis frame of a link, with z along the axis of the link's joint.
 
     `T_antecedent_axis` is the pose in the antecedent's axis frame. `T_link_axis` is the pose in the link's
-    URDF frame. `left_out` is the sum (rad) of the tilts from the root to the link that are set to zero.
+    URDF frame. Small tilts on the path from the root to the link are set to zero. `left_out` is the sum (rad)
+    of these tilts.
     """
 
     antecedent: int
@@ -220,8 +223,8 @@ def _steps(
 ) -> tuple[list[AxisTransform], dict[int, tuple[float, float]]]:
     """Return a transform for each joint, and an angle and an offset for each moving link.
 
-    The transform leads from the axis of the antecedent to the joint's axis. The angle and the offset lead
-    from the axis frame of a link to the frame of its row.
+    The transform is between the axis of the antecedent and the joint's axis. The angle and the offset are a
+    rotation about z and a shift along z. They change the axis frame of a link into the frame of its row.
     """
     steps, offsets = list[AxisTransform](), {-1: (0.0, 0.0)}
     for link, joint, length in zip(links, tree.joints, lengths, strict=True):
@@ -274,7 +277,7 @@ def _row(
 
 
 def _path_lengths(tree: KinematicTree) -> list[float]:
-    """Return the sum of all offsets (m) from the root to each joint's origin."""
+    """Return the length (m) of the path from the root to each joint's origin."""
     lengths = [0.0]
     for joint in tree.joints:
         lengths.append(lengths[joint.parent] + joint.length)

@@ -42,12 +42,14 @@ from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limi
 TOLERANCE = 2e-4
 FIT_SAMPLES, CHECK_SAMPLES = 40, 200
 _FIT_SEED, _CHECK_SEED = 1, 2
-#: Differing cells are reported only if their correction reduces the tip error to this fraction.
+#: Differing cells are reported only if their correction reduces the tip error to this fraction, or to
+#: `EXPLAINED`.
 _CORRECTED = 0.5
-#: The correction of a mistake must reduce the tip error to this fraction, or to the tolerance.
+#: If a table does not agree, the correction of a mistake must reduce the tip error to this fraction, or to
+#: the tolerance.
 _MISTAKE_CORRECTED = 0.05
 _LEAST_CHANGE = 1e-10
-#: The list of differing cells without a fit may have this many more cells than the list after a fit.
+#: Differing cells without a fit are reported only if they outnumber those after a fit by at most this number.
 _MORE_CELLS = 2
 #: If the tip moves by less than this fraction of the path length, the reach is the path length.
 _FIXED_TIP = 1e-6
@@ -130,7 +132,8 @@ def fast_fit_errors(chain: FrameChain, reference: DHTable, enough: float) -> tup
 def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """Return the robot's reach (metres); angles are multiplied by it to compare them with lengths.
 
-    The path length may be kilometres in a URDF that was made from a table without Hayati rows.
+    A table without Hayati rows may have offsets of kilometres. The path length of a URDF that was made from
+    this table is then far larger than the reach.
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
@@ -205,7 +208,7 @@ def _mask(reference: DHTable) -> FloatArray:
 def _hidden(
     reference: DHTable, fitted: TableArrays, check_targets: TargetPoses
 ) -> tuple[tuple[int, str], ...]:
-    """Return row and name of each cell whose error base, tool or joint offsets can compensate."""
+    """Return row and name of each cell whose error is hidden by a fit of base, tool and joint offsets."""
     hidden = []
     for i, k in hidden_cells(fitted, check_targets):
         at = _reference_row(reference, i, CELLS[k])
@@ -251,7 +254,10 @@ def _differences_without_fit(
     check_targets: TargetPoses,
     digits: Digits,
 ) -> tuple[CellDifference, ...]:
-    """Return the cells that differ without a fit; () if correcting them leaves a tip error."""
+    """Return the cells that differ without a fit.
+
+    The result is empty if a tip error remains after a correction of these cells.
+    """
     corrected = fit_cells(written, targets, _mask(reference), free=False)
     metres, radians = check_targets.largest_errors(corrected)
     if metres > EXPLAINED * targets.scale or radians > EXPLAINED:

@@ -5,9 +5,9 @@ twist. A small change of any number in the table also moves the tip by a twist, 
 changes that remove the error. If changes of different cells can remove the same error, reweighted least
 squares change as few cells as possible.
 
-If the axes of two joints nearly coincide, an angle that is added to one joint offset and subtracted from the
-other hardly moves the tip, so a fit changes such offsets slowly. When the error no longer decreases,
-`fit_free_parameters` changes two such offsets by a large angle, and fits again.
+Suppose that the axes of two joints nearly coincide. An angle that is added to one joint offset and subtracted
+from the other offset then hardly moves the tip. Therefore, a fit changes such offsets slowly. When the error
+no longer decreases, `fit_free_parameters` changes two such offsets by a large angle, and fits again.
 """
 
 from __future__ import annotations
@@ -47,10 +47,11 @@ _SOLVED = 1e-14
 _RCOND_FREE, _RCOND_CELLS = 1e-8, 1e-9
 _REWEIGHTINGS = 25
 _LEAST_WEIGHT = 1e-9
-#: Initial weights increase from 1 to this number, so that only one of two equivalent cells changes.
+#: Initial weight of the table's last cell; the first cell has weight 1, and the weights increase evenly.
+#: Two cells with the same effect have different weights, so that only one of these cells changes.
 _LAST_WEIGHT = 1.2
-#: Initial weight of beta, and its factor at each reweighting.
-#: Both are small, so that beta changes only if a change of alpha is not enough.
+#: Initial weight of each beta, and the factor that multiplies the weights of beta at each reweighting.
+#: Both numbers are small, so that beta changes only if a change of alpha is not enough.
 _BETA_WEIGHT, _BETA_FACTOR = 0.3, 0.5
 _SAME_EFFECT = 1e-6
 _PATIENCE = 4
@@ -110,7 +111,7 @@ class TableArrays:
         return tuple(_MOTIONS.values()) * len(self.cells)
 
     def path_at(self, values: FloatArray) -> tuple[Path, FloatArray]:
-        """Return the path from base to tip, and the angles and lengths (s, 5 n) of its motions.
+        """Return the path from base to tip, and the amounts (s, 5 n) of its elementary motions (rad or m).
 
         `values` (s, n) contains the joint values of s samples.
         """
@@ -139,7 +140,10 @@ class TargetPoses:
         return float(metres), float(rotation_angle(poses[:, :3, :3], self.poses[:, :3, :3]).max())
 
     def errors(self, poses: FloatArray) -> FloatArray:
-        """Return the twists (6 s,) from a model's poses to the target poses, angles multiplied by `scale`."""
+        """Return the twists (6 s,) from a model's poses to the target poses.
+
+        The angles are multiplied by `scale`.
+        """
         turn = log_rotation(self.poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], -1, -2))
         return np.concatenate([self.poses[:, :3, 3] - poses[:, :3, 3], self.scale * turn], axis=-1).ravel()
 
@@ -147,7 +151,7 @@ class TargetPoses:
 def tip_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and their derivatives (twists) by the free parameters and by the cells.
+    """Return the tip's poses, and their derivatives (twists) with respect to free parameters and cells.
 
     The derivatives have the shapes (6 s, 12 + n) and (6 s, 5 n). The free parameters have 6 columns for the
     base, 6 for the tool, and 1 for each joint offset. Angles are multiplied by the scale.
@@ -185,8 +189,9 @@ def with_changes(
     for i, offset in enumerate(free[12:]):
         k = model.variables[i]
         new_cells[i, k] += offset * units[k]
-    # The base is changed in the frame of the first revolute joint, the tool in the frame of the last.
-    # A rotation about the axis of such a joint then exactly equals a change of the joint's offset.
+    # The twist that changes the base is expressed in the frame of the first revolute joint.
+    # The twist that changes the tool is expressed in the frame of the last revolute joint.
+    # A rotation about the z axis of such a frame has exactly the same effect as a joint offset.
     base = _with_twist(model.base @ model.first, free[:6], scale) @ np.linalg.inv(model.first)
     tool = np.linalg.inv(model.last) @ _with_twist(np.eye(4), free[6:12], scale) @ model.last
     return replace(model, cells=new_cells, base=np.asarray(base), tool=np.asarray(model.tool @ tool))
@@ -201,7 +206,7 @@ def _with_twist(T: FloatArray, twist: FloatArray, scale: float) -> FloatArray:
 
 
 def fit_cells(model: TableArrays, targets: TargetPoses, mask: FloatArray, *, free: bool) -> TableArrays:
-    """Fit the table, with changes of few cells; `mask` (n, 5) is 1 for cells that may change."""
+    """Fit the table by changes of as few cells as possible; `mask` (n, 5) is 1 for cells that may change."""
     start, best, best_size, scale = model, model, np.inf, targets.scale
     for _ in range(_MAX_STEPS):
         poses, by_free, by_cells = tip_derivatives(model, targets)
@@ -229,9 +234,10 @@ def _sparse_changes(
     error: FloatArray,
     scale: float,
 ) -> FloatArray:
-    """Return changes that remove the error; as few cells as possible then differ from `start`.
+    """Return changes of the cells that remove the error.
 
-    A cell does not change if a free parameter, for example the joint offset of its row, has the same effect.
+    After these changes, as few cells as possible differ from `start`. If the free parameters can move the tip
+    in the same way as a cell, the cell does not change. An example is the joint offset of the cell's row.
     """
     Q = _orthonormal_basis(by_free)
     remaining = by_cells - Q @ (Q.T @ by_cells)
@@ -255,7 +261,7 @@ def _orthonormal_basis(by_free: FloatArray) -> FloatArray:
 
 
 def hidden_cells(model: TableArrays, targets: TargetPoses) -> list[tuple[int, int]]:
-    """Return (row, cell index) of each cell whose effect on the tip the free parameters can reproduce."""
+    """Return (row, cell index) of each cell whose effect on the tip can be reproduced by free parameters."""
     _, by_free, by_cells = tip_derivatives(model, targets)
     Q = _orthonormal_basis(by_free)
     remaining = np.linalg.norm(by_cells - Q @ (Q.T @ by_cells), axis=0)

@@ -20,12 +20,12 @@ from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
 
-#: Tip error (rad, or metres per metre of reach) that may remain after the differing cells are corrected.
+#: Largest tip error (rad, or metres per metre of reach) that counts as zero after a correction of cells.
 #: The rounding errors of a fit are far smaller, and those of numbers in data sheets are far larger.
 EXPLAINED = 1e-9
 #: Largest distance (m) from zero that is assumed for a prismatic joint without limits.
 TRAVEL = 0.5
-#: Finest resolution of printed fitted numbers (rad, or metres per metre of reach).
+#: `resolution` replaces a smaller tip error (rad, or metres per metre of reach) by this number.
 _FINEST = 1e-12
 #: This factor exceeds 1, because doubles cannot represent most decimal numbers exactly.
 _HALF = 1.0 + 1e-6
@@ -102,7 +102,7 @@ class Fitted:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mistake:
-    """A likely mistake in a table: after its correction, fewer other parameters must be fitted.
+    """A likely mistake in a table; after the mistake is corrected, a fit changes fewer parameters.
 
     `table`, `fitted` and the tip errors `metres` and `radians` are those after the correction.
     """
@@ -122,7 +122,7 @@ class TableComparison:
 
     Attributes:
         reference: The table with the URDF's joint names and with fitted base, tool, joint signs and joint
-            offsets. The method `placement` of this table accepts the coordinates of the URDF.
+            offsets. The method `placement` of this table takes the URDF's joint coordinates.
         senses: Sign of each joint, +1 or -1. The table's variable is sign * q + offset, where q is the URDF's
             joint value.
         metres, radians: Largest errors of the fitted table's tip on the samples.
@@ -130,9 +130,10 @@ class TableComparison:
             and for all displacements within limits. A prismatic joint without limits is assumed to be within
             0.5 m of zero. The bounds do not include rounding errors.
         written_metres, written_radians: Largest errors of the unfitted table's tip on the samples.
-        instead: The cells that would have to change without a fit; empty if this would change too many cells,
-            or would not remove the tip error.
-        hidden: Row index and name of each cell whose error base, tool and joint offsets can compensate.
+        instead: The cells that must change so that the table agrees without a fit. Empty if these cells are
+            too many, or if a tip error remains after their correction.
+        hidden: Row index and name of each cell whose error is hidden by a fit of base, tool and joint
+            offsets.
         residual: Tip error (metres) that remains if the differing cells take the URDF's values.
     """
 
@@ -196,8 +197,9 @@ def has_range(limit: Limit | None) -> TypeGuard[Limit]:
 
 
 def resolution(share: float, radians: float) -> float:
-    """Return the power of ten to which fitted numbers are rounded: at least twice the tip error.
+    """Return the power of ten to which fitted numbers are rounded.
 
+    The result is the smallest power of ten that is at least twice the tip error and at least twice `_FINEST`.
     `share` is the position error of the tip in metres per metre of reach.
     """
     return float(10.0 ** math.ceil(math.log10(2.0 * max(share, radians, _FINEST))))
@@ -365,7 +367,10 @@ def _table(cells: Sequence[CellDifference], units: Units) -> Table:
 
 
 def _format_offset(offset: float, row: DHRow, fine: float, units: Units) -> str:
-    """Format an offset with the resolution `fine`; write near-multiples of 15 degrees exactly."""
+    """Round an offset to a multiple of `fine`, and format it.
+
+    An angle that differs by at most `fine` from a multiple of 15 degrees is rounded to this multiple.
+    """
     if abs(offset) <= fine:
         return "0"
     if not row.kind.turns:

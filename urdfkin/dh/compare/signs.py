@@ -1,9 +1,9 @@
 """Find the joint signs and the directions of x with which a reference table fits a path of a URDF.
 
 The author of a table makes three choices that do not change the robot: the positive direction of each joint,
-the direction of x along each common normal, and the zero position of each theta. A sign +1 or -1 represents a
-direction, and the zero positions follow from the signs. Each combination of signs gives a table of the path.
-A beam search keeps the combinations whose tables differ least from the reference table.
+the direction of x along each common normal, and the zero position of each theta. The search describes each
+direction by a sign, +1 or -1, and computes the zero positions from the signs. Each combination of signs gives
+a table of the path. A beam search keeps the combinations whose tables differ least from the reference table.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from urdfkin.model.tree import FloatArray
 
 PATTERNS = 12
 BEAM = 128
-#: This cost (metres) of a reversed joint selects the URDF's joint signs among equal alignments.
+#: Cost (metres) of each joint with sign -1. Among otherwise equal alignments, the URDF's signs cost least.
 _REVERSAL_COST = 1e-9
 #: Length differences next to a prismatic axis have a small weight, because this axis can be shifted.
 _SLIDING_WEIGHT = 1e-3
@@ -63,7 +63,7 @@ class _PartialAlignment:
 
     Attributes:
         cost: Sum of the differences between cells (metres); angles are multiplied by the reach.
-        offsets: Offsets of these joints except the last joint.
+        offsets: Joint offsets of these joints. The offset of the last of these joints is not yet known.
         phi_in: Rotation about z from the last joint's DH frame to its URDF frame (rad).
         carry: Offset along z from the last joint's DH frame to its URDF frame (metres).
         free_offset: Row index and sign of a joint offset that can be chosen freely, because axes coincide.
@@ -96,7 +96,8 @@ def align(chain: FrameChain, reference: DHTable, count: int = PATTERNS, beam: in
             for extended in _extend(partial, chain, reference, i, sense, reach)
         ]
         partials = _without_equivalents(sorted(longer, key=lambda partial: partial.cost))[:beam]
-    # If axes nearly coincide, a fit from one direction of x can reach all nearly equivalent directions.
+    # If axes nearly coincide, many directions of x are nearly equivalent.
+    # A fit that starts with one of these directions can reach each of the others.
     # Therefore, only the best alignment is kept for each combination of joint signs.
     by_senses: dict[tuple[int, ...], _PartialAlignment] = {}
     for partial in partials:
@@ -108,7 +109,7 @@ def _without_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlig
     """Keep the first of several alignments that differ only by a rotation about coinciding axes."""
     different: dict[tuple[object, ...], _PartialAlignment] = {}
     for partial in partials:
-        # If the joint's zero offset is free, it can reverse x, so both directions of x are equivalent.
+        # A joint offset that can be chosen freely can reverse x. Both directions of x are then equivalent.
         period = math.pi if partial.free_offset else 2.0 * math.pi
         last_frame = round(partial.phi_in % period, _DECIMALS), round(partial.carry, _DECIMALS)
         different.setdefault((partial.senses, partial.free_offset, *last_frame), partial)
@@ -116,7 +117,10 @@ def _without_equivalents(partials: list[_PartialAlignment]) -> list[_PartialAlig
 
 
 def _constant(chain: FrameChain, k: int, sense_before: int, sense_after: int) -> FloatArray:
-    """Return the constant pose A_k; reverse the z axis of each neighbouring joint with sign -1."""
+    """Return the constant pose A_k.
+
+    If the joint before or after A_k has sign -1, the z axis of this joint is reversed.
+    """
     A = chain.constants[k]
     A = _HALF_TURN @ A if sense_before < 0 else A
     return np.array(A @ _HALF_TURN if sense_after < 0 else A)
@@ -165,7 +169,10 @@ def _free_offset(
 
 
 def _with_theta(partial: _PartialAlignment, step: AxisTransform, theta: float) -> _PartialAlignment:
-    """Change the free joint offset so that the next row, of a prismatic joint, has this theta."""
+    """Change the joint offset in `free_offset` so that the row of the last joint has this theta.
+
+    The last joint is prismatic.
+    """
     if partial.free_offset is None:
         return partial
     excess = partial.phi_in + step.phi - theta
@@ -192,8 +199,8 @@ def _steps(
         # A prismatic joint's axis can be shifted, so x can have any direction next to a prismatic joint.
         if math.hypot(shifted[0, 3], shifted[1, 3]) < _NO_OFFSET or not both_turn:
             shifted[:2, 3] = 0.0
-        # With reach 0, every common normal that misses a joint's origin counts as far away.
-        # Therefore, `step_between` makes a Hayati row.
+        # `step_between` makes a Hayati row if the common normal is farther than the reach from an origin.
+        # With reach 0, `step_between` makes a Hayati row unless the common normal meets both origins.
         hayati_reach = reach if sine < NEARLY_PARALLEL else 0.0
         step = step_between(shifted, hayati_reach, phi_free, hayati=True)
         steps.append(replace(step, delta=step.delta + delta))

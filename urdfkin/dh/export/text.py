@@ -24,7 +24,8 @@ _LATEX_FORMULA = {
     DHConvention.STANDARD: r"R_z(\theta_i)\,T_z(d_i)\,T_x(a_i)\,R_x(\alpha_i)",
     DHConvention.MODIFIED: r"T_x(a_{i-1})\,R_x(\alpha_{i-1})\,R_z(\theta_i)\,T_z(d_i)",
 }
-#: With this factor, a relative rounding error below 1e-12 does not increase a bound's last printed digit.
+#: A bound is multiplied by this factor, and then rounded up to its last printed digit.
+#: Therefore, a relative rounding error below 1e-12 does not increase this digit.
 _ON_THE_DIGIT = 1.0 - 1e-12
 
 
@@ -40,7 +41,7 @@ def variable(
     name: str = "q{}",
     number: Callable[[float], str] = "{:.10g}".format,
 ) -> str:
-    """Return the joint's variable, with sense and multiplier: q1, -q2, 2 q1."""
+    """Return the joint's variable with its sign and its multiplier, for example q1, -q2 or 2 q1."""
     leader = row.mimic.leader if row.mimic else row.joint
     q = name.format(table.joint_names.index(leader) + 1)
     multiplier = row.sense * (row.mimic.multiplier if row.mimic else 1.0)
@@ -55,7 +56,10 @@ def coordinate_names(table: DHTable) -> str:
 
 
 def constant_of(row: DHRow) -> float:
-    """Return the constant added to the joint's variable: the cell plus the offset of a mimic rule."""
+    """Return the constant that is added to the joint's variable.
+
+    For a mimic joint, it is the cell plus the product of the joint's sign and the offset of the mimic rule.
+    """
     cell = row.theta if row.kind.turns else row.d
     return cell + row.sense * row.mimic.offset if row.mimic else cell
 
