@@ -105,7 +105,7 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: Commands that error messages suggest, each with the unknown words that the command replaces.
+#: Commands that error messages suggest. Each value lists the unknown commands for a suggestion.
 _SYNONYMS = _by_word(
     {
         "placement": "fk forward forward-kinematics pose transform tf",
@@ -132,7 +132,7 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice in error messages, each with words for a subject that urdfkin does not cover.
+#: Advice for computations that urdfkin does not offer. Each value lists the unknown commands for an advice.
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"

@@ -68,7 +68,10 @@ def _table(robot: Robot) -> Answer:
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return each joint's index in q: "7", "7/6" if the index in v is 6, or "-" without a coordinate."""
+    """Return a text for each joint: its index in q, for example "7", or its range of indices, "7-13".
+
+    The text is "7/6" if the index in v is 6. The text is "-" if the convention has no index for the joint.
+    """
     indices = conversion.q_and_v_indices
 
     def span(found: list[int]) -> str:
