@@ -70,7 +70,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         ),
         "verify": (
             "verify",
-            "Compare the results of your function or program with urdfkin's and Pinocchio's.",
+            "Compare the results of your function or program with those of urdfkin and Pinocchio.",
         ),
         "readers": (
             "readers",
@@ -121,7 +121,7 @@ _SYNONYMS = _by_word(
         "screws": "poe product-of-exponentials twists",
         "info": "show joints links frames limits summary tree",
         "view": "visualize visualise viewer display gui",
-        "report compare (reports), same (models), diff (versions of a file)": "compare comparison",
+        "report compare (for reports), same (for models) or diff (for file versions)": "compare comparison",
         "report status": "campaign status progress",
         "report merge": "merge",
         "check": "lint validate-urdf check-urdf",
@@ -138,9 +138,9 @@ _ABSENT = _by_word(
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"
         " and `jacobian` compute the pose and the Jacobian that an iterative solver needs":
             "ik inverse inverse-kinematics solve",
-        "urdfkin has no dynamics; use Pinocchio's (`robot.pinocchio_model()` in Python)":
+        "urdfkin does not compute dynamics; use Pinocchio (`robot.pinocchio_model()` in Python)":
             "dynamics rnea inertia torque mass-matrix",
-        "urdfkin has no collision checks; use Pinocchio's": "collision",
+        "urdfkin does not check collisions; use Pinocchio": "collision",
     }
 )  # fmt: skip
 

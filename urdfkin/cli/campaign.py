@@ -182,8 +182,8 @@ def status(context: click.Context, folder: Path) -> None:
         say(f"  and {len(failed) - _MOST_FAILED:,} more")
     if missing and (seconds := _seconds_of_chunk(store, counts)) is not None:
         say(
-            f"remaining: {duration(missing * seconds)} on one processor, {seconds:.2g} s per chunk;"
-            " divide the time by the number of processors"
+            f"remaining: {duration(missing * seconds)} on one processor, with {seconds:.2g} s for each chunk;"
+            " on n processors, divide the remaining time by n"
         )
     if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")

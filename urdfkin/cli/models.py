@@ -59,7 +59,8 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes of joint space in memory while bounds are computed; 0: no bounds.",
+    help="Maximum number of boxes (parts of the joint space) that the search for sharper upper bounds keeps"
+    " in memory; 0: no search.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")

@@ -116,7 +116,7 @@ def _code(start: Conversion, end: Conversion) -> Answer:
             old, new, star = (
                 ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
             )
-            yield f"# {letter}: the conversion does more than reorder entries; use urdfkin:"
+            yield f"# {letter}: this conversion changes more than order, factors and zeros; use urdfkin:"
             yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

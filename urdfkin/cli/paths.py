@@ -163,8 +163,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     "--opw",
     type=FiniteNumber(),
     metavar="MM",
-    help="Instead, print the parameters of an OPW solver as YAML. Fail if the tip deviates by more than MM"
-    " millimetres or MM milliradians.",
+    help="Print the parameters of an OPW solver as YAML, instead of the structure. The command fails if the"
+    " error of the tip pose exceeds MM millimetres or MM milliradians.",
 )
 @verify_option
 @writes_answer(*TEXTS, "json")
@@ -215,7 +215,7 @@ def _structure_document(found: Structure) -> TextDocument:
             rows.append((f"{pair.first}, {pair.second}", angle, distance))
         parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
-    start = "from the point of the first axis nearest to the second axis"
+    start = "measured from the point on the first axis that is nearest to the second axis"
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
         f"reach: {found.reached:.4g} m on samples{bound}, {start}",

@@ -299,8 +299,8 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
 
     def parts() -> Iterator[str | Table]:
         yield (
-            "in m/s^2 and rad/s^2; terms of equation 7.125: transverse (a z x d), centripetal,"
-            " Coriolis (2 w x u), sliding (a z)"
+            "The numbers are in m/s^2 and rad/s^2. The kinds are terms of equation 7.125: transverse"
+            " (a z x d), centripetal, Coriolis (2 w x u) and sliding (a z)."
         )
         yield from _samples(x, 2, "csv, json or npy", table)
 
@@ -421,8 +421,8 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
         metavar="NAME",
         default="ZYZ",
         help="Representation of the orientation: rpy (roll, pitch, yaw as in a URDF), quaternion, or the axes"
-        " of three Euler angles. Capital letters are moving axes (ZYZ), small letters are fixed axes (xyz,"
-        " which is rpy).",
+        " of three Euler angles. Capital letters are moving axes (ZYZ), small letters are fixed axes (xyz"
+        " is the same as rpy).",
     ),
     click.option(
         "--nearest",

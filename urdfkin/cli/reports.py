@@ -147,7 +147,7 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     "--factor",
     type=NumberInRange(1.0),
     default=2.0,
-    help="If a worst disagreement grows by more than this factor, report a regression.",
+    help="Report a regression if a quantity's largest disagreement grows by more than this factor.",
 )
 @markdown_option
 @writes_answer(*TEXTS, "json")
