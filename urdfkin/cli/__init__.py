@@ -70,7 +70,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         ),
         "verify": (
             "verify",
-            "Compare the results of your function or program with urdfkin's and Pinocchio's.",
+            "Compare the results of your function or program with those of urdfkin and Pinocchio.",
         ),
         "readers": (
             "readers",
@@ -105,7 +105,7 @@ def _by_word(table: dict[str, str]) -> dict[str, str]:
     return {word: key for key, words in table.items() for word in words.split()}
 
 
-#: Commands that error messages suggest, each with the unknown words that the command replaces.
+#: Commands that error messages suggest. Each value lists the unknown commands for a suggestion.
 _SYNONYMS = _by_word(
     {
         "placement": "fk forward forward-kinematics pose transform tf",
@@ -121,7 +121,7 @@ _SYNONYMS = _by_word(
         "screws": "poe product-of-exponentials twists",
         "info": "show joints links frames limits summary tree",
         "view": "visualize visualise viewer display gui",
-        "report compare (reports), same (models), diff (versions of a file)": "compare comparison",
+        "report compare (for reports), same (for models) or diff (for file versions)": "compare comparison",
         "report status": "campaign status progress",
         "report merge": "merge",
         "check": "lint validate-urdf check-urdf",
@@ -132,15 +132,15 @@ _SYNONYMS = _by_word(
         "robots": "list catalogue catalog",
     }
 )
-#: Advice in error messages, each with words for a subject that urdfkin does not cover.
+#: Advice for computations that urdfkin does not offer. Each value lists the unknown commands for an advice.
 _ABSENT = _by_word(
     {
         "urdfkin has no inverse kinematics; `structure` names closed-form solvers for an arm, and `placement`"
         " and `jacobian` compute the pose and the Jacobian that an iterative solver needs":
             "ik inverse inverse-kinematics solve",
-        "urdfkin has no dynamics; use Pinocchio's (`robot.pinocchio_model()` in Python)":
+        "urdfkin does not compute dynamics; use Pinocchio (`robot.pinocchio_model()` in Python)":
             "dynamics rnea inertia torque mass-matrix",
-        "urdfkin has no collision checks; use Pinocchio's": "collision",
+        "urdfkin does not check collisions; use Pinocchio": "collision",
     }
 )  # fmt: skip
 

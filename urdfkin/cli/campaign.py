@@ -29,14 +29,17 @@ _LINES, _JSON = 10.0, 0.5
 
 
 class Pace:
-    """Estimates the speed of a validation (chunks per second) and the remaining time (s)."""
+    """Estimates the speed of a validation in chunks per second, and the remaining time (s).
+
+    A chunk is a part of the samples of one robot.
+    """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self._now, self._begin = now, now()
 
     def of(self, state: CampaignProgress) -> tuple[float | None, float | None]:
         seconds, fresh = self._now() - self._begin, state.chunks_done - state.chunks_kept
-        # Before the first new chunk, urdfkin may compile kernels, so this time is not counted.
+        # The time before the first new result is not counted, because urdfkin may compile kernels then.
         if fresh <= 0:
             self._begin = self._now()
         if fresh <= 0 or seconds <= 0.0:
@@ -179,8 +182,8 @@ def status(context: click.Context, folder: Path) -> None:
         say(f"  and {len(failed) - _MOST_FAILED:,} more")
     if missing and (seconds := _seconds_of_chunk(store, counts)) is not None:
         say(
-            f"remaining: {duration(missing * seconds)} on one processor, {seconds:.2g} s per chunk;"
-            " divide the time by the number of processors"
+            f"remaining: {duration(missing * seconds)} on one processor, with {seconds:.2g} s for each chunk;"
+            " on n processors, divide the remaining time by n"
         )
     if (holder := store.writing_process()) is not None:
         say(f"the store is in use by: {holder}")
@@ -235,9 +238,9 @@ def _seconds_of_chunk(store: Store, counts: dict[int, tuple[int, bool]]) -> floa
 def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     """Copy the results of several stores of the same validation into the folder DIR.
 
-    A STORE is a folder of `urdfkin validate --store`, for example one from each machine. Results of the
-    accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped. DIR
-    is made if it does not exist.
+    Each STORE is a folder that `urdfkin validate --store` wrote, for example on another machine. Results of
+    the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
+    DIR is made if it does not exist.
     """
     from urdfkin.validation.accuracy_store import AccuracyResult
     from urdfkin.validation.store import Store, open_store

@@ -69,7 +69,8 @@ choice_options = combine(
     _choice(
         "--near-parallel",
         ("hayati", "strict"),
-        "Number of parameters in the row of a nearly parallel joint axis: five (hayati) or four (strict).",
+        "Parameters for nearly parallel joint axes. hayati: five, with the angle beta. strict: only four, and"
+        " offsets can become very large.",
     ),
     click.option(
         "--snap",
@@ -86,8 +87,8 @@ choice_options = combine(
     _choice(
         "--parallel-offset",
         ("last", "first", "each"),
-        "For parallel joint axes: write the sum of their offsets into the d of the last row or of the first"
-        " row, or each offset into the d of its own row.",
+        "Rule for the offsets along parallel joint axes. last or first: the cell d of the last or first row"
+        " contains their sum. each: the cell d of each row contains the offset of its own link.",
     ),
     click.option(
         "--flip",
@@ -103,13 +104,14 @@ choice_options = combine(
     _choice(
         "--sign",
         ("theta", "a", "alpha"),
-        "How to choose the directions of the x axes: smallest |theta| (theta), a not negative (a), or alpha"
-        " not negative (alpha).",
+        "Rule for the directions of the x axes. theta: |theta| is at most 90 degrees. a: the length a is not"
+        " negative. alpha: the angle alpha is not negative.",
     ),
     _choice(
         "--slide",
         ("drawn", "minimal"),
-        "Axis of a prismatic joint. drawn: the axis in the URDF. minimal: a parallel axis for which a is 0.",
+        "Position of a prismatic joint's axis. drawn: as in the URDF. minimal: through the origin of the next"
+        " or previous revolute joint, so that the length a between the axes is 0.",
     ),
     click.option(
         "--like",
@@ -170,7 +172,7 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
         (("tip", "like"), options["all_"], "with --all"),
         (_SIGNS, options["like"] is not None, "with --like"),
         (("columns",), tree or compares, "unless the output is one table"),
-        (_UNITS, form not in printed, f"in the format {form!r}, which is exact, in metres and radians"),
+        (_UNITS, form not in printed, f"in the format {form!r}: its numbers are in metres and radians"),
         (("mimic", "root_joint", "xacro_arg"), is_table, "for a robot from a table"),
     ):
         if where:

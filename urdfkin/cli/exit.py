@@ -30,7 +30,10 @@ class Stop:
     signal: int | None = None
 
     def exit_code(self, otherwise: int) -> int:
-        """Return 128 + the number of the signal, as shells do; exit code 1 (a disagreement) stays 1."""
+        """Return 128 + the number of the signal that stopped the command, as shells do.
+
+        Return `otherwise` if no signal stopped the command, or if `otherwise` is 1 (a disagreement).
+        """
         return otherwise if self.signal is None or otherwise == 1 else 128 + self.signal
 
 
@@ -38,7 +41,8 @@ class Stop:
 def stoppable() -> Iterator[Stop]:
     """Raise KeyboardInterrupt at the first SIGTERM or SIGHUP; ignore later ones so that results are saved."""
     stop = Stop()
-    # `nohup` makes a process ignore SIGHUP, so only signals with the default handler get a new handler.
+    # `nohup` makes a process ignore SIGHUP, and a new handler would end this.
+    # The new handler therefore replaces only default handlers.
     numbers = [number for number in _SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
 
     def handle(handler: Any) -> None:

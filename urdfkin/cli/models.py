@@ -59,7 +59,8 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--boxes",
     type=WholeNumber(0),
-    help="Maximum number of boxes of joint space in memory while bounds are computed; 0: no bounds.",
+    help="Maximum number of boxes (parts of the joint space) that the search for sharper upper bounds keeps"
+    " in memory; 0: no search.",
     show_default="131072",
 )
 @click.option("--all", "all_", is_flag=True, help="Show all differences and frames, not only the first ones.")
@@ -100,20 +101,21 @@ def same_command(
 ) -> Answer:
     """Prove whether A and B are the same robot in every configuration; with C, compare each pair.
 
-    A and B are robots as in other commands, or Denavit-Hartenberg tables. A and B are the same robot if the
-    screws of all joints and the zero-configuration poses of all links agree. Fixed links, names and the order
-    of joints may differ. A and B are equivalent if they agree after a change of B, for example of its base
-    pose or of the zero position of a joint.
+    A and B are paths, names that `urdfkin robots` lists, or Denavit-Hartenberg tables. A and B are the same
+    robot if the screws of all joints and the zero-configuration poses of all links agree. Fixed links, names
+    and the order of joints may differ. A and B are equivalent if they agree after a change of B, for example
+    of its base pose or of the zero position of a joint.
 
     If A and B differ, the command prints two bounds on the largest distance of each frame of B from the same
-    frame of A. The distance reaches the lower bound in a configuration that the command prints. No
+    frame of A. The command also prints a configuration in which the distance is at least the lower bound. No
     configuration within the joint limits exceeds the upper bound: this is proven. A USD file has numbers in
-    single precision. Two models are the same up to single precision if each joint differs only by the
-    rounding of the numbers in its definition.
+    single precision. Two models are the same up to single precision if each joint differs by no more than the
+    rounding of its numbers to single precision.
 
-    Exit 0: same, same up to single precision, or equivalent up to the printed changes. 1: different; with
-    --strict, also if the models are equivalent but not the same. 2: bad input. With --within, A is compared
-    with B as given. Exit 0: all frames are within the given distance. 1: a frame is not.
+    Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
+    1: the models are different. With --strict, also 1 if the models are equivalent but not the same, or if
+    their joint limits differ. 2: bad input. With --within, the command does not change B before the
+    comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
     from urdfkin.comparison.bounds import MOST_BOXES
     from urdfkin.comparison.certificate import certificate
@@ -198,7 +200,7 @@ def _recheck(robots: tuple[Robot, Robot], path: Path) -> Answer:
 def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown: Path | None) -> Answer:
     """List the changes from OLD to NEW, attribute by attribute, and how far they move the robot's frames.
 
-    For each changed joint, the command prints how far this joint's changes move the frame that moves most.
+    For each changed joint, the command prints the largest displacement of any frame by this joint's changes.
     This distance is the maximum over all configurations within limits, with the same joint coordinates in OLD
     and NEW. The last line of the output states how far all changes together move the frames. If OLD and
     NEW have different formats (URDF, MJCF or USD), the changes are the differences that `urdfkin same` finds.

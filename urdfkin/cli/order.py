@@ -68,7 +68,10 @@ def _table(robot: Robot) -> Answer:
 
 
 def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
-    """Return each joint's index in q: "7", "7/6" if the index in v is 6, or "-" without a coordinate."""
+    """Return a text for each joint: its index in q, for example "7", or its range of indices, "7-13".
+
+    The text is "7/6" if the index in v is 6. The text is "-" if the convention has no index for the joint.
+    """
     indices = conversion.q_and_v_indices
 
     def span(found: list[int]) -> str:
@@ -113,7 +116,7 @@ def _code(start: Conversion, end: Conversion) -> Answer:
             old, new, star = (
                 ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
             )
-            yield f"# {letter}: the conversion does more than reorder entries; use urdfkin:"
+            yield f"# {letter}: this conversion changes more than order, factors and zeros; use urdfkin:"
             yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
         if start.angular_first != end.angular_first:
             yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"

@@ -139,7 +139,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     The result is the pose M in the zero configuration, and each joint's screw in space and body axes. A screw
     is a vector (w, v), with the angular velocity w first. In generated code, each screw is a column of the
     matrix Slist (space axes) or Blist (body axes). Every command can load the TOML or JSON file that this
-    command writes. If you write such a file by hand, it needs M, and the screws as `space` or as `body`.
+    command writes. If you write such a file by hand, write the pose as `M`, and the screws as `space` or
+    as `body`.
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
@@ -162,8 +163,8 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     "--opw",
     type=FiniteNumber(),
     metavar="MM",
-    help="Instead, print the parameters of an OPW solver as YAML. Fail if the tip deviates by more than MM"
-    " millimetres or MM milliradians.",
+    help="Print the parameters of an OPW solver as YAML, instead of the structure. The command fails if the"
+    " error of the tip pose exceeds MM millimetres or MM milliradians.",
 )
 @verify_option
 @writes_answer(*TEXTS, "json")
@@ -214,7 +215,7 @@ def _structure_document(found: Structure) -> TextDocument:
             rows.append((f"{pair.first}, {pair.second}", angle, distance))
         parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
-    start = "from the point of the first axis nearest to the second axis"
+    start = "measured from the point on the first axis that is nearest to the second axis"
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
         f"reach: {found.reached:.4g} m on samples{bound}, {start}",

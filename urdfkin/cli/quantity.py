@@ -258,7 +258,7 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
         relative_to = x.settings.get("relative_to", "the world")
         heads = (f"axis of {relative_to}", "x of frame", "y of frame", "z of frame", "position [m]")
         return Table(heads, [(axis, *row) for axis, row in zip("xyz", value[:3].tolist(), strict=True)])
-    # A position with a quaternion has seven numbers, but two units.
+    # The columns x, y and z need three numbers for each unit. A position with a quaternion has seven numbers.
     if len(value) != 3 * len(quantity.units):
         return Table(quantity.labels, [value.tolist()], left=0)
     names = [f"{name} [{unit}]" for name, unit in quantity.units.items()]
@@ -269,8 +269,8 @@ def _table(x: Inputs, quantity: Quantity, value: FloatArray) -> Table:
 def _columns(quantity: Quantity, rates: Sequence[str], value: FloatArray) -> Table:
     """Return a table with one row for each column of a Jacobian.
 
-    For a Hessian, each row has the derivative of one column with respect to one coordinate. Rows that
-    contain only rounding errors are left out.
+    For a Hessian, each row has the derivative of one column of the Jacobian with respect to one joint
+    coordinate. Rows that contain only rounding errors are left out.
     """
     import numpy as np
 
@@ -299,8 +299,8 @@ def _breakdown_answer(x: Inputs, reference: str, found: AccelerationBreakdown) -
 
     def parts() -> Iterator[str | Table]:
         yield (
-            "in m/s^2 and rad/s^2; terms of equation 7.125: transverse (a z x d), centripetal,"
-            " Coriolis (2 w x u), sliding (a z)"
+            "The numbers are in m/s^2 and rad/s^2. The kinds are terms of equation 7.125: transverse"
+            " (a z x d), centripetal, Coriolis (2 w x u) and sliding (a z)."
         )
         yield from _samples(x, 2, "csv, json or npy", table)
 
@@ -361,8 +361,8 @@ def placement_command(relative_to: str | None, written: str, verify: bool, **_: 
     angles, or a position and a quaternion. Pinocchio checks that the angles or the quaternion give the same
     rotation as T.
 
-    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The path may also be that of
-    a Denavit-Hartenberg table: .toml, .json or .csv.
+    ROBOT is a path, a name that `urdfkin robots` lists, or - for standard input. The file at the path may
+    also be a Denavit-Hartenberg table: .toml, .json or .csv.
     """
     if relative_to is not None:
         reject_unused_options(click.get_current_context(), ("base_placement",), "with --relative-to")
@@ -421,8 +421,8 @@ REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES)
         metavar="NAME",
         default="ZYZ",
         help="Representation of the orientation: rpy (roll, pitch, yaw as in a URDF), quaternion, or the axes"
-        " of three Euler angles. Capital letters are moving axes (ZYZ), small letters are fixed axes (xyz,"
-        " which is rpy).",
+        " of three Euler angles. Capital letters are moving axes (ZYZ), small letters are fixed axes (xyz"
+        " is the same as rpy).",
     ),
     click.option(
         "--nearest",
@@ -436,7 +436,8 @@ def analytical_jacobian_command(representation: str, nearest: float | None, **_:
     """Compute a frame's analytical Jacobian J = C^-1 J_v (eq. 7.118, 7.122).
 
     Each row of the table belongs to one entry of v, for example a joint velocity. The row lists the time
-    derivatives of the frame's position and orientation (Euler angles or a quaternion) for a unit velocity.
+    derivatives of the frame's position and orientation (Euler angles or a quaternion). For these derivatives,
+    this entry of v is 1, and all other entries are 0.
     `urdfkin jacobian` prints angular velocities instead.
     """
     from urdfkin.kinematics.rotation import NEAREST
@@ -519,7 +520,8 @@ def singular_values_command(rows: str, **_: Any) -> Answer:
     joint, from the Hessian.
 
     At a singularity, the command prints the rank, the lost directions and the joints that cause them. The
-    manipulability may have no derivative there: nan in CSV, null in JSON. See `urdfkin explain singularity`.
+    manipulability may have no derivative at a singularity. CSV then contains nan, and JSON contains null.
+    See `urdfkin explain singularity`.
 
     With --convention, the derivatives are with respect to the joint coordinates of that convention. The
     singular values are always for joint velocities in rad/s and m/s.

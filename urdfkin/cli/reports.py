@@ -147,7 +147,7 @@ def show(context: click.Context, /, results: Path | None, cases: bool, **files: 
     "--factor",
     type=NumberInRange(1.0),
     default=2.0,
-    help="If a worst disagreement grows by more than this factor, report a regression.",
+    help="Report a regression if a quantity's largest disagreement grows by more than this factor.",
 )
 @markdown_option
 @writes_answer(*TEXTS, "json")
@@ -159,12 +159,15 @@ def compare_reports(old: Path, new: Path, factor: float, markdown: Path | None) 
     - The run passed before and fails now.
     - A robot is missing, or its verdict is worse.
     - More results are outside their bound.
-    - A quantity is no longer compared, or is compared on fewer samples.
-    - A bound is wider.
-    - A worst disagreement grew by more than --factor, and is above 2 eps*scale.
+    - A quantity is no longer compared, or there are fewer samples or results.
+    - A bound is wider for the same joints.
+    - The largest disagreement of a quantity grew by more than --factor,
+      and is above 2 eps*scale (the error of a single rounding).
+    - The largest ratio of a disagreement to its bound grew by more than
+      --factor, and is above 0.1.
 
-    A changed model is listed joint by joint. A changed model alone is not a regression; `urdfkin same` and
-    `urdfkin diff` compute how far its frames move.
+    If a model changed, the command lists the changes of each joint. A changed model alone is not a
+    regression; `urdfkin same` and `urdfkin diff` compute how far the model's frames move.
 
     Exit 0: no regression. 1: a regression. 2: a file cannot be used, for example because its numbers of
     samples contradict each other.
@@ -199,7 +202,7 @@ def report_history(paths: tuple[Path, ...], all_: bool) -> Answer:
 
     The arguments are reports (JSON files), folders of `urdfkin validate --store`, or folders that contain
     both. Runs are ordered by their start. The command identifies a robot by its source (a path or a name of
-    the catalogue). If a file was renamed, the command identifies it by the robot's name. Changes and
+    the catalogue). If a file was renamed, the command identifies the robot by its name. Changes and
     regressions are defined as in `urdfkin report compare`. With `--output history.html`, the command writes
     an HTML page with charts, which works offline.
 

@@ -74,7 +74,7 @@ def info_command(robot: str) -> Answer:
     The joints have the same order as in q, in v and in the columns of a Jacobian. This is Pinocchio's order;
     the last line states whether the file has another order. Limits are in rad and rad/s, for prismatic joints
     in m and m/s. A link that is not indented is a child of the link above it. If a link has several children,
-    lines lead to them.
+    lines before their names mark the children.
     """
     loaded = load_robot(robot)
     data = {"json": lambda: _describe(loaded), "csv": lambda: _rows(loaded._sheet(), loaded.tree.links)}

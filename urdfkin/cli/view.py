@@ -63,8 +63,9 @@ def command(
     With --trajectory, the viewer plays the samples of a CSV or .npz file. With --convention, the input field
     of q accepts and shows values in that convention.
 
-    The printed address ends with a secret key. Open the address with its key, and show it only to people who
-    may see and move the robot. Other web pages and other users of this machine have no access.
+    The printed address ends with a secret key. Open the whole address, including the key. Show the address
+    only to people who may see and move the robot. Other web pages and other users of this machine
+    have no access.
     """
     from urdfkin.view.server import has_screen, new_server, opened_page
     from urdfkin.view.viewer import Viewer

@@ -14,9 +14,9 @@ from urdfkin.errors import SourceError
 def command() -> None:
     """Compile all kernels (machine code for batches) and store them, for container images and CI.
 
-    Without this command, urdfkin compiles a kernel at the first computation that becomes faster with it, for
-    example a large batch. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME. On
-    another processor, the kernels are compiled again.
+    Without this command, urdfkin compiles a kernel when computations without the kernel take too long, for
+    example for a large batch. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME.
+    On another processor, the kernels are compiled again.
 
     Exit 0: all kernels are stored. 2: the kernels cannot be stored.
     """
