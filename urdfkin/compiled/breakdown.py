@@ -13,12 +13,12 @@ acceleration of a moving point in a moving frame. Equation 7.130 is the sum of t
 | sliding | a_k z | acceleration of a prismatic joint |
 
 The vector d from the joint's origin to the frame's origin is the sum of the interorigin vectors after the
-joint (7.110). A difference of two positions in the world would lose digits if the robot
-is far from the world's origin or has a long link.
+joint (7.110). A difference of two positions in the world would lose digits if the robot is far from the
+world's origin or has a long link.
 
 The angular acceleration has the terms a_k z (transverse) and v_k w_{k-1} x z (Coriolis) of equation 7.129. A
-planar or floating joint with the linear velocity s and the angular velocity o has one more Coriolis term,
-o x s, because the joint's axes of translation rotate.
+planar or floating joint has one more Coriolis term, because the joint's axes of translation rotate. The term
+is o x s for the linear velocity s and the angular velocity o of the joint.
 """
 
 from __future__ import annotations
@@ -245,7 +245,7 @@ def _moves(joint: Joint, x: FloatArray, R: FloatArray) -> _Moves:
 
 
 def _rigid(base: FloatArray, d: FloatArray) -> FloatArray:
-    """Return the acceleration (7.123) of the base's point at `d` from the base's origin."""
+    """Return the acceleration (7.123) of a point fixed to the base, at `d` from the base's origin."""
     w, alpha, a = base[:, 12:15], base[:, 18:21], base[:, 21:24]
     linear = eq.point_acceleration(a, alpha, w, d)
     return np.concatenate((linear, np.broadcast_to(alpha, linear.shape)), axis=-1)

@@ -16,7 +16,8 @@ from urdfkin.kinematics import equations as eq
 _LOCAL, _WORLD, _ALIGNED = REFERENCES.values()
 _FRAMES, _NV = int(Head.FRAMES), int(Head.NV)
 
-#: Scratch memory rows with the 16 numbers of a pose, and with the six numbers of a velocity or acceleration.
+#: Scratch rows of the 16 numbers of a pose (`_POSE`).
+#: Scratch rows of the six numbers of a velocity or an acceleration (`_SIX`).
 _POSE = np.array([*range(OUT_ROW, OUT_ROW + 12), ZERO_ROW, ZERO_ROW, ZERO_ROW, ONE_ROW])
 _SIX = np.arange(OUT_ROW, OUT_ROW + 6)
 
@@ -64,7 +65,7 @@ def _pose_row(s, row, x, last):
 
 def emit_velocity(m, s, program, place, sources, b, reference, state, to):
     p, w, vel = state[1], state[2], state[3]
-    if reference == _WORLD:  # In WORLD, the reference point is the body's point at the world's origin.
+    if reference == _WORLD:  # The reference point is the point of the body at the world's origin.
         vel = eq.point_velocity(vel, w, eq.minus(_no_vector(), p))
     _emit_six(m, s, program, place, b, vel, w, to)
 
@@ -133,7 +134,10 @@ def column_jacobian(s, row, to, how, g, c, reference, state):
 
 
 def column_rate(s, row, to, how, g, c, reference, state):
-    """Compute the time derivative of a Jacobian column (7.126); for LOCAL, in the frame's moving axes."""
+    """Compute the time derivative of a Jacobian column (7.126).
+
+    For LOCAL, differentiate the column's components in the moving axes of the frame.
+    """
     R, p, w, vel = state[0], state[1], state[2], state[3]
     z = vector(s, row)
     z_rate = eq.axis_rate(vector(s, row + 6), z)
@@ -153,7 +157,7 @@ def column_rate(s, row, to, how, g, c, reference, state):
 
 
 def _end(reference, x):
-    """Return the reference point of a Jacobian column: the frame's origin x, or 0 for WORLD."""
+    """Return x, the position or velocity of the frame's origin; for WORLD, return 0."""
     if reference == _WORLD:
         nil = same(0.0)
         x = nil, nil, nil
@@ -215,8 +219,8 @@ def _add_changes(s, program, i, first, end, reference):
     Column i belongs to a joint on the path. If an earlier joint on the path turns, the linear and angular
     parts of column i turn with the earlier joint. A later joint moves only the reference point of the column,
     which is the frame's origin. For WORLD, the reference point does not move, so a later joint does not
-    change the column. For LOCAL, an earlier joint rotates the column together with the axes of the frame, so
-    the components of the column do not change.
+    change the column. For LOCAL, an earlier joint moves the column and the frame together. The components of
+    the column in the axes of the frame therefore do not change.
     """
     v_i, w_i = vector(s, program[i]), vector(s, program[i] + 3)
     for j in range(first, end, PAIR_WIDTH):

@@ -40,7 +40,7 @@ class JointMotion(IntEnum):
 class Geometry(IntEnum):
     """Columns of `CompiledTree.geometry`.
 
-    The offset leads from the previous moving joint to this joint, in the previous joint's axes.
+    The offset is the vector from the previous moving joint to this joint, in the previous joint's axes.
     """
 
     R = 0
@@ -81,22 +81,23 @@ class CompiledTree:
 
     Attributes:
         joints: Indices of the moving joints in the tree's list of joints.
-        steps: (steps, 3) integers, columns `StepField`.
-        geometry: (steps, 14), columns `Geometry`.
-        frames: (frames, 2) row in `steps` of the last moving joint before the frame, or -1, and the frame's
-            index in the output; sorted by the row in `steps`.
+        steps: (steps, 3) integers; `StepField` names the three columns.
+        geometry: (steps, 14); `Geometry` gives the first column of each quantity.
+        frames: (frames, 2) row in `steps` of the last moving joint before the frame, and the frame's index in
+            the output. The row is -1 if no moving joint precedes the frame. The frames are sorted by this
+            row.
         offsets: (frames, 12) rotation matrix and translation of each frame, relative to its last moving
             joint, in the order of `frames`.
-        columns: (columns, 4) integers, columns `ColumnField`; one row for each Jacobian column.
+        columns: (columns, 4) integers, one row for each Jacobian column; `ColumnField` names the integers.
         multipliers: (columns,) mimic multiplier of each Jacobian column's joint; 1 without a mimic rule.
-        leaders: (frames, columns) index of the column to which each column is added; -1 if the column's joint
-            does not move the frame. The columns of a joint and of its mimic joints are added. Their sum is
-            stored in the first of these columns on the path to the frame.
+        leaders: (frames, columns) index of the sum column of each Jacobian column; -1 if the column's joint
+            does not move the frame. The columns of a joint and of its mimic joints are added in one sum
+            column. The sum column is the first of these columns on the path to the frame.
         places_q: Indices of the coordinates that the recursion needs.
         parents: (steps,) index of the previous moving joint on the path from the base; -1 for the first.
         lengths: (steps + frames,) sums of the lengths (m) of URDF offsets, including fixed joints. The first
-            sums are from the previous moving joint to each moving joint. The other sums are from the last
-            moving joint to each frame, in the order of `frames`.
+            elements sum the offsets between the previous moving joint and each moving joint. The other
+            elements sum the offsets between the last moving joint and each frame, in the order of `frames`.
         depth: (frames,) number of URDF joints between the root and each frame, in output order.
         tilts: (frames,) sum of `Joint.tilt` (rad) over the URDF joints between the root and each frame, in
             output order.
@@ -276,10 +277,11 @@ def _leaders(columns: IntArray, parents: Sequence[int], ends: Sequence[int]) -> 
 
 
 class Op(IntEnum):
-    """Instructions of a program; the suffix X, Y or Z is the axis, and CARRY and TURN allow any axis.
+    """Instructions of a program.
 
-    CARRY is a constant translation, and TURN is a constant rotation. Instructions for a coordinate axis are
-    faster. STORE stores the data that the Jacobian column of a joint needs.
+    CARRY is a constant translation in any direction, and TURN is a constant rotation about any axis. The
+    suffix X, Y or Z names a coordinate axis; these instructions are faster. STORE stores the data that the
+    Jacobian column of a joint needs.
     """
 
     END = 0
@@ -330,14 +332,14 @@ class Head(IntEnum):
 LANES = 8
 #: Number of integers for an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers for a joint angle: scratch row, scratch row of the sine, index of the mimic rule, flag
-#: for a mimic joint.
+#: Number of integers for a joint angle. The integers are the scratch row of the angle, the scratch row of the
+#: sine, the index of the mimic rule, and a flag. The flag is 1 if the mimic rule changes the angle.
 ANGLE_WIDTH = 4
 #: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19
 STATE_ROWS, STORED_ROWS, COLUMN_ROWS = 24, 12, 6
-#: Number of integers for one Jacobian column in a Hessian: scratch row, joint, index in v, scratch row of the
-#: running sum.
+#: Number of integers for one Jacobian column in a Hessian. The integers are the scratch row of the column,
+#: the joint's row in `steps`, the joint's index in v, and the scratch row of the running sum.
 PAIR_WIDTH = 4
 
 _JOINTS = {
@@ -350,9 +352,10 @@ _JOINTS = {
 
 @dataclass(frozen=True, eq=False)
 class KernelProgram:
-    """A program: `words` are the integers that `Head` names, then lists, and then the instructions.
+    """A program for a kernel.
 
-    `rows` is the number of rows of scratch memory that the program needs.
+    `words` has three parts: the integers that `Head` names, the lists, and the instructions. `rows` is the
+    number of rows of scratch memory that the program needs.
     """
 
     words: IntArray
@@ -375,9 +378,9 @@ def program_of(
 ) -> KernelProgram:
     """Return the program for the frames of a compiled tree; the tree stores the program.
 
-    If `turned` is true, the program also computes the orientation of each frame. Placements, and results in
-    the frame's own axes, require `turned`. If `pairs` is true, mimic joints have separate Jacobian columns,
-    as a Hessian requires.
+    If `turned` is true, the program also computes the orientation of each frame. Placements need the
+    orientation, and so do results in the frame's own axes. If `pairs` is true, mimic joints have separate
+    Jacobian columns, as a Hessian requires.
     """
     key = turned, columns, pairs
     program: KernelProgram | None = plan.cache.get(key)
@@ -436,7 +439,11 @@ class _Writer:
                 now = -2  # The registers contain the state of the frame, not of a joint.
 
     def _events(self) -> Iterator[tuple[int, int | None, int | None]]:
-        """Yield (previous joint, joint, None) or (previous joint, None, frame), in the recursion's order."""
+        """Yield one event for each moving joint and each frame, in the recursion's order.
+
+        The event of a joint is (previous moving joint, joint, None). The event of a frame is (last moving
+        joint, None, frame).
+        """
         f = 0
         for i in range(-1, len(self.plan.steps)):
             if i >= 0:
@@ -446,7 +453,7 @@ class _Writer:
                 f += 1
 
     def _save(self, step: int, last: Mapping[int, int], following: int) -> None:
-        """Save the state after a joint if an event after the next event needs the state."""
+        """Save the state after a joint if an event later than event `following` begins with this state."""
         if last.get(step, -1) > following:
             self._put(Op.SAVE, self._slot(step))
 
@@ -462,7 +469,7 @@ class _Writer:
         return len(self.constants) - len(numbers)
 
     def _rigid(self, R: FloatArray, p: FloatArray, *, turned: bool = True) -> bool:
-        """Write a translation by p and a rotation by R; return whether they need instructions."""
+        """Add the instructions for a translation by p and a rotation by R; return whether any was added."""
         before = len(self.code)
         along = np.flatnonzero(p).tolist()
         if along:
@@ -498,7 +505,10 @@ class _Writer:
         self._put(op, first, int(step[StepField.V]), sine if op is Op.PLANAR else int(rule > 0), at=rule)
 
     def _frame(self, f: int) -> bool:
-        """Add the instructions for a frame's results; return whether they overwrite the joint's state."""
+        """Add the instructions for a frame's results.
+
+        Return whether the instructions overwrite the state of the last moving joint.
+        """
         plan, offsets = self.plan, self.plan.offsets[f]
         moved = self._rigid(offsets[:9].reshape(3, 3), offsets[9:], turned=self.turned)
         sources = 0
@@ -520,7 +530,10 @@ class _Writer:
                 self._put(Op.COLUMN, *rows, how, at=follows)
 
     def _sources(self, f: int, row: int) -> list[int]:
-        """Return the scratch row of each element of the frame's (6, nv) matrix, from `row` on."""
+        """Return the scratch row of each element of the frame's (6, nv) matrix.
+
+        The six numbers of Jacobian column c begin at the scratch row `row + COLUMN_ROWS * c`.
+        """
         plan = self.plan
         sources = np.full((6, plan.nv), ZERO_ROW, dtype=np.int64)
         for c in np.flatnonzero(plan.leaders[f] == np.arange(len(plan.columns))):
@@ -528,7 +541,11 @@ class _Writer:
         return sources.ravel().tolist()
 
     def _pairs(self, f: int) -> list[int]:
-        """Return the number of columns, `PAIR_WIDTH` integers for each, and the result's scratch rows."""
+        """Return the integers that the Hessian of a frame needs.
+
+        The integers are the number of columns, then `PAIR_WIDTH` integers for each column, and then the
+        scratch rows of the result.
+        """
         columns, leaders = self.plan.columns, self.plan.leaders[f]
         own = np.flatnonzero(leaders >= 0)
         rows = self.results + COLUMN_ROWS * own, self.sums + COLUMN_ROWS * leaders[own]

@@ -30,9 +30,9 @@ from urdfkin.system.locks import importing
 if TYPE_CHECKING:
     import subprocess
 
-#: Thresholds (s) of the computing time without a kernel; the module docstring lists the actions.
+#: Computing times (s) without a kernel; the table above lists the action that follows each time.
 LOADING, BESIDE, COMPILING = 0.3, 1.0, 3.0
-#: Time (s) that replaces `LOADING` after the first kernel is loaded.
+#: This threshold (s) applies instead of `LOADING` after the first kernel is loaded.
 _LOADING_MORE = 0.03
 #: Time (s) that the fast function saves in each call with one configuration.
 _SAVED = 5e-5
@@ -57,7 +57,7 @@ _only: list[Way] = []
 
 @contextmanager
 def only(way: Way) -> Iterator[None]:
-    """Compute only in the given way while the context is open."""
+    """While the context is open, use only Python numbers ("interpreted") or only kernels ("compiled")."""
     _only.append(way)
     try:
         yield
@@ -92,7 +92,7 @@ def kernel(name: str, more: float = 0.0, home: str = RECURSIONS) -> Any:
 def single_pays(name: str) -> bool:
     """Return whether to load the function that computes one configuration with the kernel `name`.
 
-    Each call adds the time that this function would save to a running total.
+    If the kernel is loaded, each call adds `_SAVED` seconds to the time lost without this function.
     """
     if _only:
         return _only[-1] == "compiled"
@@ -133,9 +133,10 @@ _beside: dict[str, subprocess.Popen[bytes]] = {}
 
 
 def _compile_beside(name: str, home: str) -> bool:
-    """Start a second process that compiles a kernel; return whether the caller goes on without the kernel.
+    """Start a second process that compiles a kernel.
 
-    At most one second process runs at a time, and at most one is started for each kernel.
+    Return False if the caller must load or compile the kernel itself, and True otherwise. At most one second
+    process runs at a time, and at most one is started for each kernel.
     """
     if cache_folder() is None:
         return False

@@ -82,9 +82,9 @@ class PreparedFrame:
     ) -> None:
         self.frame, self.reference, self.verify = frame, reference, verify
         self._robot, self._plan = robot, plan
-        #: Whether `Robot.prepare` created this object, so that the first call compiles machine code.
+        #: Whether `Robot.prepare` created this object. If so, the first call loads or compiles machine code.
         self.wanted = False
-        # At the first call of a quantity, `_first` replaces the quantity's attribute by a compiled function.
+        # `_first` replaces each of these attributes when `_first` creates the quantity's compiled function.
         self._placement: Fast = partial(self._first, "placement")
         self._velocity: Fast = partial(self._first, "velocity")
         self._jacobian: Fast = partial(self._first, "jacobian")
@@ -160,7 +160,10 @@ class PreparedFrame:
         )
 
     def _first(self, quantity: str, q: Given, *others: object) -> FloatArray | None:
-        """Create and call a quantity's fast function; return None if it cannot be used or saves no time."""
+        """Create a quantity's fast function and call the fast function.
+
+        Return None if the fast function cannot be used, saves no time, or returns None.
+        """
         # Only `Robot` normalises quaternions and checks for overflow.
         needs_robot = self._robot.tree.floating_joints or self._plan.is_large
         if needs_robot or not (isinstance(q, np.ndarray) and q.ndim == 1):

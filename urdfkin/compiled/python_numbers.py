@@ -233,7 +233,7 @@ def numbers_of(array: Any) -> Any:
 
 
 def numbers_at(address: Any) -> Any:
-    """Return the argument, a list; compiled code converts an address to a pointer."""
+    """Return the list `address`; the function of this name in compiled code returns a pointer."""
     return address
 
 
@@ -261,7 +261,7 @@ def ordinary(total: Number) -> bool:
 
 
 def all_written(*_: object) -> None:
-    """Do nothing; compiled code waits here until all results are in memory."""
+    """Do nothing; the function of this name in compiled code waits until all results are in memory."""
 
 
 stream = all_written

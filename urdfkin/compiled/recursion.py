@@ -14,7 +14,7 @@ world axes. The joint axis and the interorigin vector have constant components i
 | `axes` | joint axis and interorigin vector | velocities and accelerations of the previous link |
 |---|---|---|
 | `world_axes` | rotated by R | unchanged |
-| `link_axes` | constant: (0, 0, 1) and a constant vector | rotated to the next link's axes |
+| `link_axes` | constant; the joint axis is (0, 0, 1) | rotated to the next link's axes |
 
 The recursion uses the axes in which the result is requested. A conversion of the result to other axes would
 add the rounding errors of another rotation.
@@ -88,12 +88,12 @@ def world_axes(own, world):
 
 
 def seen(axes, R, x):
-    """Convert a vector x from link axes to the axes of the recursion."""
+    """Convert a vector x from link axes to the axes that `axes` selects: link axes or world axes."""
     return axes(x, eq.rotate(R, x))
 
 
 def seen_after(axes, S, x):
-    """Return the components of a vector x after a rotation S of the link's frame."""
+    """Return the components of a vector x after the link's frame is rotated by S; x itself stays the same."""
     return axes(eq.rotate(eq.transposed(S), x), x)
 
 
@@ -115,7 +115,10 @@ def carried(axes, state, d):
 
 
 def turned(axes, state, S):
-    """Return a link's state after a rotation S of the link's frame; the link does not move."""
+    """Return a link's state after the link's frame is rotated by S, so that R becomes R S.
+
+    The motion of the link stays the same; only its components in link axes change.
+    """
     R, p, w, vel, alpha, acc = state
     return (
         eq.product(R, S),
@@ -262,8 +265,8 @@ def _read(m, x, n, b, width, stride, blocks, begin, end, s, row):
     """Read the listed blocks of eight numbers of `m` configurations into scratch memory.
 
     A whole block is read faster than a part of a block. The last block of a configuration may therefore
-    contain surplus numbers of the next configuration. Later inputs overwrite the surplus numbers,
-    or no instruction uses them.
+    contain surplus numbers of the next configuration. Inputs that are read later may overwrite the surplus
+    numbers. No instruction uses the other surplus numbers.
     """
     for i in range(begin, end):
         at = blocks[i]
@@ -324,8 +327,8 @@ def _over_joint(axes, op, state, s, x, v, a, z, g, c):
 
     The scratch rows of the joint's velocity and acceleration are `v` and `a`. For a revolute joint, `x` is
     the scratch row of the sine; for other joints, `x` is the row of the first coordinate. For a planar joint,
-    `z` is the scratch row of the sine; for other joints, `z` is 1 for a mimic joint, else 0. The constants of
-    a mimic rule begin at `g[c]`.
+    `z` is the scratch row of the sine. For a revolute or prismatic joint, `z` is 1 if a mimic rule changes
+    the coordinate, else 0. The constants of the mimic rule begin at `g[c]`.
     """
     if op == _REVOLUTE:
         rate, rate_2 = _rate(state[2][0], s, v, g, c, z), _rate(state[4][0], s, a, g, c, z)
@@ -372,7 +375,7 @@ def _block(axes, m, task, program, g, s, b, reference, orders, mask, store, colu
     at, stage = program[_CODE], task[_STAGE]
     to, first = (numbers_at(stage), 0) if stage else (numbers_at(task[_OUT]), b)
     if task[_BASE] == 0 and _CARRY_X <= program[at] <= _CARRY:
-        # The base is at rest at the world's origin, so the first translation changes only the position.
+        # The base is at rest, so a translation as the first instruction changes only the position.
         state = _shifted(state, _vector(g, program[at + 4]))
         at += WIDTH
     while program[at] != _END:

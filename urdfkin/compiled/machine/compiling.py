@@ -1,9 +1,9 @@
 """Compile kernels with Numba and cache them on disk.
 
-The name of the cache folder contains a digest of all source files of `compiled` and `kinematics`, because a
-kernel may use functions of any of these files. Numba's own cache files have no digest: a truncated file makes
-every later run fail, and Numba executes a file with a changed bit. This module therefore writes a digest into
-each cache file. If a cache file is damaged, its kernel is compiled again.
+The name of the cache folder contains a digest of all source files of `compiled` and `kinematics`. A kernel
+may use functions of any of these files. Numba's own cache files have no digest: a truncated file makes every
+later run fail, and Numba executes a file with a changed bit. This module therefore writes a digest into each
+cache file. If a cache file is damaged, its kernel is compiled again.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ _dumps: Any = dumps
 class KernelCache(_Null):  # type: ignore[misc]
     """The disk cache of one function, which Numba reads before a compilation and writes afterwards.
 
-    A function's source file may be in another package, so the name of the cache file also depends on the text
-    of that source file.
+    A function's source file may be in another package. The name of the cache file therefore depends on the
+    text of that source file too.
     """
 
     def __init__(self, function: Callable[..., int], folder: Path, begin: Callable[[], None]) -> None:
@@ -113,7 +113,8 @@ class _InlinedLowering(_Lowering):  # type: ignore[misc]
 class InlinedCompiler(_Compiler):  # type: ignore[misc]
     """A compiler of functions that only kernels call; it produces LLVM code, but no machine code.
 
-    The functions must not contain closures or array expressions, because the passes for them are skipped.
+    The functions must not contain closures or array expressions, because this compiler omits Numba's passes
+    for closures and for array expressions.
     """
 
     def define_pipelines(self) -> list[Any]:
@@ -139,7 +140,8 @@ class InlinedCompiler(_Compiler):  # type: ignore[misc]
 
 _config: Any = numba.config  # Numba defines these settings at run time.
 
-#: Without fast math, the compiler neither reorders nor fuses operations; the module `numbers` fuses some.
+#: Without fast math, the compiler neither reorders nor fuses operations. The module `numbers` decides which
+#: operations are fused.
 #: Results therefore do not depend on the compiler.
 #: Division by zero gives inf, as in C, so loops contain no branch that raises an error.
 #: The functions allocate no memory, so their arrays need no reference counts.
@@ -163,7 +165,7 @@ def compiling_allowed() -> Iterator[None]:
 
 
 def _skip_blas_check() -> None:
-    """Prevent Numba from importing SciPy only to check that linear algebra is available.
+    """Skip Numba's check that linear algebra is available, because the check imports SciPy.
 
     For other compiled functions that call linear algebra, Numba still imports and checks SciPy.
     """

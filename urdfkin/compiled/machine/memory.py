@@ -318,7 +318,7 @@ def ordinary(total):
 
 @intrinsic
 def _stream_8(context: Any, x: Any, i: Any, to: Any, at: Any) -> Any:
-    """Copy a cache line of `x` to a cache line of `to` in memory, bypassing the caches."""
+    """Copy the eight numbers that begin at `x[i]` to the cache line at `to[at]`, bypassing the caches."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         x, i, to, at = arguments

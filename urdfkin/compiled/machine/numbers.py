@@ -1,10 +1,10 @@
 """Number types for compiled code: a value of such a type is one double or a vector of doubles.
 
 A value of type `Lanes(8)` is eight doubles in one vector register, and a value of type `Lanes(1)` is one
-double. A product x y is stored as two factors, and multiplied only when it is needed. In the sum x y + z, the
-product and the sum are one fused multiply-add, which is rounded only once. This module, and not the compiler,
-decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)` are therefore exactly the same
-doubles, on every machine.
+double. A product x y is stored as two factors, and the factors are multiplied only when the product is
+needed. In the sum x y + z, the product and the sum are one fused multiply-add, which is rounded only once.
+This module, and not the compiler, decides which operations are fused. Results with `Lanes(1)` and `Lanes(8)`
+are therefore exactly the same doubles, on every machine.
 
 `zero()` and `one()` are the numbers 0 and 1, known at compile time. `nothing()` is the placeholder for a
 number that is not needed; each operation with `nothing()` gives `nothing()`. Operations with these constants
@@ -131,7 +131,7 @@ def _known(kind: Any, value: int | None) -> bool:
 
 
 def _ours(*kinds: Any) -> bool:
-    """Return whether all types are integers or types of this module, but not only integers."""
+    """Return whether all types are integers or types of this module, and at least one is of this module."""
     ours = [isinstance(kind, Lanes | Product | Known) for kind in kinds]
     return any(ours) and all(
         mine or isinstance(kind, types.Integer) for mine, kind in zip(ours, kinds, strict=True)

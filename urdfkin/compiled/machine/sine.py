@@ -2,11 +2,11 @@
 
 Cody and Waite's method subtracts a multiple of pi/2 from the angle, so that the rest is in [-pi/4, pi/4]. The
 rounding error of this subtraction is computed too. The polynomials come from fdlibm (Sun Microsystems,
-k_sin.c and k_cos.c). For angles below 2^20 quarter turns, the sum of two doubles represents pi/2. Two
-doubles are enough because the subtraction uses fused multiply-adds. Near a multiple of pi/2, the sine or the
-cosine is near 0, and this small value has an error of up to 1e-27. The C library computes the sine and the
-cosine of larger angles. Only the larger angles of a vector use the C library. Otherwise, the result of a
-configuration would depend on the other configurations in the vector.
+k_sin.c and k_cos.c). For angles below 2^20 quarter turns, the method subtracts multiples of two doubles whose
+sum is nearly pi/2. Two doubles are enough because the subtraction uses fused multiply-adds. Near a multiple
+of pi/2, the sine or the cosine is near 0, and this small value has an error of up to 1e-27. The C library
+computes the sine and the cosine of larger angles. Only the larger angles of a vector use the C library.
+Otherwise, the result of a configuration would depend on the other configurations in the vector.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ _OWN = object.__basicsize__ // 8
 #: Index of the 8-byte word with an object's type, and index of the word with a tuple's first item.
 _TYPE, _ITEMS = _OWN - 1, tuple.__basicsize__ // 8
 #: Indices of 8-byte words of a NumPy array, from the C structure PyArrayObject_fields.
-#: The number of axes and the flags are numbers of four bytes.
+#: The number of axes, and the flags, are in the lower four bytes of their words.
 _DATA, _NDIM, _SHAPE, _KIND, _FLAGS = _OWN, _OWN + 1, _OWN + 2, _OWN + 5, _OWN + 6
 #: Index of the word with the byte order and the type number of an array's elements (PyArray_Descr in C).
 _KIND_AND_ORDER, _NATIVE, _DOUBLE = _OWN + 1, ord("="), 12
@@ -104,10 +104,11 @@ def _doubles_address(array, ndarray, flags, axes, rows, columns):
 def one_configuration(bound, arguments, count):
     """Compute the result for one configuration; return None if the arguments are not supported.
 
-    The function also returns None if another thread is using the scratch memory. The `count` arguments at the
-    address `arguments` are q, or q and v, or q, v and a, and then the output array or None. The tuple at the
-    address `bound` contains the array of kernel arguments, NumPy's array type, None, the function that
-    creates the result array, the shape of the result array, and objects that must stay alive.
+    The function also returns None if another thread is using the scratch memory, or if an input is nan,
+    infinite or too large. `arguments` is the address of `count` arguments: first q, or q and v, or q, v and
+    a, and then the output array or None. `bound` is the address of a tuple. The tuple begins with the array
+    of kernel arguments, NumPy's array type and None. The next items are the function that creates the result
+    array, and the shape of the result array. The other items are objects that must stay alive.
     """
     items, inputs = whole_numbers_at(bound), whole_numbers_at(arguments)
     address, ndarray, none = whole_numbers_at(items[_ITEMS])[_DATA], items[_ITEMS + 1], items[_ITEMS + 2]
@@ -187,7 +188,8 @@ def arrays_are_known() -> bool:
     )
 
 
-#: For each quantity: kernel, kernel for LOCAL, number of inputs, number of axes of length nv.
+#: For each quantity: the kernel, the kernel for LOCAL, the number of inputs, and the number of axes of the
+#: result array that have the length nv.
 _HOW: dict[str, tuple[Core, Core, int, int]] = {
     "placement": (kernels.placements, kernels.placements, 1, 0),
     "velocity": (kernels.velocities, kernels.local_velocities, 2, 0),
@@ -200,11 +202,10 @@ _HOW: dict[str, tuple[Core, Core, int, int]] = {
 def single(
     quantity: str, plan: CompiledTree, reference: Reference
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that computes a quantity for one configuration, and the kernel's arguments.
+    """Return a function that computes a quantity for one configuration, and the array of kernel arguments.
 
-    The compiled tree must have only one frame, and the base must be fixed. The returned
-    function returns None for unsupported arguments. The entry `KernelArgs.COUNT` of the kernel's arguments
-    counts the computed results.
+    The compiled tree must have only one frame, and the base must be fixed. The returned function returns None
+    for unsupported arguments. The element `KernelArgs.COUNT` of the array is the number of computed results.
     """
     core, local_core, orders, columns = _HOW[quantity]
     local = reference.own_axes
@@ -222,7 +223,10 @@ def single(
 def called(
     core: Any, orders: int, shape: tuple[int, ...], plan: CompiledTree
 ) -> tuple[Callable[..., FloatArray | None], IntArray]:
-    """Return a function that calls a C function instead of a kernel, and the C function's arguments."""
+    """Return a function that calls the C function `core` instead of a kernel.
+
+    Also return the array of the C function's arguments.
+    """
     address = ctypes.cast(core, ctypes.c_void_p).value
     return _called(address or 0, orders, shape, plan, core)
 
