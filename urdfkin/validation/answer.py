@@ -88,7 +88,9 @@ def _name_and_message(error: Exception) -> str:
 
 
 CRASHED = "the process that validated the robot crashed"
-CRASHED_TWICE = "the process that validated the robot crashed twice; the second process had only this robot"
+CRASHED_TWICE = (
+    "the process that validated the robot crashed; a second process, for this robot only, also crashed"
+)
 
 
 def crash_failure(subject: RobotInput, reason: str, cause: str) -> Failure:

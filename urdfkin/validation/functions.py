@@ -497,7 +497,8 @@ class _Run:
             return scale
         if not conversion.is_constant and name != "jacobian":
             raise InputError(
-                f"urdfkin has no bound of the {name} for a base velocity in axes other than the base's axes",
+                f"urdfkin has no bound for the {name}: in this convention, the velocity of a floating or"
+                " planar joint has other axes or another reference point",
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )
@@ -553,8 +554,8 @@ class _Run:
         if total.eps_scale * EPS <= _SINGLE and math.isfinite(total.share):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
             yield (
-                f"rounding in {precision} precision explains all differences: they are below"
-                f" {total.eps_scale * EPS:.1g} of the terms' size;"
+                f"rounding in {precision} precision explains all differences: the largest difference is"
+                f" {total.eps_scale * EPS:.1g} times the size of the terms;"
                 f" factor={math.ceil(total.share * self.factor)} accepts them"
             )
             return

@@ -142,7 +142,10 @@ class Vectors(TypedDict):
     file: Annotated[str, says("Path of the URDF, in this folder or in example-robot-data.")]
     sha256: Annotated[Sha256, says("SHA-256 of the URDF file.")]
     rule: Annotated[str | None, says("The rule of the URDF standard that this robot tests, or null.")]
-    note: Annotated[str | None, says("How libraries differ, or how the file was loaded; null: no remark.")]
+    note: Annotated[
+        str | None,
+        says("Known difference between libraries, or reason of invalid mimic rules; null: no remark."),
+    ]
     joints: list[JointEntry]
     samples: list[Sample]
 
