@@ -57,7 +57,7 @@ def test_a_crash_is_the_result_of_its_robot_and_the_other_robots_are_verified(
     crashes.write_text("99")
     report = validate(ROBOTS, samples=60, **how)
     assert [robot.verdict for robot in report.robots] == ["verified", "not verified", "verified"]
-    twice = "crashed twice; the second process had only this robot"
+    twice = "crashed; a second process, for this robot only, also crashed"
     assert report.robots[1].reason == CRASH.format("crashed" if "isolate" in how else twice)
     assert not report.passed
     assert report.exit_code == 3

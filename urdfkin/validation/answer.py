@@ -31,7 +31,7 @@ from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entrie
 class Failure:
     """The reason why a robot was not checked.
 
-    `passing` means that the process or the cluster failed, and not the robot. Such a failure is not stored,
+    `passing` is True if the process or the cluster failed, and not the robot. Such a failure is not stored,
     so a resumed run computes the chunk again. `error` is the traceback of an unexpected error.
     """
 
@@ -88,7 +88,9 @@ def _name_and_message(error: Exception) -> str:
 
 
 CRASHED = "the process that validated the robot crashed"
-CRASHED_TWICE = "the process that validated the robot crashed twice; the second process had only this robot"
+CRASHED_TWICE = (
+    "the process that validated the robot crashed; a second process, for this robot only, also crashed"
+)
 
 
 def crash_failure(subject: RobotInput, reason: str, cause: str) -> Failure:

@@ -77,9 +77,9 @@ def validate(
             process. Other robots are not affected.
         mimic: As in `load`.
         root_joint: As in `load`.
-        xacro_args: As in `load`, for each .xacro file among the robots.
-        lock: As in `load`, for each robot.
-        joints: As in `load`, for each robot.
+        xacro_args: Arguments for the .xacro files among the robots, as in `load`.
+        lock: Value (rad or m) of each joint to lock in each robot, as in `load`.
+        joints: The joints that remain movable in each robot, as in `load`.
         oracle: "mujoco": also compare every frame with MuJoCo, which needs the extra `mujoco`. If only two of
             the three libraries agree, the report names the third library.
         isolate: Run each robot in its own process, `jobs` processes at a time. If a process crashes, its
@@ -103,7 +103,7 @@ def validate(
             installed. The store contains a validation with other robots or settings, or another process uses
             the store.
         InstallationError: Pinocchio is missing, or another project is installed under its name.
-        SourceError: The store cannot be made.
+        SourceError: The folder of the store cannot be created or used.
 
     >>> report = validate("ur5", samples=10)
     >>> report.passed, report.robots[0].failed
@@ -141,7 +141,7 @@ def validate(
             if saved is not None:
                 campaign.use(saved)
             for i, error in unread.items():
-                # The loop ends after one chunk, because the robot has then failed.
+                # After this failure, no chunk of the robot is missing, so the loop ends after one chunk.
                 for index in collector.missing(i):
                     campaign.enter(campaign.task(i, index), failure(found[i], error))
             missing = [robot for i, robot in enumerate(found) if any(True for _ in collector.missing(i))]
@@ -223,7 +223,8 @@ def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[Accura
     return tuple(None if isinstance(one, FailedStudy) else one for one in found), None not in found
 
 
-#: Number of samples above which kernels save time: kernels on disk, and kernels that must be compiled.
+#: Kernels save time if the number of samples is larger than these numbers.
+#: The first number is for kernels on disk, and the second for kernels that must be compiled.
 _WORTH_LOADING, _WORTH_COMPILING = 30, 300
 
 

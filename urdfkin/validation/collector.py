@@ -150,7 +150,8 @@ class _RobotAnswers:
         return self.done == len(self.part)
 
     def report(self, subject: RobotInput, wanted: int) -> RobotReport:
-        # Results after a failed chunk are left out, because their number depends on the workers' speed.
+        # The number of results after a failed chunk depends on the workers' speed.
+        # Therefore, these results are left out.
         last = min(self.failures, default=self.part.stop)
         failure = self.failures.get(last)
         results = [result for run, result in self._sums if run.start < last]

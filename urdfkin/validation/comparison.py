@@ -68,7 +68,10 @@ def tallies(
 
 
 def frame_bytes(samples: int, nv: int) -> int:
-    """Return the size in bytes of one frame's largest array: Jacobians, or placements if nv is small."""
+    """Return the size in bytes of one frame's largest array.
+
+    This array contains the Jacobians, or the placements if nv is at most 2.
+    """
     return samples * 8 * max(16, 6 * nv)
 
 
@@ -98,7 +101,7 @@ class _Block(_ComparisonBatch):
         tree = robot.tree
         self.frames = robot.all_frames[frames]
         links = tuple(tree.frame_link(frame) for frame in self.frames)
-        # If the block has all frames, the compiled tree is in the robot's cache.
+        # The robot's cache keeps the compiled tree for all frames, but not a compiled tree for some frames.
         whole = len(links) == len(robot.all_frames)
         self.plan = robot.plan(links) if whole else compile_tree(tree, links)
         self.size = magnitudes(self.plan, x.q, x.v, x.a, STILL_STATE)
@@ -110,9 +113,10 @@ class _Block(_ComparisonBatch):
         self.joint_names = robot.joint_names[joints]
 
     def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
-        """Yield error statistics; urdfkin's results for a joint are those for the joint's child link.
+        """Yield error statistics for the frames and the joints of the block.
 
-        The results for both are compared, because Pinocchio computes them with different functions.
+        For a joint, urdfkin's result is the result for the joint's child link. Pinocchio computes the joint
+        and the child link with different functions, so both results are compared.
         """
         inputs = self.x.q, self.x.v, self.x.a
         for row in validated():
@@ -188,7 +192,7 @@ class _Screws(_ComparisonBatch):
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
-    """Return configurations of the tree `free`, without mimic rules, from configurations of `tree`."""
+    """Convert configurations of `tree` to configurations of `free`, the same tree without mimic rules."""
     expanded = np.empty((len(q), free.nq))
     for joint, at, free_at in zip(tree.joints, tree.q_index, free.q_index, strict=True):
         own = q[:, at : at + joint.kind.nq]

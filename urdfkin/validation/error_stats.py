@@ -1,12 +1,12 @@
-"""Error statistics of a validation, which can be added over chunks, processes and machines.
+"""Error statistics of a validation.
 
-The addition of tallies is commutative and associative. Therefore, the sum does not depend on the division of
-the samples into chunks. If two worst cases are equally bad, the sum of two tallies keeps the case with the
-smaller sample number.
+The statistics of several chunks, processes and machines can be added. The addition of tallies is commutative
+and associative. Therefore, the sum does not depend on the division of the samples into chunks. If two worst
+cases are equally bad, the sum of two tallies keeps the case with the smaller sample number.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
-bound. The bound for Pinocchio and the second oracle is the sum of the bounds of the other two pairs. If two
-results agree and the third result agrees with neither, the third result is the outlier.
+bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.
+If two results agree and the third result agrees with neither, the third result is the outlier.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _compare_pair(one: FloatArray, other: FloatArray, bound: Bound) -> tuple[NDA
 
 
 def _sum_of_bounds(first: Bound, second: Bound) -> Bound:
-    """Add two bounds k * eps * scale, and express the sum with the second bound's k and a new scale."""
+    """Add two bounds k * eps * scale. The sum has the k of the second bound and a new scale."""
     size = first.k * first.scale + second.k * second.scale
     with np.errstate(invalid="ignore", over="ignore"):
         return Bound(size / second.k, second.k)
@@ -174,7 +174,7 @@ class Tally:
         )
 
     def beside(self, other: Tally) -> Tally:
-        """Return the statistics for the frames of `self` and of `other`, which have the same samples."""
+        """Return the statistics for all frames of `self` and `other`; both must have the same samples."""
         joined = replace(self, by_frame=()) + replace(other, by_frame=())
         return replace(joined, by_frame=self.by_frame + other.by_frame)
 

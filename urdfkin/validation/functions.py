@@ -1,8 +1,9 @@
-"""Compare a user's function with urdfkin and the oracle, within the derived bound.
+"""Compare a user's function with urdfkin and the oracle.
 
 The user's function computes a quantity from q, from q and v, or from q, v and a. The module calls this
-function at random configurations, at the zero configuration and at the joint limits. If urdfkin and the
-oracle agree, but the function disagrees with urdfkin, the error is in the function.
+function at random configurations, at the zero configuration and at the joint limits. The allowed difference
+is a derived bound on rounding errors. If urdfkin and the oracle agree, but the function disagrees with
+urdfkin, the error is in the function.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ _BATCH = 256
 _DIAGNOSED = 48
 #: Maximum number of stored messages about exceptions and wrong shapes.
 _MESSAGES = 5
-#: Maximum relative difference that rounding to single precision explains.
+#: Rounding to single precision can explain relative differences up to this value.
 _SINGLE = 1e-5
 
 
@@ -97,8 +98,8 @@ class FunctionCheck(Displayable):
         robot: Name of the robot.
         quantity: Name of the quantity.
         frame: Name of the frame.
-        reference: Name of the reference frame; None for a quantity that has none.
-        convention: Name of the convention of inputs and results; None for urdfkin's.
+        reference: Name of the reference frame; None if the quantity has no reference frame.
+        convention: Name of the convention of inputs and results; None: urdfkin's convention.
         oracle: Name and version of the oracle that confirmed urdfkin's results; "" if no oracle could check
             them.
         samples: Number of configurations.
@@ -221,7 +222,7 @@ class FunctionCheck(Displayable):
 
 
 class _Recorder:
-    """A wrapper of a robot's verifier that also stores the latest checked call of each quantity."""
+    """A wrapper of a robot's verifier that stores the latest call of each quantity."""
 
     def __init__(self, verifier: Verifier) -> None:
         self._verifier = verifier
@@ -249,12 +250,13 @@ def verify_function(
     batch: bool = False,
     **options: Any,
 ) -> FunctionCheck:
-    """Compare the results of your function with urdfkin's and the oracle's results, within the derived bound.
+    """Compare the results of your function with the results of urdfkin and of the oracle.
 
-    The function receives q (nq,), and v and a (nv,) if the quantity needs them, in rad, m and s. The values
-    are random within the limits; the zero configuration and the joint limits come first. In every eighth
-    sample, v and a are a hundred times larger, so that quadratic terms have a visible effect. If the
-    function raises an exception or returns a wrong shape, the check reports this and continues.
+    The allowed difference is a derived bound on rounding errors. The function receives q (nq,), and v and a
+    (nv,) if the quantity needs them, in rad, m and s. The values are random within the limits; the zero
+    configuration and the joint limits come first. In every eighth sample, v and a are a hundred times larger,
+    so that quadratic terms have a visible effect. If the function raises an exception or returns a wrong
+    shape, the check reports this and continues.
 
     Args:
         function: The function to check: q -> result, (q, v) -> result or (q, v, a) -> result.
@@ -263,13 +265,13 @@ def verify_function(
             "acceleration", "relative placement", "analytical jacobian" or "imu".
         frame: Name of a link or joint; None: the robot's only tip.
         reference: Reference frame of the result.
-        convention: Convention of the function's inputs and results, one that `Robot.convention` accepts.
-            None: urdfkin's convention.
+        convention: Convention of the function's inputs and results, in a form that `Robot.convention`
+            accepts. None: urdfkin's convention.
         samples: Number of random configurations.
         seed: Seed of the random configurations.
-        factor: Number by which the bound is multiplied; above 1 for a function with larger rounding errors
-            than the textbook's recursion. `FunctionCheck.needed_factor` is the smallest factor with which the
-            check passes.
+        factor: Number by which the bound is multiplied. The bound is derived for a recursion from joint to
+            joint; give a factor above 1 for a method with larger rounding errors.
+            `FunctionCheck.needed_factor` is the smallest factor with which the check passes.
         batch: True: the function receives q (n, nq), and v and a (n, nv), and returns n results.
         **options: Further arguments of the `Robot` method that computes the quantity, such as
             `representation`.
@@ -279,7 +281,7 @@ def verify_function(
 
     Raises:
         UnknownNameError: no such quantity, frame or convention.
-        InputError: an invalid argument; or a convention that has no result for the quantity.
+        InputError: an argument is invalid, or urdfkin cannot check the quantity in this convention.
         VerificationError: urdfkin and the oracle disagree.
 
     >>> import urdfkin
@@ -495,7 +497,8 @@ class _Run:
             return scale
         if not conversion.is_constant and name != "jacobian":
             raise InputError(
-                f"urdfkin has no bound of the {name} for a base velocity in axes other than the base's axes",
+                f"urdfkin has no bound for the {name}: in this convention, the velocity of a floating or"
+                " planar joint has other axes or another reference point",
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )
@@ -506,13 +509,13 @@ class _Run:
         return found
 
     def _rounding_of_the_conversion(self, q: FloatArray) -> float:
-        """Return the rounding errors of a conversion, in eps * scale; 0 for a permutation.
+        """Return the rounding error of a conversion, in eps * scale; 0 if it only reorders numbers.
 
         The conversion rounds each joint angle before the angle is passed to the user's function. The rounded
-        angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix has
-        an error of up to 2 eps |q|. Each term of the result has this matrix as a factor, so the result and
-        the matrix have equal relative errors. The conversion of a base velocity by a matrix has at most 16
-        rounding errors.
+        angle differs from urdfkin's angle by up to 2 eps |q|. Therefore, the joint's rotation matrix has an
+        error of up to 2 eps |q|. Each term of the result is a product of rotated vectors. Each joint may
+        rotate each of these vectors, so the errors of all joints and vectors are added. The matrix that
+        converts the velocities of a planar or floating joint adds at most 16 rounding errors.
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
@@ -551,8 +554,8 @@ class _Run:
         if total.eps_scale * EPS <= _SINGLE and math.isfinite(total.share):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"
             yield (
-                f"rounding in {precision} precision explains all differences: they are below"
-                f" {total.eps_scale * EPS:.1g} of the terms' size;"
+                f"rounding in {precision} precision explains all differences: the largest difference is"
+                f" {total.eps_scale * EPS:.1g} times the size of the terms;"
                 f" factor={math.ceil(total.share * self.factor)} accepts them"
             )
             return

@@ -12,7 +12,7 @@ from enum import StrEnum
 
 
 class ValidationVerdict(StrEnum):
-    """Result of the validation of a robot; worse results come first."""
+    """Result of the validation of a robot; HTML and Markdown reports list robots in this order."""
 
     BAD_INPUT = "bad input"
     NOT_VERIFIED = "not verified"
@@ -53,7 +53,7 @@ class RunOutcome:
 
     @property
     def verdict(self) -> str:
-        """The verdict of the run: the verdict of the worst robot, or "interrupted"."""
+        """The verdict of the run, which belongs to `exit_code`: a verdict on a robot, or "interrupted"."""
         return OUTCOMES[self.exit_code]
 
     @property

@@ -7,8 +7,9 @@
     DIR/chunks/4f/4f1a....accuracy result of the accuracy study of a robot
     DIR/lock                       locked by the process that writes to the store
 
-Files are written atomically, so a file is either complete or absent. A damaged file, and a file whose name
-belongs to no chunk, is reported and moved to `damaged/`. The chunk of a damaged file is computed again.
+Files are written atomically, so a file is either complete or absent. The store reports damaged files, and
+files whose names belong to no chunk. A store that is open for writing moves these files to `damaged/`. The
+chunk of a damaged file is computed again.
 """
 
 from __future__ import annotations
@@ -189,7 +190,7 @@ def open_store(
 ) -> Iterator[Store]:
     """Open or create the store of a validation, and lock the store for writing.
 
-    With `shard`, for example "2/4", other processes may write other parts. With `retry_failed`, stored
+    If `shard` is given, such as "2/4", other processes may write other shards. With `retry_failed`, stored
     failures are deleted, because the files of the failed robots may have changed.
     """
     try:
@@ -227,14 +228,18 @@ def open_store(
 
 
 def _is_ours(path: Path) -> bool:
-    """Return whether the process of another shard may have created this file before the manifest."""
+    """Return whether this path may belong to a store that has no manifest yet.
+
+    The process of another shard creates locks and folders before it writes the manifest.
+    """
     return path.name in (_WRITING, _CHUNKS) or path.name.startswith(_LOCK)
 
 
 def _check_or_write_manifest(store: Store, *, retry_failed: bool) -> Store:
-    """Return the store; write its manifest if there is none, or for a retry with changed files.
+    """Return the store with its manifest.
 
-    Otherwise the manifest is not replaced, because it contains the original start time.
+    The manifest is written if the folder has none, or for a retry after the files of failed robots changed.
+    In all other cases, the folder keeps its manifest, because the manifest contains the original start time.
     """
     if not (store.folder / _MANIFEST).exists():
         store.write(_MANIFEST, store.manifest.as_json())

@@ -22,7 +22,7 @@ class Timings:
     second: float = 0.0
 
     def timed(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Call a function, and add its computing time (s) to the attribute `part`, such as "urdfkin"."""
+        """Call a function. Add its computing time (s) to the attribute named by `part`, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
             return function(*args, **kwargs)

@@ -65,9 +65,9 @@ SAMPLES = 3
 #: Largest absolute value of velocities, of accelerations, and of positions of planar and floating joints.
 _RANGE = 2.0
 #: Inputs are rounded to multiples of 1 / _GRID, except quaternions and values at a joint limit.
-#: A multiple of 1 / 1024 has few decimals and is exactly a double.
+#: A multiple of 1 / 1024 has at most ten decimals, and a double represents it without rounding.
 _GRID = 1024.0
-#: Number of digits of a printed tolerance, and number of digits of a first rounding.
+#: A tolerance is rounded to 12 digits, and then rounded up to 3 digits.
 #: Results of different processors differ in the last digits; the first rounding removes these digits.
 _DIGITS, _FIRST_DIGITS = 3, 12
 
@@ -77,7 +77,8 @@ SPATIAL_ACCELERATION = replace(
     exact=lazy_import("urdfkin.verify.exact.recursion:spatial_acceleration_values"),
 )
 #: The classical and the spatial acceleration differ by the cross product of angular and linear velocity.
-#: The scale of each acceleration includes this product.
+#: The bound on the classical acceleration includes this product.
+#: Therefore, the bound is also valid for the spatial acceleration.
 QUANTITIES = (
     PLACEMENT, VELOCITY, JACOBIAN, JACOBIAN_RATE, HESSIAN, ACCELERATION, SPATIAL_ACCELERATION,
 )  # fmt: skip
@@ -141,7 +142,10 @@ class Vectors(TypedDict):
     file: Annotated[str, says("Path of the URDF, in this folder or in example-robot-data.")]
     sha256: Annotated[Sha256, says("SHA-256 of the URDF file.")]
     rule: Annotated[str | None, says("The rule of the URDF standard that this robot tests, or null.")]
-    note: Annotated[str | None, says("How libraries differ, or how the file was loaded; null: no remark.")]
+    note: Annotated[
+        str | None,
+        says("Known difference between libraries, or reason of invalid mimic rules; null: no remark."),
+    ]
     joints: list[JointEntry]
     samples: list[Sample]
 

@@ -1,9 +1,10 @@
-"""Engine that runs chunks in processes of this machine; the crash of a process affects only its robot.
+"""Engine that runs chunks in processes of this machine.
 
-A worker process is a new Python interpreter. A worker imports neither the parent's main module nor modules of
-the current folder, so a script needs no `__main__` guard. A worker has one chunk at a time, so each crash can
-be attributed to a robot. After a crash, the robot is tried once more, alone in a process, after all other
-robots. With `isolate`, each robot runs alone from the start, and the first crash is the robot's result.
+The crash of a process affects only the robot that this process validates. A worker process is a new Python
+interpreter. A worker imports neither the parent's main module nor modules of the current folder, so a script
+needs no `__main__` guard. A worker has one chunk at a time, so each crash can be attributed to a robot. After
+a crash, the robot is tried once more, alone in a process, after all other robots. With `isolate`, each robot
+runs alone from the start, and the first crash is the robot's result.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class WorkerProcess:
             self.connection.close()
             raise
         finally:
-            # Close this process's copy of the worker's end, so that the pipe closes when the worker ends.
+            # Close the worker's end in this process. Otherwise the pipe stays open when the worker ends.
             theirs.close()
 
     @property
@@ -141,14 +142,15 @@ class ProcessEngine:
 class _WorkerPool:
     """A group of at most `jobs` worker processes.
 
-    If `alone` is given, each process validates only one robot, and `alone` is the reported reason of a crash.
+    If `alone` is given, each process validates only one robot. If this process crashes, the report states the
+    text `alone` as the reason.
     """
 
     def __init__(self, work: Work, jobs: int, enter: Enter, *, alone: str | None = None) -> None:
         self._jobs, self._enter, self._alone = jobs, enter, alone
         self._queue = WorkQueue(work, shared=alone is None)
         self._workers: list[_BusyWorker] = []
-        #: Unanswered tasks of each robot that crashed a worker process.
+        #: Tasks to run again, for each robot whose worker process crashed.
         self.to_retry: dict[int, list[Task]] = {}
 
     def work(self) -> None:
