@@ -30,7 +30,7 @@ QUANTITIES = ("placement", "jacobian", "acceleration")
 
 
 def code_in(code: FrameCode, to: str) -> FrameCode:
-    """Return the code, with exact constants for the language sympy-exact.
+    """Return the code itself, or the code with exact constants if the language is sympy-exact.
 
     Raise VerificationError if Pinocchio's results differ from those of the exact expressions.
     """

@@ -1,10 +1,10 @@
 """Write C99 code in double or single precision, for one configuration and for batches.
 
-The exported code allocates no memory and has no global variables. Each function is straight-line code. A call
-computes one configuration, or `LANES` configurations together. In the arrays of a call, the numbers of one
-configuration are `L` elements apart, where `L` is 1 or `LANES`. With `LANES`, a compiler turns each line of
-code into one vector instruction. The templates in the folder `frames/` contain the code that all robots
-share.
+The exported code allocates no memory and has no global variables. Each function is straight-line code. It
+computes one configuration, or `LANES` configurations together. In the arrays of the straight-line code,
+consecutive numbers of one configuration are `L` elements apart. Here, `L` is 1 for one configuration, and
+`LANES` for `LANES` configurations. If `L` is `LANES`, a compiler turns each line of code into vector
+instructions. The templates in the folder `frames/` contain the code that all robots share.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def _function(code: FrameCode, function: Function) -> str:
 
 
 def reserve(code: FrameCode, function: Function) -> int:
-    """Return the least number of configurations for which each array has eight or more numbers."""
+    """Return the least number of configurations whose arrays, if not empty, have eight or more numbers."""
     widths = (*code.widths(function).values(), len(function.results))
     return max(-(-8 // width) if width else 0 for width in widths)
 

@@ -81,8 +81,8 @@ def _doubts(text: str) -> Iterator[str]:
     sealed = is_sealed(text)
     if sealed is None:
         yield (
-            "the file has no seal (checksum), so its header may not describe these numbers; export the"
-            " file again"
+            "the file has no seal (checksum), so changes of the file cannot be detected; export the file"
+            " again"
         )
     elif not sealed:
         yield "the file was changed after it was written; export the file again"

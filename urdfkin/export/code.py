@@ -172,7 +172,7 @@ def _exported_quantities(names: Collection[str]) -> list[Quantity]:
 
 
 class Writer:
-    """Writes expressions as code; without `sine`, sines and cosines are inputs of the code."""
+    """Writes expressions as code. If `sine` is False, sines and cosines are inputs of the code."""
 
     def __init__(
         self,

@@ -139,7 +139,8 @@ def _load(data: bytes) -> ctypes.CDLL:
     with os.fdopen(descriptor, "wb") as file:
         file.write(data)
         file.flush()
-        # The loader identifies a library by its path. A different number of "./" makes each path unique.
+        # The loader identifies a library by its path, but a later library can get the same descriptor.
+        # Therefore each path contains a different number of "./".
         return ctypes.CDLL(f"/proc/self/fd/{'./' * next(_names)}{descriptor}")
 
 
@@ -161,7 +162,7 @@ def _processor() -> str:
     return next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
 
 
-#: Maximum number of results; the results of eight configurations then fit in half a megabyte of stack.
+#: Maximum number of results. The results of eight configurations then need at most half a megabyte of stack.
 _MOST_RESULTS = 8192
 # Plain integers are several times as fast as members of an enumeration.
 _N, _OUT, _STAGE, *_INPUTS = map(
@@ -381,9 +382,10 @@ class CompiledFrame:
     def _are_plain(
         self, inputs: Sequence[Given], row: Quantity, out: FloatArray
     ) -> TypeGuard[Sequence[FloatArray]]:
-        """Return whether the machine code can use all arguments without a copy.
+        """Return whether the machine code can use all arguments without a copy or a check of values.
 
-        Such arguments need no conversion by `Call`, which takes a tenth of the time of a large batch.
+        The class `Call` converts all other arguments. For a large batch, this conversion takes a tenth of the
+        time.
         """
         n = len(out) if type(out) is np.ndarray and out.ndim else 0
         plain = not (self._tree.floating_joints or self._plan.is_large) and _is_plain(
@@ -411,7 +413,8 @@ class CompiledFrame:
         def compute(parts: Sequence[FloatArray], part: FloatArray) -> int:
             arguments = _Arguments()
             arguments[_N], arguments[_OUT] = len(part), address(part)
-            # The code may write past the last row by less than a vector register, so `stage` has extra space.
+            # The code writes eight numbers at once, so it may write up to seven numbers beyond the results.
+            # Therefore the buffer `stage` has extra space.
             stage = lines(LANES * part[0].size + LANES) if row.columns and is_staged(out) else None
             arguments[_STAGE] = 0 if stage is None else address(stage)
             for index, x in zip(_INPUTS, parts, strict=False):

@@ -1,4 +1,4 @@
-"""Write a header with function templates for any number type: for C++11, or for CUDA.
+"""Write a header in C++11 or CUDA, with function templates for any number type.
 
 The number type may be `double`, `float`, or the type of a library for automatic differentiation. The header
 for CUDA has the same functions for the host and the device, a kernel for batches, and C functions that start

@@ -107,7 +107,10 @@ def exact_plan(
 
 
 def _aligning(axis: Vector, z: float) -> Matrix:
-    """Return the rotation matrix whose third column is the unit axis, as in `axis_aligning`."""
+    """Return a rotation matrix whose third column is `axis`, by the formula in `axis_aligning`.
+
+    The vector `axis` has unit length, and `z` is its third component as a float.
+    """
     x, y, own = axis
     sign = 1 if z >= 0.0 else -1
     scale = -1 / (sign + own)
@@ -155,7 +158,11 @@ def balls(function: Function, inputs: Sequence[Sequence[float]]) -> list[Number]
 
 @dataclass(frozen=True)
 class ExactProof(Proof):
-    """Checks of an export with exact constants; `most` is the largest change of an angle (rad)."""
+    """The checks of an exported file with exact constants.
+
+    The code contains multiples of pi instead of `angles` different angles. `most` is the largest difference
+    (rad) between an angle and the multiple of pi that replaces it.
+    """
 
     angles: int = 0
     most: float = 0.0

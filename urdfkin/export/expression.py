@@ -137,7 +137,10 @@ class Graph:
         return self.made("*", *_in_order(x, y))
 
     def _record_numbers(self, equation: Callable[..., Any]) -> Callable[..., Any]:
-        """Return an equation that stores its number in new nodes, unless another equation calls it."""
+        """Return an equation that stores its number in the nodes that it creates.
+
+        If another equation calls this equation, the nodes store the number of the calling equation.
+        """
         found = _EQUATIONS.match(equation.__doc__ or "")
         if found is None:
             return equation

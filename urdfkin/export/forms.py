@@ -52,7 +52,7 @@ def code_of_chain(
     name: str | None = None,
     verify: bool = True,
 ) -> FrameCode:
-    """Return the code of a chain's last frame; results are in the axes of the chain's base."""
+    """Return the code for the last frame of a chain. The chain's base is the world frame."""
     if isinstance(chain, DHTable):
         text, chain = document(chain, Units()).text(), _with_safe_names(chain)
     else:

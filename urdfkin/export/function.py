@@ -1,9 +1,9 @@
 """A function of the exported code, which computes one quantity of one frame.
 
-The exported code assigns an expression to a variable in three cases: the code uses the expression more than
-once, the expression is a number of a link's state (pose, velocity, acceleration), or the expression is a
-sine, cosine, root or quotient. A long expression is split into several assignments. The code contains all
-other expressions at the place of their use.
+The exported code assigns each expression that occurs more than once to a variable. Sines, cosines, square
+roots and quotients are also assigned to variables, and so are the numbers of a link's state (pose, velocity,
+acceleration). A long expression is split into several assignments. All other expressions are parts of
+larger expressions.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def function_of(
 ) -> Function:
     """Return the function that computes a quantity for the only frame of `plan`.
 
-    If `plan` has exact constants, `graph` is the graph that created these constants.
+    Exact constants of `plan` can be expressions; then `graph` is the graph that contains these expressions.
     """
     graph = graph or Graph()
 

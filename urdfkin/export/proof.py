@@ -51,7 +51,8 @@ class Vector:
     """A test vector: one configuration, and the true result of each function.
 
     `within` and `single` are the error bounds in double precision (in eps = 2^-52) and in single precision
-    (in eps = 2^-23). In `single`, 0.0 means that a number is beyond the range of single precision.
+    (in eps = 2^-23). If the code computes a number beyond the range of single precision, no error bound
+    exists, and `single` contains 0.0.
     """
 
     inputs: tuple[list[float], ...]
@@ -64,8 +65,10 @@ class Vector:
 class Proof:
     """The checks of an exported file: test vectors and the comparison with Pinocchio.
 
-    `single` is the largest error bound of each quantity in single precision, in multiples of eps * scale; inf
-    if a number is beyond the range of single precision. `lock` contains the value of each locked joint.
+    `single` contains the largest error bound of each quantity in single precision, in multiples of
+    eps * scale. The scale of a number is an upper bound on the sum of the absolute values of its terms. If a
+    number is beyond the range of single precision, the error bound is inf. `lock` contains the value of each
+    locked joint.
     """
 
     sha256: str
@@ -199,7 +202,10 @@ def _vectors(
 
 
 def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds k * scale (n, numbers) on a function's results, in eps, and the scales."""
+    """Return the error bounds of a function's results, in eps, and the scales of these results.
+
+    Both arrays have the shape (n, numbers). Each error bound is a factor k times the scale of the result.
+    """
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)

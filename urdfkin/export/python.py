@@ -25,6 +25,7 @@ class Dialect:
     """The code for one Python library.
 
     Attributes:
+        result: Function that yields the lines of code that return the results.
         imports: Import lines. `{}` is replaced by the used functions among `cos`, `sin` and `sqrt`. If none
             of them is used, the line is left out.
         values: Body of the exported function `_values`, which evaluates a function for some configurations.
@@ -52,7 +53,7 @@ def _rows(values: Sequence[str], width: int) -> list[Sequence[str]]:
 
 
 def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that assigns each number to an element of an array."""
+    """Make `Dialect.result` for code that assigns each number to an element of an array."""
 
     def result(writer: Writer) -> Iterator[str]:
         shape = writer.function.shape
@@ -65,7 +66,7 @@ def _in_array(create: str, index: str) -> Callable[[Writer], Iterator[str]]:
 
 
 def _nested(opening: str, closing: str, row: str = "[{}]") -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that returns a matrix; a Hessian (6, nv, nv) becomes one matrix."""
+    """Make `Dialect.result` for code that returns a matrix. A Hessian becomes a matrix (6 nv, nv)."""
 
     def result(writer: Writer) -> Iterator[str]:
         values, shape = writer.results(), writer.function.shape
@@ -97,7 +98,7 @@ def _shapes(writer: Writer) -> list[str]:
 
 
 def _zero(writer: Writer, xp: str) -> str:
-    """Return code for zeros with the batch shape, the type and the device of the inputs."""
+    """Return a line of code that creates zeros with the inputs' batch shape, type and device."""
     widths = writer.code.widths(writer.function)
     columns = (f"{x}[..., 0]" if width else f"{xp}.sum({x}, axis=-1)" for x, width in widths.items())
     return "zero = " + " + ".join(f"{xp}.zeros_like({column})" for column in columns)
@@ -110,7 +111,7 @@ def _demands(writer: Writer, first: str = "") -> list[str]:
 
 
 def _lengths(text: str) -> Callable[[Writer], list[str]]:
-    """Return a `Dialect.first_lines` that checks the input lengths of one configuration."""
+    """Make `Dialect.first_lines` for code that checks the input lengths of one configuration."""
 
     def first_lines(writer: Writer) -> list[str]:
         lines = list[str]()
@@ -128,7 +129,7 @@ def _in_any_namespace(writer: Writer) -> list[str]:
 
 
 def _stacked(xp: str) -> Callable[[Writer], Iterator[str]]:
-    """Return a `Dialect.result` that stacks the numbers, for libraries with immutable arrays."""
+    """Make `Dialect.result` for code that stacks the numbers, because the arrays are immutable."""
 
     def result(writer: Writer) -> Iterator[str]:
         function = writer.function
@@ -177,8 +178,8 @@ def _demand(
     """Return the code of the function `_demand`, which checks an input.
 
     The arguments `wrong` and `is_array` are Python expressions as text. `wrong` is true for numbers of a
-    wrong type. `is_array` is true for an accepted container; "" means no test. `given` contains further
-    parameters of `_demand`.
+    wrong type. `is_array` is true for an accepted container. If `is_array` is empty, `_demand` accepts every
+    container. `given` contains further parameters of `_demand`.
     """
     first = _IS_ARRAY.format(is_array=is_array, array=array) if is_array else ""
     return _DEMAND.format(given=given, array=array, numbers=numbers, is_array=first, wrong=wrong)
@@ -228,7 +229,7 @@ def gradients(device="cpu"):
 
 
 def _torch_module(code: FrameCode) -> str:
-    # The method `forward` computes the function with the fewest inputs.
+    # The method `forward` calls the function that needs the fewest inputs.
     first = min(code.functions, key=lambda function: len(function.inputs))
     return _MODULE.format(
         first=first.name,
@@ -242,13 +243,14 @@ def _torch_module(code: FrameCode) -> str:
 def _rate(plan: CompiledTree) -> float:
     """Return an upper bound on the rotation (rad) of any vector when a coordinate changes by 1 rad.
 
-    The bound is at least 1. It is the largest sum of the multipliers of all revolute joints whose values
-    depend on the same coordinate.
+    Several revolute joints can depend on the same coordinate. For each coordinate, the absolute values of
+    the multipliers of these joints are added. The bound is the largest sum, and at least 1.
 
     With a floating joint, the bound is at least 3. If one component of a unit quaternion changes by t, the
-    body rotates about a fixed axis. Let x be the angle between the quaternion and the direction of the
-    change. The derivatives of the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. For a
-    product of F rotated vectors, the third derivative is at most (2 F)^3 + 3 (2 F)(2 F) + 4 F <= (3 F)^3.
+    body rotates about a fixed axis. The quaternion and the axis of the changed component are vectors with
+    four components. Let x be the angle between these two vectors. At t = 0, the first three derivatives of
+    the rotation angle with respect to t are 2 sin x, -2 sin 2x and 4 sin 3x. A product of F rotated unit
+    vectors has a third derivative of at most (2 F)^3 + 3 (2 F)(2 F) + 4 F. This number is at most (3 F)^3.
     """
     floats = bool((plan.steps[:, StepField.KIND] == JointMotion.FLOATING).any())
     return max(3.0 if floats else 1.0, float(column_weights(plan)[0].max(initial=0.0)))

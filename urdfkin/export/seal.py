@@ -1,6 +1,6 @@
 """Write and check the seal of an exported file: the digest of the text, in the file's header.
 
-The seal shows whether numbers, test vectors or statements of the file were changed. A seal is not a
+The seal shows whether the header, the code or the test vectors of the file were changed. A seal is not a
 signature, so it does not prove who wrote the file.
 """
 

@@ -61,7 +61,10 @@ def _bounds(
     bound, slopes = np.zeros((n, len(results))), dict[Node, FloatArray]()
 
     def propagate(x: Number, slope: FloatArray, columns: slice | int) -> None:
-        """Add `slope` to the derivatives with respect to x, or the error of a constant x to the bounds."""
+        """Add `slope` to the derivatives of the results with respect to the expression x.
+
+        If x is a constant, add the error that its rounding causes to the bounds.
+        """
         if not isinstance(x, Node):
             bound[:, columns] += np.abs(slope) * _constant(x)
         elif x in slopes:
