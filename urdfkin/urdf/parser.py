@@ -172,7 +172,7 @@ COMMON_DEPTH = 256
 #: Number of bytes that expat parses in one call.
 _PIECE = 1_000_000
 
-#: If an element's text has this many stored characters, the parser stores no further text.
+#: If the stored text of an element has at least this many characters, the parser ignores further text.
 _STORED = 2 * QUOTED
 
 #: Attributes whose value is the name of a link or joint.
@@ -518,7 +518,8 @@ class NumberReader:
         )
 
 
-#: Tags of elements that messages about numbers do not name.
+#: For an attribute of these elements, a message about an invalid number names only the attribute.
+#: For other elements, the message also names the element.
 _PLAIN = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
@@ -808,7 +809,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    # The cache must not store long words, because a word may have megabytes.
+    # A name in the file may have megabytes, and the cache must not store such a name.
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 

@@ -119,7 +119,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # A joint without a valid child may be the parent joint of any link.
+        return False  # Any link may be the intended child of a joint whose child is not a link.
     parents = {joint.parent for joint in robot.joints}
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
@@ -135,7 +135,8 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Smaller deviations of an axis length from 1 are notes, because numbers with few digits cause them.
+#: If the length of an axis differs from 1 by less than this number, the finding is a note.
+#: Numbers with few digits cause such differences.
 LENGTH_ROUNDING = 2e-4
 
 #: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
@@ -148,7 +149,8 @@ _LEAN = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _SNAPPED = 1e-12
 
-#: Smaller tilts (rad) of an axis are not reported, because the bounds in `verify.bounds` include these tilts.
+#: If an axis differs from a coordinate axis by at most this angle (rad), the difference is not reported.
+#: The error bounds in `verify.bounds` cover this difference.
 _TILT = 2.0**-52
 
 
@@ -317,8 +319,8 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
 LARGEST = 1e6
-#: Limits are reported if they exclude more than this fraction of the mimicked joint's range.
-#: Smaller fractions are common, because limits are often written with few digits.
+#: The limits of a mimic joint may exclude this fraction of the mimicked joint's range without a finding.
+#: Limits are often written with few digits, and therefore exclude a small fraction.
 LEAST_LOST = 1e-3
 
 
@@ -485,7 +487,7 @@ FAR = 100.0
 #: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
 TINY = 1e-4
 
-#: A limit that is a whole number from `MANY` to `ENDLESS` is probably in degrees.
+#: A limit is probably in degrees if it is a whole number, at least `MANY` and less than `ENDLESS`.
 #: For a joint without limits, some exporters write limits of at least `ENDLESS`.
 MANY, ENDLESS = 30.0, 1000.0
 
@@ -495,7 +497,8 @@ NOTICEABLE = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi. A rounded multiple is reported if it has at least the stated number of decimals.
+#: Multiples of pi, each with a minimum number of decimals.
+#: A number in the file with fewer decimals is not reported as a rounded multiple of pi.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -601,7 +604,7 @@ def _as_pi(multiple: Fraction) -> str:
 def _metres(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
-    # Round to two significant digits, so that `:g` writes no exponent.
+    # The format `:.2g` would write 120 as 1.2e+02.
     return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 
