@@ -121,8 +121,9 @@ def confine(holds: Callable[[str], bool]) -> None:
             raise RefusedError(f"a xacro file may not write a file: {path!r}")
         if not isinstance(path, str | bytes | os.PathLike) or not holds(os.fsdecode(path)):
             raise RefusedError(
-                f"{path!r} may not be read: it is hidden, or it is neither in the file's folder, package or"
-                " repository nor in a package on ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
+                f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
+                " xacro file's folder, package and repository, and the packages on ROS_PACKAGE_PATH and"
+                " AMENT_PREFIX_PATH"
             )
 
     sys.addaudithook(watch)

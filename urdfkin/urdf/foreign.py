@@ -74,7 +74,7 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
         f"yourdfpy ignores quat_xyzw, so the rotation of joint {', '.join(joints[:_NAMED])}{more} is lost if"
         " the file gives the rotation by quat_xyzw"
     )
-    remedy = "load the file itself if it contains quat_xyzw"
+    remedy = "if the file contains quat_xyzw, load the file instead of the yourdfpy robot"
     return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 

@@ -598,7 +598,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
 
 _FORMATS = {
     "sdf": "this is an SDF file; convert the file to a URDF first",
-    "mujoco": "this is an MJCF file; `load` and all other commands read files with the suffix .xml or .mjcf",
+    "mujoco": "this is an MJCF file; `load` and the commands read MJCF files with the suffix .xml or .mjcf",
     "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
     "model": "this is a part of an SDF file; convert the file to a URDF first",
     "world": "this is a part of an SDF file; convert the file to a URDF first",

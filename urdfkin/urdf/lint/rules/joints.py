@@ -208,7 +208,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         message = f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}"
-        remedy = f'write xyz="{written}"; to keep the tilt, double all three numbers'
+        remedy = f'write xyz="{written}", or double all three numbers: Pinocchio then keeps the tilt'
         report.add(
             NEARLY_COORDINATE_AXIS, message, element,
             attribute="xyz", found=_written(joint), remedy=remedy, weight=tilt,
@@ -245,7 +245,7 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
         return
     at = joint.axis_element or joint.element
     message = "a planar joint moves in the XY plane of its frame, independent of <axis>"
-    remedy = 'rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>'
+    remedy = 'rotate the origin until its z axis is the normal of the plane, and write <axis xyz="0 0 1"/>'
     report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_written(joint), remedy=remedy)
 
 
@@ -282,11 +282,11 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     if any(getattr(limit, name) is None for name in written):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
-    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits (a missing limit is 0)"
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits (the default of a limit is 0)"
     if lower > upper:
         message, remedy = "the lower limit is above the upper limit", "swap the limits"
         if len(written) < 2:
-            found, remedy = f"{found} (a missing limit is 0)", "write both limits"
+            found, remedy = f"{found} (the default of a limit is 0)", "write both limits"
         report.add(INVERTED_LIMIT, message, limit.element, attribute="lower", found=found, remedy=remedy)
     elif lower == upper and bounded:
         message = "the joint cannot move: its limits are equal"
@@ -402,7 +402,7 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if leader.mimic is not None:
             message = f"the mimicked joint itself mimics {leader.mimic.leader!r}"
-            remedy = "name the last joint of the chain, because some readers apply only one rule of a chain"
+            remedy = "name the independent joint of the chain, because some readers apply only one rule"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
             self.check_range(joint, mimic, joint.limit)
