@@ -143,7 +143,7 @@ def test_files_outside_the_robots_folder_are_not_read(
     (tmp_path / "robot" / "urdf" / "link").symlink_to(secret.parent)
     name = name.format(tmp=tmp_path)
     message = refused(expanded, link(f"${{xacro.load_yaml('{name}.yaml')['password']}}"))
-    assert "it is neither in the file's folder, package or repository nor" in message
+    assert "outside the allowed folders. These are the xacro file's folder" in message
     for how in ('filename="{}.xacro"', 'filename="{}.x*"', 'filename="{}.xacro" optional="true"'):
         refused(expanded, f"<xacro:include {how.format(name)}/>")
 

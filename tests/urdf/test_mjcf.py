@@ -205,7 +205,9 @@ def test_a_file_with_the_root_element_mujoco_is_mjcf(write: Write) -> None:
     assert [is_mjcf(path) for path in (a, b, c, d)] == [True, False, True, False]
     assert loaded(b).nq == 2
     assert not is_mjcf(a.with_name("nothing.xml"))
-    with pytest.raises(urdfkin.UrdfError, match="this is an MJCF file; `load` and all other commands read"):
+    with pytest.raises(
+        urdfkin.UrdfError, match="this is an MJCF file; `load` and the commands read MJCF files"
+    ):
         urdfkin.load(d)
 
 

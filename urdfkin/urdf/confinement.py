@@ -20,7 +20,7 @@ from typing import Any
 
 from urdfkin.urdf.expressions import RefusedError
 
-#: Maximum memory of the process in bytes. Python and its imported libraries need about a tenth as much.
+#: Maximum memory of the process in bytes. Python and its imported libraries need about a tenth of this.
 MEMORY = 2 * 1024**3
 
 #: Audit events that are always allowed.
@@ -37,8 +37,8 @@ class Ground:
     Attributes:
         roots: Files that may be read, and folders whose content may be read, except hidden files and folders.
             The target of a symbolic link must also be one of these files, or be in one of these folders.
-        installed: Folders in which a symbolic link may point to a package in any other folder, as in the
-            install folder of `colcon build --symlink-install`.
+        installed: Folders with installed packages. A symbolic link in these folders may point to a package in
+            any other folder. `colcon build --symlink-install` writes such links.
     """
 
     roots: list[str] = field(default_factory=list)
@@ -121,8 +121,9 @@ def confine(holds: Callable[[str], bool]) -> None:
             raise RefusedError(f"a xacro file may not write a file: {path!r}")
         if not isinstance(path, str | bytes | os.PathLike) or not holds(os.fsdecode(path)):
             raise RefusedError(
-                f"{path!r} may not be read: it is hidden, or it is neither in the file's folder, package or"
-                " repository nor in a package on ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
+                f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
+                " xacro file's folder, package and repository, and the packages on ROS_PACKAGE_PATH and"
+                " AMENT_PREFIX_PATH"
             )
 
     sys.addaudithook(watch)

@@ -1,9 +1,9 @@
 """Evaluate the expressions `${...}` of a xacro file without Python's `eval`.
 
-xacro itself passes expressions to `eval`, and searches for forbidden names only in the outermost code object.
-A lambda in the expression can therefore read any attribute, and run any program. This module interprets the
-syntax tree of an expression. An expression may contain only values, operators, the functions of xacro and the
-methods in `_METHODS`.
+xacro itself passes expressions to `eval`. It first searches an expression for forbidden names, but does not
+search the body of a lambda. A lambda in the expression can therefore read any attribute, and run any program.
+This module interprets the syntax tree of an expression. An expression may contain only values, operators, the
+functions of xacro and the methods in `_METHODS`.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ class _Evaluation:
             return
         loop, *others = loops
         for value in self.value(loop.iter):
-            # A copy of the outer scope would evaluate all xacro properties, even unused properties.
+            # Copying `self._names` would evaluate all xacro properties, even unused properties.
             scope = ChainMap(dict(_bound(loop.target, value)), self._names)  # type: ignore[arg-type]
             inner = _Evaluation(scope, self._functions)
             if all(inner.value(condition) for condition in loop.ifs):

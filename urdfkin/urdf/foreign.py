@@ -74,7 +74,7 @@ def lost_quaternions(source: Any, file: str) -> tuple[Finding, ...]:
         f"yourdfpy ignores quat_xyzw, so the rotation of joint {', '.join(joints[:_NAMED])}{more} is lost if"
         " the file gives the rotation by quat_xyzw"
     )
-    remedy = "load the file itself if it contains quat_xyzw"
+    remedy = "if the file contains quat_xyzw, load the file instead of the yourdfpy robot"
     return (Finding(QUATERNION.id, Severity.NOTE, message, remedy=remedy, file=file),)
 
 
@@ -118,7 +118,7 @@ def _text(root: Any) -> str:
             element, duplicate = open_.pop()
             duplicate.text = element.text
             for child in element:
-                if isinstance(child.tag, str):  # The tag of a comment or an instruction is not a string.
+                if isinstance(child.tag, str):  # In a comment or an instruction, `tag` is a function.
                     open_.append((child, ElementTree.SubElement(duplicate, child.tag, dict(child.attrib))))
         return ElementTree.tostring(copy, encoding="unicode")
     except (TypeError, AttributeError, RecursionError) as error:
@@ -146,7 +146,8 @@ _ENDLESS = 1e300
 class Modelled:
     """The kinematic tree of a Pinocchio model, with the index of each link's Pinocchio joint or frame.
 
-    `joints` contains the links whose frame is a joint frame; `frames` contains all other links.
+    `joints` contains the joint index of each link whose frame is a joint frame. `frames` contains the frame
+    index of every other link.
     """
 
     tree: KinematicTree
@@ -184,13 +185,19 @@ class _ModelReader:
         self.rows: list[tuple[Joint, str, str]] = []
 
     def _bodies_on_joints(self) -> Iterator[tuple[int, int]]:
-        """Yield joint and body index for each body at a joint frame, last body first."""
+        """For each body whose frame is a joint frame, yield the index of the joint and of the body.
+
+        The last body comes first, so a dictionary keeps the first body of each joint.
+        """
         for i in reversed(range(len(self.frames))):
             if self.kinds[i] == "BODY" and (self.places[i] == np.eye(4)).all():
                 yield int(self.frames[i].parentJoint), i
 
     def read(self) -> Modelled:
-        """Convert all frames, then all moving joints. In Pinocchio, a parent frame has a lower index."""
+        """Convert all frames, then all moving joints.
+
+        In Pinocchio, the index of a parent frame is lower than the indices of its child frames.
+        """
         for i in range(len(self.frames)):
             self._frame(i)
         frames = zip(self.frames, self.kinds, strict=True)
@@ -204,7 +211,10 @@ class _ModelReader:
         return Modelled(tree, joints, {link: i for i, link in self.links.items() if link not in joints})
 
     def _attachment(self, frame: Any, joint: int, T: FloatArray) -> tuple[str, FloatArray]:
-        """Return a frame's parent link and pose in this link; T is the pose in the joint frame."""
+        """Return the parent link of a frame, and the pose of the frame relative to this link.
+
+        T is the pose of the frame relative to the frame of `joint`.
+        """
         i = -1 if frame is None else int(frame.parentFrame)
         if i < 0 or i not in self.links or int(self.frames[i].parentJoint) != joint:
             return self.carriers[joint], T

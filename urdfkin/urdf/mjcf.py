@@ -4,9 +4,9 @@ MuJoCo compiles the file, which resolves defaults and classes. The tree is built
 
 - Each body becomes a link with the body's frame. Each site with a name also becomes a link; a fixed joint
   connects this link with the link of the site's body.
-- The joints of a body move one after the other. Joint k, with the anchor p_k and the motion J_k, changes the
-  pose F of the body to F Trans(p_k) J_k Trans(-p_k). A body with several joints becomes a chain of joints and
-  links. The last link of the chain is the body.
+- The joints of a body move one after the other. Joint k has the anchor p_k and the motion J_k. It changes the
+  pose F of the body to F Trans(p_k) J_k Trans(-p_k). Trans(p) is the translation by p. A body with several
+  joints becomes a chain of joints and links. The last link of the chain is the body.
 - The joint origin includes the joint's reference value (`ref`), so that urdfkin's q has the same values as
   MuJoCo's qpos. Only quaternions differ: MuJoCo stores the scalar part first.
 
@@ -59,7 +59,7 @@ class Listed:
     Attributes:
         where: The tag and the name of the element, or the tag alone; None for the whole file.
         moves: Whether the part of the file affects the motion of the links.
-        remedy: The remedy for a probable mistake; None for a part that is left out.
+        remedy: The remedy if the file probably contains a mistake, otherwise None.
     """
 
     what: str
@@ -75,10 +75,10 @@ class Mjcf:
     Attributes:
         model: MuJoCo's compiled model, in which all bodies remain separate.
         fused: The model with fused static bodies; None unless `whole` is True and the file sets `fusestatic`.
-        frames: "body" or "site", and the index in `model`, for each link.
+        frames: For each link, the word "body" or "site", and the index of this body or site in `model`.
         coordinates: Index in MuJoCo's qpos of each moving joint, including mimic joints.
         rules: Name of the mimic joint for each equality that is a mimic rule, by the equality's index.
-        apart: Indices of the active equalities between joints that the tree cannot represent.
+        apart: Indices of the active joint equalities that are not mimic rules of the tree.
         whole: Whether `model` contains the shapes and inertias of the file.
         aligns: Whether MuJoCo aligns the frame of a free body with the body's inertial frame.
     """
@@ -95,7 +95,10 @@ class Mjcf:
     aligns: bool
 
     def qpos(self, q: FloatArray) -> FloatArray:
-        """Return MuJoCo's qpos (n, nq of MuJoCo) for q (n, nq), including mimic joints."""
+        """Return MuJoCo's qpos for urdfkin's q (n, nq).
+
+        qpos also contains the mimic joints. Its shape is (n, nq of MuJoCo's model).
+        """
         tree, full = self.tree, np.tile(self.model.qpos0, (len(q), 1))
         for joint, at in zip(tree.joints, tree.q_index, strict=True):
             if joint.name not in self.coordinates:
@@ -144,10 +147,10 @@ class Mjcf:
         return self._of_frames(at_body, np.linalg.norm(m.site_pos, axis=1))
 
     def reference_angles(self, q: FloatArray) -> FloatArray:
-        """Return a sum of hinge angles (n, frames), in rad, for bounds on rounding errors.
+        """Return a sum of absolute hinge angles, in rad, for each frame, shape (n, frames).
 
         Each hinge between the world and a frame adds |q| + |ref| if the hinge's reference value `ref` is
-        nonzero.
+        nonzero. Bounds on rounding errors contain this sum.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         at_body = np.zeros((len(q), m.nbody))
@@ -165,7 +168,10 @@ class Mjcf:
             yield j, words.get(int(m.jnt_type[j]), "hinge"), int(m.jnt_qposadr[j])
 
     def _of_frames(self, at_body: FloatArray, own: FloatArray) -> FloatArray:
-        """Select a column of `at_body` (n, bodies) for each frame; for a site, add `own` (sites,)."""
+        """Return the values of all frames (n, frames), from the values `at_body` (n, bodies) of the bodies.
+
+        The value of a site is the value of its body plus the number of the site in `own` (sites,).
+        """
         columns = [
             at_body[:, i] if kind == "body" else at_body[:, self.model.site_bodyid[i]] + own[i]
             for kind, i in self.frames.values()
@@ -189,11 +195,11 @@ class Mjcf:
         return out
 
     def rule_sizes(self, q: FloatArray) -> FloatArray:
-        """Return the size (n, equalities) of each mimic rule, which bounds the rule's rounding error.
+        """For each mimic rule, return a number for the bound on its rounding error, shape (n, equalities).
 
-        A joint y with the rule y = y0 + c0 + c1 (x - x0) has the sum s(y) = |y0| + |c0| + |c1| (s(x) + |x0|).
-        An independent joint x has the sum s(x) = |x|. The size of the rule is s(y) (k + 1), where k is the
-        number of rules from y to an independent joint.
+        Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
+        s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The returned number is s(y) (k + 1), where k is the number of
+        rules from y to an independent joint. The bound is this number times `MJCF_RULE` and `EPS`.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}
@@ -355,7 +361,7 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
 
 
 def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
-    """Yield a finding if all hinge limits of a file in degrees are probably in radians."""
+    """Yield a finding if a file declares degrees, but all its hinge limits are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
     if 0.0 < largest <= LARGEST_ANGLE:
@@ -375,7 +381,7 @@ def _strip(mujoco: Any, spec: Any) -> None:
     for site in spec.sites:
         site.material = ""
     for joint in spec.joints:
-        # MuJoCo must not align a frame with the placeholder inertia that the next loop sets.
+        # The next loop replaces all inertias. MuJoCo must not align a frame with such an inertia.
         joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
     for body in spec.bodies[1:]:
         body.explicitinertial, body.mass, body.ipos = True, 1.0, (0.0, 0.0, 0.0)
@@ -449,7 +455,10 @@ class _MjcfReader:
             self._fix(T, here, link)
 
     def _joint(self, j: int, name: str, T: FloatArray) -> tuple[Joint, FloatArray]:
-        """Return the joint with index `j` and origin T, and the pose of the body in the joint frame."""
+        """Return the joint with index `j`, and the pose of its body in the joint frame.
+
+        T is the joint's origin without the joint's reference value.
+        """
         m, kinds = self.model, self.mujoco.mjtJoint
         kind, axis, back = m.jnt_type[j], m.jnt_axis[j], pose(p=-m.jnt_pos[j])
         if kind == kinds.mjJNT_BALL:

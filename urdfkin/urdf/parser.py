@@ -172,7 +172,7 @@ COMMON_DEPTH = 256
 #: Number of bytes that expat parses in one call.
 _PIECE = 1_000_000
 
-#: If an element's text has this many stored characters, the parser stores no further text.
+#: If the stored text of an element has at least this many characters, the parser ignores further text.
 _STORED = 2 * QUOTED
 
 #: Attributes whose value is the name of a link or joint.
@@ -518,7 +518,8 @@ class NumberReader:
         )
 
 
-#: Tags of elements that messages about numbers do not name.
+#: For an attribute of these elements, a message about an invalid number names only the attribute.
+#: For other elements, the message also names the element.
 _PLAIN = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
@@ -597,7 +598,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
 
 _FORMATS = {
     "sdf": "this is an SDF file; convert the file to a URDF first",
-    "mujoco": "this is an MJCF file; `load` and all other commands read files with the suffix .xml or .mjcf",
+    "mujoco": "this is an MJCF file; `load` and the commands read MJCF files with the suffix .xml or .mjcf",
     "mujocoinclude": "this is a part of an MJCF file; load the file that includes it",
     "model": "this is a part of an SDF file; convert the file to a URDF first",
     "world": "this is a part of an SDF file; convert the file to a URDF first",
@@ -808,7 +809,7 @@ _UNUSED_NUMBERS = {
 
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
-    # The cache must not store long words, because a word may have megabytes.
+    # A name in the file may have megabytes, and the cache must not store such a name.
     return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
 
 

@@ -98,8 +98,9 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
 def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
     """Return the rule of each mimic joint relative to an independent joint.
 
-    If z mimics y, and y mimics x, the combined rule is z = m2 (m1 x + b1) + b2. Pinocchio also combines the
-    rules from x upwards, so urdfkin and Pinocchio have equal rounding errors.
+    If z mimics y, and y mimics x, the combined rule is z = m2 (m1 x + b1) + b2. urdfkin and Pinocchio
+    combine the rules in the same order: first the rule of y, then the rule of z. Therefore their rounding
+    errors are equal.
     """
     names = dict.fromkeys(joint.name for joint in joints)
     rules = {joint.name: joint.mimic for joint in joints if joint.mimic and joint.kind != "fixed"}

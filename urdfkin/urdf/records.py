@@ -20,12 +20,13 @@ class Limits:
     """Limits on the size of a URDF file and its content.
 
     Attributes:
-        depth: Maximum number of levels of nested elements. Pinocchio never reads more than the default.
+        depth: Maximum number of levels of nested elements. Pinocchio refuses a file with more levels than the
+            default.
         attributes: Maximum number of attributes of one element.
         name: Maximum number of characters in the name of an element, an attribute, a link or a joint.
         number: Maximum number of characters of one number.
-        markup: Maximum number of bytes of one tag, comment or processing instruction. The default is that of
-            libxml2. urdfkin measures this size with an error of at most 1 MB.
+        markup: Maximum number of bytes of one tag, comment or processing instruction. The default is the
+            limit of libxml2. urdfkin measures the number of bytes with an error of at most 1 MB.
     """
 
     bytes: int = 100_000_000
@@ -66,7 +67,7 @@ class Element:
     text: str = ""
 
     def append(self, child: Element) -> None:
-        """Add a child; to save memory, an element without children has no list."""
+        """Add a child; only elements with children have a list, which saves memory."""
         if isinstance(self.children, list):
             self.children.append(child)
         else:
@@ -88,7 +89,10 @@ class Element:
 
     @property
     def holder(self) -> Element:
-        """The child of `<robot>` that contains this element, or the element itself."""
+        """The child of `<robot>` that contains this element.
+
+        For `<robot>` and its children, `holder` is the element itself.
+        """
         return self.above or self
 
 

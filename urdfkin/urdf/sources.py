@@ -126,7 +126,8 @@ class Text:
 
     Attributes:
         label: The name in messages, for example the path, `<text>` or `<stdin>`.
-        source: The path or name for reading the URDF again; otherwise `<text>`, `<bytes>` or `<file>`.
+        source: The path or name with which the URDF can be read again. A source without a path or name has
+            the value `-`, `<text>`, `<bytes>` or `<file>`.
         sha256: The digest of the MJCF or USD file from which the URDF was converted; otherwise empty.
     """
 
@@ -141,7 +142,11 @@ class Text:
 
 
 def read_source(source: Source, most: int = MOST, xacro_args: Mapping[str, object] | None = None) -> Text:
-    """Read a URDF from any source, at most `most` + 1 bytes (or characters of an open text file).
+    """Read a URDF from any source.
+
+    Read at most `most` + 1 bytes of a URDF file, an open binary file or standard input. Read at most
+    `most` + 1 characters of an open text file. The additional byte or character shows that the file is too
+    long.
 
     A catalogue name has priority over a file with this name: for a file `panda`, write `./panda`. Raise
     SourceError for an unreadable file, UnknownNameError for an unknown name, and InputError for a wrong type.
@@ -257,7 +262,10 @@ def as_word(path: Path) -> str:
 
 
 def entry_of(word: str) -> Entry | None:
-    """Return the catalogue entry of a name, or None. A word with a dot or a separator is a path."""
+    """Return the catalogue entry of a name, or None.
+
+    A text with a dot or a path separator is a path, not a name.
+    """
     return None if "." in word or os.sep in word else catalogue().get(word)
 
 

@@ -21,8 +21,8 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG, Element
 def to_urdf(tree: KinematicTree) -> str:
     """Write the links and joints of a tree as URDF, without shapes and masses.
 
-    URDF 1.0 requires finite limits of effort and velocity. If a <limit> element lacks such a limit, the file
-    declares version 1.2.
+    URDF 1.0 requires finite limits of effort and velocity in a <limit> element. The file declares version 1.2
+    if a <limit> element omits an infinite limit of effort or velocity.
     """
     version = ' version="1.2"' if any(_needs_newer_version(joint) for joint in tree.joints) else ""
     lines = [f'<robot name="{attribute(tree.name)}"{version}>']

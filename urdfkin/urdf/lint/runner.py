@@ -55,14 +55,14 @@ def check(
         xacro_args: Arguments for a .xacro file, which is expanded first. Line numbers of findings are those
             of the expanded text.
         fold: Whether to combine many warnings with one code into a single warning that lists the lines. If
-            `fold` is True and there are more than a hundred errors with one code, the hundredth error lists
-            the lines of all further errors.
+            `fold` is True, at most 100 errors with one code are returned. The last of these errors lists the
+            lines of all further errors.
 
     Returns:
         The findings that no comment silences, as a list. Notebooks show this list as a table. The list is
         empty if the file has no problem. If a file has more than 10,000 findings with one code, the list
-        contains the first 10,000. The last of these findings has the line numbers of all further findings in
-        the attribute `also`.
+        contains the first 10,000. The attribute `also` of the 10,000th finding lists the line numbers of all
+        further findings.
 
     Raises:
         SourceError: the file cannot be read.
@@ -87,8 +87,8 @@ def check(
 class Examined:
     """The result of a check; `robot` is None if the text is not a URDF.
 
-    `data` has no byte order mark, and findings state positions in `data`. `silenced` has pairs of a finding
-    and the reason in the comment.
+    `data` has no byte order mark, and findings state positions in `data`. `silenced` contains silenced
+    findings, each with the reason in the comment.
     """
 
     text: Text
@@ -107,7 +107,11 @@ def examine(
     fold: bool = False,
     wanted: Callable[[Finding], bool] | None = None,
 ) -> Examined:
-    """Check a text, with arguments of `check`; `wanted` selects findings before findings are combined."""
+    """Check a text; the function `check` documents the arguments.
+
+    `wanted` returns False for a finding that must not be reported. Such findings are removed first, and then
+    the remaining findings are combined.
+    """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
     report = Reporter(text.label, text.data, limits)

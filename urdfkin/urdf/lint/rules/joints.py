@@ -119,7 +119,7 @@ def _one_root(report: Reporter, robot: RobotRecord) -> bool:
     if len(roots) < 2:
         return len(roots) == 1
     if not children <= robot.links.keys():
-        return False  # A joint without a valid child may be the parent joint of any link.
+        return False  # Any link may be the intended child of a joint whose child is not a link.
     parents = {joint.parent for joint in robot.joints}
     main = next((root for root in roots if root in parents), roots[0])
     for root in roots:
@@ -135,7 +135,8 @@ AXIS_LENGTH = Rule("URDF503", "axis-not-unit", WARNING)
 PLANAR_AXIS = Rule("URDF505", "planar-axis", WARNING)
 NEARLY_COORDINATE_AXIS = Rule("URDF514", "nearly-coordinate-axis", NOTE)
 
-#: Smaller deviations of an axis length from 1 are notes, because numbers with few digits cause them.
+#: If the length of an axis differs from 1 by less than this number, the finding is a note.
+#: Numbers with few digits cause such differences.
 LENGTH_ROUNDING = 2e-4
 
 #: Maximum difference between 1 and the length of a unit vector, as in `kinematics.inputs`.
@@ -148,7 +149,8 @@ _LEAN = 1e-9
 #: The number is the default tolerance of Eigen's function `isApprox`.
 _SNAPPED = 1e-12
 
-#: Smaller tilts (rad) of an axis are not reported, because the bounds in `verify.bounds` include these tilts.
+#: If an axis differs from a coordinate axis by at most this angle (rad), the difference is not reported.
+#: The error bounds in `verify.bounds` cover this difference.
 _TILT = 2.0**-52
 
 
@@ -206,7 +208,7 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         message = f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}"
-        remedy = f'write xyz="{written}"; to keep the tilt, double all three numbers'
+        remedy = f'write xyz="{written}", or double all three numbers: Pinocchio then keeps the tilt'
         report.add(
             NEARLY_COORDINATE_AXIS, message, element,
             attribute="xyz", found=_written(joint), remedy=remedy, weight=tilt,
@@ -243,7 +245,7 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
         return
     at = joint.axis_element or joint.element
     message = "a planar joint moves in the XY plane of its frame, independent of <axis>"
-    remedy = 'rotate the origin so that the normal is z, and write <axis xyz="0 0 1"/>'
+    remedy = 'rotate the origin until its z axis is the normal of the plane, and write <axis xyz="0 0 1"/>'
     report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_written(joint), remedy=remedy)
 
 
@@ -280,11 +282,11 @@ def _check_limit(report: Reporter, joint: JointRecord, limit: LimitRecord, versi
     if any(getattr(limit, name) is None for name in written):
         return
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
-    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits (a missing limit is 0)"
+    found = f'lower="{lower:g}" upper="{upper:g}"' if written else "no limits (the default of a limit is 0)"
     if lower > upper:
         message, remedy = "the lower limit is above the upper limit", "swap the limits"
         if len(written) < 2:
-            found, remedy = f"{found} (a missing limit is 0)", "write both limits"
+            found, remedy = f"{found} (the default of a limit is 0)", "write both limits"
         report.add(INVERTED_LIMIT, message, limit.element, attribute="lower", found=found, remedy=remedy)
     elif lower == upper and bounded:
         message = "the joint cannot move: its limits are equal"
@@ -317,8 +319,8 @@ MIMIC_RANGE = Rule("URDF527", "mimic-range", WARNING)
 
 #: Largest multiplier or offset (rad or m) of a mimic joint that is not reported.
 LARGEST = 1e6
-#: Limits are reported if they exclude more than this fraction of the mimicked joint's range.
-#: Smaller fractions are common, because limits are often written with few digits.
+#: The limits of a mimic joint may exclude this fraction of the mimicked joint's range without a finding.
+#: Limits are often written with few digits, and therefore exclude a small fraction.
 LEAST_LOST = 1e-3
 
 
@@ -400,7 +402,7 @@ class _MimicChecker:
             self.add(MIMIC_CONTINUOUS, message, mimic, "joint", 'write type="revolute" for the mimic joint')
         if leader.mimic is not None:
             message = f"the mimicked joint itself mimics {leader.mimic.leader!r}"
-            remedy = "name the last joint of the chain, because some readers apply only one rule of a chain"
+            remedy = "name the independent joint of the chain, because some readers apply only one rule"
             self.add(MIMIC_CHAIN, message, mimic, "joint", remedy)
         if joint.limit is not None and max(abs(mimic.multiplier), abs(mimic.offset)) <= LARGEST:
             self.check_range(joint, mimic, joint.limit)
@@ -485,7 +487,7 @@ FAR = 100.0
 #: If a robot's total length (m) is below this number, the lengths were probably scaled twice.
 TINY = 1e-4
 
-#: A limit that is a whole number from `MANY` to `ENDLESS` is probably in degrees.
+#: A limit is probably in degrees if it is a whole number, at least `MANY` and less than `ENDLESS`.
 #: For a joint without limits, some exporters write limits of at least `ENDLESS`.
 MANY, ENDLESS = 30.0, 1000.0
 
@@ -495,7 +497,8 @@ NOTICEABLE = 1e-3
 #: Smaller differences (rad) between an angle and a multiple of pi are not reported.
 ANGLE_ROUNDING = 1e-10
 
-#: Multiples of pi. A rounded multiple is reported if it has at least the stated number of decimals.
+#: Multiples of pi, each with a minimum number of decimals.
+#: A number in the file with fewer decimals is not reported as a rounded multiple of pi.
 _MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
     (Fraction(k, d), 4) for d in (3, 4, 6, 12) for k in range(1, 2 * d) if Fraction(k, d).denominator == d
 ]
@@ -601,7 +604,7 @@ def _as_pi(multiple: Fraction) -> str:
 def _metres(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
-    # Round to two significant digits, so that `:g` writes no exponent.
+    # The format `:.2g` would write 120 as 1.2e+02.
     return f"{float(f'{length * factor:.1e}'):g} {unit}"
 
 
