@@ -96,7 +96,7 @@ class AccuracyResult:
                 "the accuracy results in the two folders were computed with different options",
                 where=str(other._store.folder),
                 found=f"{other._settings.options}, and {self._settings.options} in {self._store.folder}",
-                remedy="use the same options of the accuracy study for all stores",
+                remedy="run the accuracy study with the same options for both folders",
             )
 
     def _key(self, robot: int) -> str:
