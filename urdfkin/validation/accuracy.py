@@ -94,8 +94,10 @@ def accuracy_study(
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
     `base` is the motion of the root link: one motion for all samples, or one motion for each sample. Without
-    `base`, the root link is fixed. Pinocchio computes no analytical Jacobians. Therefore, the study computes the
-    analytical Jacobians from the rotation and the Jacobian of each library (eq. 7.122).
+    `base`, the root link is fixed.
+
+    Pinocchio computes no analytical Jacobians. Therefore, the study computes the analytical Jacobians from the
+    rotation and the Jacobian of each library (eq. 7.122).
     """
     drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
