@@ -96,8 +96,8 @@ def accuracy_study(
     `base` is the motion of the root link: one motion for all samples, or one motion for each sample. Without
     `base`, the root link is fixed.
 
-    Pinocchio computes no analytical Jacobians. Therefore, the study computes the analytical Jacobians from the
-    rotation and the Jacobian of each library (eq. 7.122).
+    Pinocchio computes no analytical Jacobians. Therefore, the study computes the analytical Jacobians
+    from the rotation and the Jacobian of each library (eq. 7.122).
     """
     drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
