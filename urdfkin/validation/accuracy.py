@@ -47,8 +47,8 @@ from urdfkin.verify.verifier import bound_of, oracle_results, own_results
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED
 _INTERVALS = np.vectorize(exact, otypes=[object])
-#: Groups of representations of the orientation; the result has one line for each group.
-#: Angles about fixed axes are left out: their Jacobians are those of Euler angles with reversed rows.
+#: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
+#: Angles about fixed axes are in no group: the Jacobian of Euler angles has the same rows in reverse order.
 _REPRESENTATIONS = {
     "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
@@ -94,8 +94,10 @@ def accuracy_study(
     """Compute the errors of urdfkin and of Pinocchio relative to values with fifty digits.
 
     `base` is the motion of the root link: one motion for all samples, or one motion for each sample. Without
-    `base`, the root link is fixed. Pinocchio computes no analytical Jacobians, so the study inserts the
-    rotation and the Jacobian of each library into eq. 7.122.
+    `base`, the root link is fixed.
+
+    Pinocchio computes no analytical Jacobians. Therefore, the study computes the analytical Jacobians
+    from the rotation and the Jacobian of each library (eq. 7.122).
     """
     drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
@@ -182,9 +184,10 @@ class _AccuracyBatch:
 
 
 def _moving_columns(scale: FloatArray) -> NDArray[np.intp]:
-    """Return the indices (n, links, most) of the nonzero columns of each link's Jacobian.
+    """Return the indices (n, links, m) of the nonzero columns of each link's Jacobian.
 
-    If a link has fewer than `most` nonzero columns, indices of zero columns follow.
+    m is the largest number of nonzero columns. If a link has fewer, the remaining indices are those of
+    zero columns.
     """
     idle = ~(scale > 0.0).any(axis=-2)
     most = int((~idle).sum(axis=-1).max(initial=0))
@@ -196,9 +199,12 @@ def _columns(J: NDArray[Any], indices: NDArray[np.intp]) -> NDArray[Any]:
 
 
 def exact_quaternion(R: NDArray[np.object_], near: FloatArray) -> NDArray[np.object_]:
-    """Return the unit quaternions (m, 4) of rotations (m, 3, 3): of q and -q, the one closer to `near`."""
+    """Return the unit quaternions (m, 4) of rotations (m, 3, 3).
+
+    Both q and -q represent a rotation; the result is the quaternion closer to `near`.
+    """
     K = davenport(R)
-    q = (K @ near[..., np.newaxis])[..., 0] + near  # K + I equals 4 q q^T.
+    q = (K @ near[..., np.newaxis])[..., 0] + near  # The matrix K + I is 4 q q^T.
     unit: NDArray[np.object_] = q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
     return unit
 

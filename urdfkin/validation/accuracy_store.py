@@ -1,7 +1,8 @@
-"""Save the results of the accuracy study in a campaign's store, so that an interrupted study can be resumed.
+"""Save the results of the accuracy study, so that an interrupted study can be resumed.
 
-`accuracy.json` contains the settings. Each robot's result is a file with a checksum, in the same folder as
-the chunks. The file name is the sha256 of all data that determine the numbers in the file.
+The store is the folder with the results of the validation. `accuracy.json` contains the settings. Each
+robot's result is a file with a checksum, in the same folder as the chunks. The file name is the sha256 of all
+data that determine the numbers in the file.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class AccuracyResult:
 
     @classmethod
     def of(cls, store: Store) -> AccuracyResult | None:
-        """Return the results in a store; None without an accuracy study or with unreadable settings."""
+        """Return the results in a store; None if there are none, or the settings are unreadable."""
         try:
             if (content := read_if_there(store.folder / STUDY_FILE)) is None:
                 return None
@@ -96,7 +97,7 @@ class AccuracyResult:
                 "the accuracy results in the two folders were computed with different options",
                 where=str(other._store.folder),
                 found=f"{other._settings.options}, and {self._settings.options} in {self._store.folder}",
-                remedy="use the same options of the accuracy study for all stores",
+                remedy="run the accuracy study with the same options for both folders",
             )
 
     def _key(self, robot: int) -> str:

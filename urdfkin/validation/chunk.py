@@ -74,7 +74,10 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class ChunkResult:
-    """Result of a chunk; results of adjacent chunks can be added, and only the first chunk has a summary."""
+    """Result of a chunk, or the sum of the results of adjacent chunks of one robot.
+
+    `summary` is None if the first chunk is not included.
+    """
 
     name: str
     joints: tuple[str, ...]
@@ -113,7 +116,7 @@ class Cut:
         return min(_MAX_DRAWS, max(1, -(-self.samples // DRAWN) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
-        """Number of chunks of a robot's samples; at least one, for the special configurations."""
+        """Number of chunks of a robot: at least one, because the special configurations need a chunk."""
         return max(1, -(-self.samples // (self._draws * DRAWN)))
 
     def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:

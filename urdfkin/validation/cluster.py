@@ -31,11 +31,11 @@ from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.verify.oracles import version
 
-#: At most _PER_THREAD * (threads of all workers) + _MORE chunks are on the cluster at the same time.
+#: At any time, at most _PER_THREAD * (threads of all workers) + _MORE sent chunks have no answer yet.
 #: With this number of chunks, no thread waits for its next chunk.
 _PER_THREAD, _MORE = 2, 4
 #: Maximum number of times that a chunk is sent; a chunk is sent again if Dask loses the worker.
-#: The number is high because a robot cannot crash a Dask worker: each chunk runs in a separate process.
+#: The number can be high: a robot cannot crash a Dask worker, because each chunk runs in a separate process.
 _TRIES = 20
 #: Seconds after which the number of workers is read again.
 _INTERVAL = 1.0
@@ -53,8 +53,9 @@ def connected(scheduler: str, tell: Callable[[str], None] = lambda _: None) -> I
     """Yield an engine on a cluster, for `validate(executor=...)`.
 
     `scheduler` is the address of a running scheduler, such as `tls://host:8786`, or `local:N` for N workers
-    on this machine. Local workers open no port, and end with the engine. `tell` receives messages for the
-    user. Raise ClusterError if no scheduler answers, or if the versions of urdfkin or Pinocchio differ.
+    on this machine. Local workers open no port, and stop when the context ends. `tell` receives messages for
+    the user. Raise ClusterError if no scheduler answers, if a worker cannot run urdfkin, or if versions or
+    code on the cluster differ from those of this process.
     """
     with _client(scheduler) as client:
         _check_versions(client)
@@ -191,10 +192,11 @@ def _raise_difference(where: str, differences: list[str]) -> None:
 class Cluster:
     def __init__(self, client: Client) -> None:
         self._client = client
-        #: Task of each chunk on the cluster, and how many times the chunk was sent.
+        #: For each chunk without an answer: the task, and how many times the chunk was sent.
         self._pending: dict[Future[Any], tuple[Task, int]] = {}
-        #: Text of each robot on the workers, and the number of chunks that need this text.
+        #: Texts of robots that the workers store.
         self._robots: dict[int, Future[bytes]] = {}
+        #: Number of chunks without an answer for each robot.
         self._in_use = Counter[int]()
         self._limit, self._counted = _MORE, float("-inf")
 
@@ -246,7 +248,7 @@ class Cluster:
         return future
 
     def _forget(self, robot: int) -> None:
-        """Delete a robot's text on the workers if no sent chunk needs the text."""
+        """Delete a robot's text on the workers if each sent chunk of the robot has its answer."""
         self._in_use[robot] -= 1
         if not self._in_use[robot]:
             del self._in_use[robot]

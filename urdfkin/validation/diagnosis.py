@@ -2,8 +2,8 @@
 
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
-results with the user's results. A mistake is reported if the largest difference between them is then at
-least a thousand times smaller. If several mistakes lead to the same results, up to three are reported.
+results with the user's results. A mistake is reported if the mistake makes the largest difference at least a
+thousand times smaller. If several mistakes lead to the same results, up to three are reported.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.verify.quantities import Quantity
 
-#: A mistake explains the results if at most this fraction of the largest difference remains.
+#: Largest remainder (see `Diagnosis.remainder`) at which a mistake explains the results.
 EXPLAINED = 1e-3
 _MOST = 3
 #: Number of configurations in a first, fast test for two exchanged joints.
 _FEW = 4
-#: Differences are divided by their scale, which is at least _LEAST * (largest scale).
+#: Each difference is divided by its scale. The smallest scale is _LEAST * (largest scale).
 _LEAST = 1e-9
-#: Maximum difference, relative to the scale, at which two results count as equal.
+#: Two numbers count as equal if their difference is at most _EQUAL * scale.
 _EQUAL = 1e-9
-#: Order of the rows of a six-vector with exchanged linear and angular halves.
+#: Row indices that exchange the linear and the angular rows of a six-vector.
 _HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
@@ -48,7 +48,7 @@ class Diagnosis:
 
     Attributes:
         inputs: q, or q and v, or q, v and a, in the function's convention.
-        scale: For each number in `expected`, the scale in its bound k * eps * scale.
+        scale: Scale of each number in `expected`. The bound of a number is k * eps * scale.
         compute: A function (inputs, frame, reference) that returns urdfkin's results.
     """
 
@@ -59,9 +59,9 @@ class Diagnosis:
     compute: Callable[..., FloatArray]
 
     def remainder(self, predicted: FloatArray, n: int | None = None) -> float:
-        """Return the fraction of the largest difference that a mistake does not explain.
+        """Return the largest difference of `found` from `predicted`, divided by that from `expected`.
 
-        `predicted` contains urdfkin's first n results with the mistake; without `n`, all results.
+        `predicted` contains urdfkin's results with a mistake: the first n results, or all if n is None.
         """
         scale = self._nonzero_scale(n)
         with np.errstate(all="ignore"):
@@ -215,7 +215,8 @@ class Mistakes:
             yield "the result is transposed", partial(case.expected.swapaxes, 1, 2)
         if len(shape) == 3:
             yield (
-                "the last two axes are exchanged: entry (row, i, j) is the derivative of column i by joint j",
+                "the last two axes are exchanged; entry (row, i, j) must be the derivative of column i"
+                " in the direction of joint velocity j",
                 partial(case.expected.swapaxes, 2, 3),
             )
 
@@ -244,7 +245,7 @@ class Mistakes:
     def _axes(self) -> list[tuple[str, int, int, bool]]:
         """Return (name, index in q, index in v, is_angle) for each joint with one coordinate.
 
-        The indices belong to the function's convention.
+        q and v are in the order of the function's convention.
         """
         tree = self.robot.tree
         found = []
@@ -261,7 +262,10 @@ class Mistakes:
 
     @staticmethod
     def _scaled(inputs: Inputs, at: Sequence[tuple[int, int]], factor: float, count: int) -> Inputs:
-        """Scale joint values in the first `count` inputs by a factor; `at` has the indices in q and in v."""
+        """Multiply joint entries of the first `count` inputs by a factor.
+
+        `at` contains the index in q and the index in v of each joint.
+        """
         found = [x.copy() for x in inputs]
         for k, x in enumerate(found[:count]):
             x[:, [pair[min(k, 1)] for pair in at]] *= factor
@@ -402,7 +406,7 @@ def as_tuple(x: FloatArray | Inputs) -> Inputs:
 
 
 def _columns(mistakes: Mistakes, case: Diagnosis) -> Iterator[tuple[float, str]]:
-    """Yield the remainder 0.0 and a sentence for each wrong column that a mistake explains completely."""
+    """Yield 0.0 and a sentence for each column that has the wrong sign, is zero or is another column."""
     if case.expected.shape[1:2] != (6,) or case.expected.ndim != 3:
         return
     names = (mistakes.conversion or mistakes.robot).rate_names

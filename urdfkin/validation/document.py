@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NotRequired, TypedDict
 from urdfkin.system.documents import Count, DocumentKind, Header, Matrix, Sha256, Size, of_length, says
 from urdfkin.validation.outcome import OUTCOMES, RunOutcome, outcome
 
-_UNDEFINED = "null: a result is NaN, or two values that must be equal differ."
+_UNDEFINED = "null: a result is NaN, or two values with the bound 0 differ."
 Units = Annotated[Size | None, says(f"A disagreement in multiples of eps * scale. {_UNDEFINED}")]
 BoundRatio = Annotated[
     float | None, says(f"Largest ratio of a disagreement to its bound; above 1: a failure. {_UNDEFINED}")
@@ -70,7 +70,10 @@ class ReportedJoint(TypedDict):
     mimic: Annotated[ReportedMimic | None, says("The rule of a mimic joint; null for other joints.")]
     kept: Annotated[
         ReportedRange | None,
-        says("Range in which the joint's mimic joints are within limits; null: the joint's whole range."),
+        says(
+            "The part of the joint's range in which all its mimic joints are within their limits."
+            " null: the joint's whole range."
+        ),
     ]
     locked: NotRequired[
         Annotated[float, says("Value of a locked joint, rad or m. The `kind` of a locked joint is `fixed`.")]
@@ -134,9 +137,15 @@ class ReportedDHRow(TypedDict):
     a: Annotated[float, says("Translation along x.")]
     alpha: Annotated[float, says("Rotation about x.")]
     beta: Annotated[float, says("Hayati parameter: rotation about y after alpha; 0 in other rows.")]
-    d: Annotated[float, says("Translation along the joint axis; a prismatic joint's value is added.")]
-    theta: Annotated[float, says("Rotation about the joint axis; a revolute joint's value is added.")]
-    sense: Annotated[Literal[1, -1], says("Sign of the joint's value in d or theta.")]
+    d: Annotated[float, says("Translation along the joint axis; for a prismatic joint, its constant part.")]
+    theta: Annotated[float, says("Rotation about the joint axis; for a revolute joint, its constant part.")]
+    sense: Annotated[
+        Literal[1, -1],
+        says(
+            "1: the joint's value is added to theta or, for a prismatic joint, to d."
+            " -1: the joint's value is subtracted."
+        ),
+    ]
 
 
 class ReportedDHTable(TypedDict):
@@ -163,13 +172,15 @@ class Chain(TypedDict):
     worst: Annotated[
         Units,
         says(
-            "Largest disagreement of the tip's placement, Jacobian and acceleration in eps * scale, for both"
-            " tables. null: a result is NaN, or there is no comparison."
+            "Largest disagreement of the tip's placement, Jacobian and acceleration, in eps * scale. The"
+            " entry covers both tables. null: a result is NaN, or there is no comparison."
         ),
     ]
     share_of_bound: Annotated[
         float | None,
-        says("Largest ratio of a disagreement to its bound. null: a result is NaN, or no comparison."),
+        says(
+            "Largest ratio of a disagreement to its bound. null: a result is NaN, or there is no comparison."
+        ),
     ]
 
 
@@ -243,7 +254,13 @@ class SecondOracle(TypedDict):
     urdfkin: ReportedOraclePair
     pinocchio: ReportedOraclePair
     alone: Alone
-    undecided: Annotated[Count, says("Number of results without a majority of two libraries.")]
+    undecided: Annotated[
+        Count,
+        says(
+            "Number of results that do not show which library is wrong. Either no two of the three libraries"
+            " agree, or one library agrees with two others that disagree with each other."
+        ),
+    ]
 
 
 class ReportedCheck(TypedDict):
@@ -299,13 +316,21 @@ class ReportedTimings(TypedDict):
 class ReportedSecondReading(TypedDict):
     """Comparison of the links and joints that urdfkin and yourdfpy read from the same text."""
 
-    by: Annotated[str, says("Name and version of the second reader.")]
+    by: Annotated[str, says("Name and version of the second URDF parser, yourdfpy.")]
     joints: Annotated[Count, says("Number of compared joints, fixed joints included.")]
     differences: Annotated[
-        list[str], says("Differences between the two readings, each caused by an error of one reader.")
+        list[str],
+        says("Differences between urdfkin and yourdfpy that no known fault of yourdfpy explains."),
     ]
-    known: Annotated[list[str], says("Known faults of the second reader that explain a difference.")]
-    unread: Annotated[str | None, says("Reason why the second reader cannot read the text; null if it can.")]
+    known: Annotated[
+        list[str],
+        says(
+            "Known faults of yourdfpy that explain other differences, with the names of the affected joints."
+        ),
+    ]
+    unread: Annotated[
+        str | None, says("Reason why there is no comparison with yourdfpy; null: there is a comparison.")
+    ]
 
 
 class ReportedRobot(TypedDict):
@@ -351,7 +376,11 @@ class Document(Header):
 
     started: Annotated[str, says("Start time of the validation, ISO 8601, UTC.")]
     seconds: Annotated[
-        float, says("Wall time of the validation in seconds. For a store: the sum over the store's chunks.")
+        float,
+        says(
+            "Wall time of the validation in seconds. In a report from a folder of stored results, the"
+            " entry is the sum of the robots' computing times."
+        ),
     ]
     seed: Annotated[int, says("Seed of the random samples.")]
     samples: Annotated[Count, says("Number of random configurations for each robot.")]

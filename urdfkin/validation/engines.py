@@ -96,10 +96,7 @@ def _result(future: Future[Answer]) -> Answer:
 
 
 class RobotTasks:
-    """The remaining tasks of a robot.
-
-    `index` is the index of the latest chunk that was taken; a lower index means that more chunks remain.
-    """
+    """The remaining tasks of a robot; `index` is the index of the chunk that was taken last."""
 
     def __init__(self, tasks: Iterable[Task]) -> None:
         self.robot = self.index = -1
@@ -127,7 +124,10 @@ class WorkQueue:
         self._ended = set[int]()
 
     def first(self) -> tuple[Task, RobotTasks] | None:
-        """Return a task for an idle worker, preferably of a new robot, and this robot's remaining tasks."""
+        """Return a task for an idle worker, and the remaining tasks of the same robot.
+
+        New robots come first.
+        """
         for tasks in self._waiting:
             self._begun.append(tasks)
             if (task := self.next(tasks)) is not None:

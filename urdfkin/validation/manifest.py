@@ -28,7 +28,8 @@ _SHOWN = 4
 class Manifest:
     """Definition of a campaign; `started` is the start time, ISO 8601, UTC.
 
-    For each robot, `robots` contains the origin and the text's sha256, which is empty for an unreadable text.
+    For each robot, `robots` contains the origin and the sha256 of the text. If the text is unreadable, the
+    sha256 is empty.
     """
 
     robots: tuple[tuple[Origin, str], ...]

@@ -1,4 +1,4 @@
-"""Call a program in any language like a function; requests and answers are lines of JSON.
+"""Compute a quantity with an external program in any language; requests and answers are lines of JSON.
 
 Each request is one line on the program's standard input:
 
@@ -15,7 +15,7 @@ does not contain the locks and the root joint, because the request contains them
 
 The program runs with the rights of the user who starts it. If the program hangs, ends or gives an answer of
 another form, the call for this configuration raises `ProgramError`. The program is started again for the next
-configuration.
+configuration, but not after three consecutive failures.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class ProgramError(Exception):
 class Program:
     """A program that computes one quantity of one frame.
 
-    Python calls the program like a function of q, v and a.
+    Call the object with q, with q and v, or with q, v and a, as the quantity requires.
 
     Args:
         command: The program and its arguments. No shell is involved.
@@ -63,7 +63,7 @@ class Program:
         quantity: Name of the quantity.
         frame: Name of the frame.
         reference: Name of the reference frame; None for a placement.
-        convention: Name of the convention of q, v, a and the result; None for urdfkin's.
+        convention: Name of the convention of q, v, a and the result; None for urdfkin's convention.
         timeout: Longest time for an answer, in seconds; at most a day.
 
     Raises:
@@ -153,7 +153,7 @@ class Program:
         return answer
 
     def _start(self) -> None:
-        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  no `with`: the file stays open while the process runs
+        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  The file must stay open while the process runs.
         try:
             self._process = subprocess.Popen(
                 self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0

@@ -20,10 +20,10 @@ from urdfkin.validation.worker_processes import WorkerProcess
 if TYPE_CHECKING:
     from urdfkin.validation.chunk import Chunk
 
-#: Return value of a worker for a chunk: a word and a value.
-#: The value of "answer" is the pickled answer.
-#: The value of "died" is the signal or exit status of the second crash.
-#: The value of "other code" contains the worker's versions, which differ from the client's versions.
+#: Return value of `run`. The first item is one of three words, and the second item depends on the word.
+#: The second item of "answer" is the pickled answer.
+#: The second item of "died" is the signal or exit status of the second crash.
+#: The second item of "other code" contains the worker's versions, if they differ from the client's.
 Found = (
     tuple[Literal["answer"], bytes]
     | tuple[Literal["died"], str]
@@ -40,7 +40,10 @@ def hold(robot: bytes) -> bytes:
 
 
 def run(robot: bytes, chunk: bytes, by: dict[str, str]) -> Found:
-    """Run a pickled chunk in a process if the client's versions and digests (`by`) equal this machine's."""
+    """Run a pickled chunk in a process; `by` contains the client's versions and digests.
+
+    The chunk is not run if this machine has other versions or digests.
+    """
     if by != provenance():
         return "other code", provenance()
     cause = ""
@@ -63,7 +66,7 @@ class _CrashError(Exception):
 
 
 class _Parcel:
-    """The serialized robot and chunk; the receiving process puts the robot into the chunk."""
+    """A pickled robot and a pickled chunk. Unpickling a parcel gives the chunk with its robot."""
 
     def __init__(self, robot: bytes, chunk: bytes) -> None:
         self._robot, self._chunk = robot, chunk

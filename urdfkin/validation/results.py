@@ -205,9 +205,10 @@ class ValidationReport(Displayable):
 
     @property
     def command(self) -> str:
-        """The command that repeats the run: one line for robots with the same options.
+        """The commands that repeat the run, one on each line.
 
-        A robot that was passed as text is read from standard input, so a line has at most one such robot.
+        Robots with the same options share a command. A command reads at most one robot from standard input.
+        Therefore, a command has at most one robot that was passed as text.
         """
         settings = f"--samples {self.samples} --seed {self.seed}"
         return "\n".join(
