@@ -31,7 +31,7 @@ from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports in a history, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of latest runs that are shown: as marks on a terminal, and in the charts of the page.
+#: Number of latest runs that have a mark on a terminal, and number of latest runs in the charts of the page.
 MARKED, CHARTED = 20, 60
 #: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
 SHOWN = 20
@@ -109,7 +109,7 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: Pairs (index of the run, change), by the source of the robot.
+#: For each source of a robot, pairs (index of the run, change). The key None is for changes of the whole run.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
@@ -144,7 +144,10 @@ class History:
 
 
 def history(paths: Sequence[Path]) -> History:
-    """Read reports, stores and folders; raise InputError for no usable report or too many reports."""
+    """Read reports, folders of `validate --store`, and folders that contain reports.
+
+    Raise InputError if no report is usable, or if there are too many reports or files.
+    """
     found = History()
     before: Document | None = None
     for file, report in _in_order(list(_files(paths)), found):
@@ -360,7 +363,10 @@ def _latest_verdicts(found: History, points: Sequence[Point]) -> list[str]:
 
 
 def changes(found: History) -> list[tuple[int, ChangeEntry]]:
-    """Return pairs (index of the run, change): latest runs first, and in a run regressions first."""
+    """Return pairs (index of the run, change).
+
+    The latest run is first. In each run, the regressions are first.
+    """
     found_changes = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
     return sorted(found_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 

@@ -132,7 +132,10 @@ def table_lines(
 
 
 def count_within(texts: Sequence[str], room: int) -> int:
-    """Return how many of the first texts fit into `room` characters, with a line end after each text."""
+    """Return the number of texts, counted from the first text, that fit into `room` characters.
+
+    Each text has a line end, which counts as one character.
+    """
     return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 

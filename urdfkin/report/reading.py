@@ -254,8 +254,8 @@ def _check(
 def _share(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
 
-    The ratio is at least the worst disagreement divided by the largest bound, and at most the worst
-    disagreement divided by the smallest bound.
+    The ratio must be at least `worst` divided by the largest bound. The ratio must be at most `worst` divided
+    by the smallest bound.
     """
     share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])

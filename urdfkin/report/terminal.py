@@ -45,7 +45,11 @@ _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report; with `cases`, every check has the command that computes its worst case again."""
+    """Print a report.
+
+    For each failed check, print the command that computes the worst case again. With `cases`, print this
+    command for every check.
+    """
     robots = document["robots"]
     out.print(
         f"worst disagreement with Pinocchio {pinocchio(document)}, in eps*scale (rounding gives 1 to 10)",
