@@ -48,7 +48,7 @@ class ValidationRun(TypedDict):
     file: Annotated[str, says("The report: a JSON file, or the folder of `validate --store`.")]
     started: Annotated[str, says("Start time, ISO 8601, UTC.")]
     verdict: Annotated[str, says("The verdict of the run.")]
-    reason: Annotated[str | None, says("Why the run has not passed; null if it has.")]
+    reason: Annotated[str | None, says("Reason why the run has not passed; null if the run has passed.")]
     samples: Annotated[Count, says("Number of random configurations for each robot.")]
     seed: Annotated[int, says("Seed of the random samples.")]
     robots: Annotated[Count, says("Number of robots.")]
@@ -67,7 +67,7 @@ class Point(TypedDict):
     run: Annotated[Count, says("Index of the run.")]
     source: Annotated[str, says("The robot's source in this run.")]
     verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], says("The verdict.")]
-    reason: Annotated[str | None, says("Why the robot is not verified; null if it is.")]
+    reason: Annotated[str | None, says("Reason why the robot is not verified; null if it is verified.")]
     sha256: Annotated[Sha256 | None, says("Digest of the robot's text; null if it could not be read.")]
     samples: Annotated[Count, says("Number of compared configurations.")]
     results: Annotated[Count, says("Number of compared results.")]
@@ -159,7 +159,7 @@ def history(paths: Sequence[Path]) -> History:
         raise InputError(
             "no report to show",
             where=", ".join(shortened(path) for path in paths[:3]),
-            found=some or "no .json file and no store",
+            found=some or "no .json file and no folder of `validate --store`",
             remedy=f"write one with: {VALIDATION.made_by}",
         )
 
@@ -181,7 +181,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
                 raise InputError(
                     f"more than {MOST_RUNS:,} reports",
                     where=shortened(path),
-                    remedy="name fewer files, or a folder with fewer files",
+                    remedy="pass fewer files, or a folder with fewer files",
                 )
             yield file
 

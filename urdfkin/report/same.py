@@ -26,7 +26,10 @@ from urdfkin.robot import Robot
 #: Number of lines for each kind of difference that are shown without --all.
 SHOWN = 12
 #: Line for models that differ, if the names or the order of their joints differ.
-GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
+GUESSED = (
+    "joints are matched by their axes, because their names or their order differ; use --map to match other"
+    " joints"
+)
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
 #: Distances up to FACTOR * (rounding error) count as rounding errors and are not printed.
@@ -40,14 +43,14 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     limits = sum(one.what == "limits" for one in found.remarks)
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if found.unlimited:
-        besides += f"; this holds while joints without limits travel at most {WIDEST:g} m"
+        besides += f"; this result holds if joints without limits travel at most {WIDEST:g} m"
     if question.within is not None:
         return _within(found, question.within) + besides
     off = "the distance of the frames has no bound"
     if math.isfinite(max(found.written)):
         off = f"in every configuration no frame is off by more than {_both(*found.written)}"
     if found.up_to_single:
-        cause = "each joint differs by no more than the rounding of the numbers in its description"
+        cause = "the difference of each joint is at most the rounding error of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
     if found.within_single and found.single is not None:
         single = f"rounding to single precision can move a frame by up to {_both(*found.single)}"
@@ -55,7 +58,7 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if found.verdict is Verdict.DIFFERS:
         by = _by(found.frames, found.rounding)
         if found.frames and not by:
-            by = ", although no common frame is off by more than rounding"
+            by = ", although the common frames differ only by rounding errors"
         single = "" if found.single is None else f"; single precision explains up to {_both(*found.single)}"
         single += f", but {found.unexplained[0]}" if single and found.unexplained else ""
         return f"DIFFERS{by}; first difference: {found.differences[0].words}{single}{besides}"

@@ -177,7 +177,7 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
         out.print(f"{robot['source']}: {second_reader_words(robot)}")
     if robot["accuracy"] is not None:
         out.print(
-            f"{robot['source']}: errors in eps*scale, compared with values at 50 digits;"
+            f"{robot['source']}: differences from values with 50 digits, in eps*scale;"
             f" {accuracy_words(robot['accuracy'])}",
             style="bold",
         )
