@@ -42,7 +42,7 @@ EDITED: list[tuple[str, Any, Any, str]] = [
     ("robot", "failed", 1, "`failed` is not 0"),
     ("robot", "samples", LESS, "only 8 of 9 samples"),
     ("robot", "checks", lambda checks: [*checks, checks[1]], "a quantity occurs twice"),
-    ("robot", "model", None, "`model` is missing, but something was compared"),
+    ("robot", "model", None, "`model` is missing, but `checks` or `chains` is not empty"),
     ("robot", ("frames", 0), GONE, "`joints` or `frames` differ from those of the model"),
     ("robot", ("joints", 0), GONE, "`joints` or `frames` differ from those of the model"),
     ("robot", ("second_reader", "differences"), ["joint j: axis"], "verified, but something"),
@@ -56,7 +56,7 @@ EDITED: list[tuple[str, Any, Any, str]] = [
     ("check", "bound", [1e9, 2e9], "`bound` is 1e+09 to 2e+09"),
     ("check", "median", 1e9, "`median` is 1000000000.0, but"),
     ("check", "p99", 0.0, "`p99` is 0.0, but"),
-    ("check", "histogram", reversed, "not in the last bin of the histogram"),
+    ("check", "histogram", reversed, "but the last bin with results does not contain this value"),
     ("check", ("histogram", 0), GONE, "`histogram` does not contain"),
     ("check", ("worst_by_subject", 0), GONE, "must have one entry for each of"),
     ("check", "worst_case", None, "`worst_case` is missing, but a result disagrees"),
@@ -81,7 +81,7 @@ EDITED: list[tuple[str, Any, Any, str]] = [
     ("joint", "mimic", {"leader": "nobody", "multiplier": 1.0, "offset": 0.0}, "it cannot mimic nobody"),
     ("chain", "base", "nowhere", "no frame nowhere"),
     ("chain", "share_of_bound", 3.0, "verified, but something lies outside its bound"),
-    ("chain", "samples", 0, "but were not compared"),
+    ("chain", "samples", 0, "but the tables have disagreements"),
     ("row", "joint", "none", "no revolute joint none"),
 ]
 

@@ -283,7 +283,7 @@ def test_the_bound_on_rounding_states_the_travel_of_a_joint_without_limits() -> 
     robots = tilted_slide("0.6 0 0.8"), tilted_slide("0.6 0 0.8000000000000002")
     found = urdfkin.same(*robots)
     assert (found.verdict, found.unlimited) == (Verdict.SAME, ("slide",))
-    assert "; this holds while joints without limits travel at most 10 m" in str(found)
+    assert "; this result holds if joints without limits travel at most 10 m" in str(found)
 
     def distance(travel: float) -> float:
         ends = [robot.placement([travel / 0.01], "tool")[:3, 3] for robot in robots]

@@ -59,7 +59,7 @@ def document(found: Calibration) -> TextDocument:
     parts.append(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
     if few:
         parts.append(
-            f"written: {len(found.written_parameters)} of {every} parameters, those that changed by more than"
+            f"written: {len(found.written_parameters)} of {every} parameters; only these changed by more than"
             " 2 sigma"
         )
     if not found.stated and not found.fitted.is_judged:

@@ -163,17 +163,22 @@ def _cell(value: Units | str) -> str:
 
 
 #: If a robot's largest disagreement grows by more than this factor, the growth is a regression.
-#: Smaller factors are normal, because the samples are random.
+#: Growth by a smaller factor is normal, because the samples are random.
 FACTOR = 2.0
-#: Largest disagreement (in eps * scale) that is never a regression; a single rounding can be as large.
+#: If a disagreement (in eps * scale) grows to at most this number, the growth is not a regression.
+#: A single rounding error can be as large.
 FLOOR = 2.0
-#: Largest ratio of a disagreement to its bound that is never a regression.
+#: If the ratio of a disagreement to its bound grows to at most this number, the growth is not a regression.
 _SHARE_FLOOR = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class ReportChange:
-    """A difference between two reports; `robot` is None for the whole run, and a missing value is empty."""
+    """A difference between two reports.
+
+    `robot` is None if the difference is about the whole run. `old` or `new` is empty if this report has no
+    value.
+    """
 
     robot: str | None
     what: str
@@ -285,7 +290,10 @@ def _robots(old: Document, new: Document, factor: float) -> Iterator[ReportChang
 
 
 def by_source(document: Document) -> dict[str, ReportedRobot]:
-    """Return robots by source; repeated sources get numbers: `ur5`, `ur5 (2)`."""
+    """Return the robots of a report by source.
+
+    If several robots have the same source, the function adds numbers: `ur5`, `ur5 (2)`.
+    """
     named: dict[str, ReportedRobot] = {}
     for robot in document["robots"]:
         source, count = robot["source"], 1

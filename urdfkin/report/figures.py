@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes
 
 
-#: Left end of the x axis, in eps * scale; smaller disagreements count as exact.
+#: Left end of the x axis, in multiples of eps * scale. The plot counts smaller disagreements as exact.
 _LEFT = 1e-2
 #: Height of the highest bar, relative to the distance between two rows.
 _HEIGHT = 0.82
@@ -122,9 +122,14 @@ _KINDS = ("fixed", "revolute", "continuous", "prismatic", "planar", "floating")
 def scene(model: ReportedModel, chains: list[Chain]) -> dict[str, Any]:
     """Return a robot as data for the script of the page, `assets/view3d.js`.
 
-    The entry `joints` contains a list for each joint: name, index of the kind, parent link, child link, pose
-    in the parent (three rows of four), axis or 0, index in q or -1, lower limit, upper limit (None: no
-    limit), mimic rule or 0. A mimic rule is the mimicked joint's index in q, the multiplier and the offset.
+    The entry `joints` contains a list for each joint. The items of the list are:
+
+    - the name, and the index of the kind in `_KINDS`;
+    - the indices of the parent link and of the child link;
+    - the pose in the parent link: three rows of four numbers;
+    - the axis (0: no axis), and the index in q (-1: no index);
+    - the lower limit and the upper limit (None: no limit);
+    - the mimic rule (0: no rule): the mimicked joint's index in q, the multiplier and the offset.
     """
     links = {name: i for i, name in enumerate(model["links"])}
     joints = {joint["name"]: i for i, joint in enumerate(model["joints"])}

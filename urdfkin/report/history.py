@@ -31,7 +31,7 @@ from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports in a history, and maximum number of files in a folder.
 MOST_RUNS, MOST_FILES = 1000, 20_000
-#: Number of latest runs that are shown: as marks on a terminal, and in the charts of the page.
+#: Number of latest runs that have a mark on a terminal, and number of latest runs in the charts of the page.
 MARKED, CHARTED = 20, 60
 #: Number of latest changes that are shown without --all; on a terminal, also the number of runs.
 SHOWN = 20
@@ -48,7 +48,7 @@ class ValidationRun(TypedDict):
     file: Annotated[str, says("The report: a JSON file, or the folder of `validate --store`.")]
     started: Annotated[str, says("Start time, ISO 8601, UTC.")]
     verdict: Annotated[str, says("The verdict of the run.")]
-    reason: Annotated[str | None, says("Why the run has not passed; null if it has.")]
+    reason: Annotated[str | None, says("Reason why the run has not passed; null if the run has passed.")]
     samples: Annotated[Count, says("Number of random configurations for each robot.")]
     seed: Annotated[int, says("Seed of the random samples.")]
     robots: Annotated[Count, says("Number of robots.")]
@@ -67,7 +67,7 @@ class Point(TypedDict):
     run: Annotated[Count, says("Index of the run.")]
     source: Annotated[str, says("The robot's source in this run.")]
     verdict: Annotated[Literal["verified", "disagrees", "not verified", "bad input"], says("The verdict.")]
-    reason: Annotated[str | None, says("Why the robot is not verified; null if it is.")]
+    reason: Annotated[str | None, says("Reason why the robot is not verified; null if it is verified.")]
     sha256: Annotated[Sha256 | None, says("Digest of the robot's text; null if it could not be read.")]
     samples: Annotated[Count, says("Number of compared configurations.")]
     results: Annotated[Count, says("Number of compared results.")]
@@ -109,7 +109,7 @@ HISTORY = DocumentKind(
     "urdfkin-history/1", HistoryDocument, tuple(OUTCOMES.values()), "urdfkin report history DIR --format json"
 )
 
-#: Pairs (index of the run, change), by the source of the robot.
+#: For each source of a robot, pairs (index of the run, change). The key None is for changes of the whole run.
 ChangesBySource = dict[str | None, list[tuple[int, ChangeEntry]]]
 
 
@@ -144,7 +144,10 @@ class History:
 
 
 def history(paths: Sequence[Path]) -> History:
-    """Read reports, stores and folders; raise InputError for no usable report or too many reports."""
+    """Read reports, folders of `validate --store`, and folders that contain reports.
+
+    Raise InputError if no report is usable, or if there are too many reports or files.
+    """
     found = History()
     before: Document | None = None
     for file, report in _in_order(list(_files(paths)), found):
@@ -156,7 +159,7 @@ def history(paths: Sequence[Path]) -> History:
         raise InputError(
             "no report to show",
             where=", ".join(shortened(path) for path in paths[:3]),
-            found=some or "no .json file and no store",
+            found=some or "no .json file and no folder of `validate --store`",
             remedy=f"write one with: {VALIDATION.made_by}",
         )
 
@@ -178,7 +181,7 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
                 raise InputError(
                     f"more than {MOST_RUNS:,} reports",
                     where=shortened(path),
-                    remedy="name fewer files, or a folder with fewer files",
+                    remedy="pass fewer files, or a folder with fewer files",
                 )
             yield file
 
@@ -360,7 +363,10 @@ def _latest_verdicts(found: History, points: Sequence[Point]) -> list[str]:
 
 
 def changes(found: History) -> list[tuple[int, ChangeEntry]]:
-    """Return pairs (index of the run, change): latest runs first, and in a run regressions first."""
+    """Return pairs (index of the run, change).
+
+    The latest run is first. In each run, the regressions are first.
+    """
     found_changes = [(k, change) for k, run in enumerate(found.runs) for change in run["changes"]]
     return sorted(found_changes, key=lambda one: (-one[0], not one[1]["regression"]))
 

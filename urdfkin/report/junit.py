@@ -51,7 +51,7 @@ def _bytes(root: ET.Element) -> bytes:
 def functions_as_junit(checks: Sequence[FunctionCheck]) -> bytes:
     """Return JUnit XML with a test case for each function.
 
-    A test case also fails if no oracle confirms the reference.
+    A test case also fails if no oracle could check urdfkin's results.
     """
     cases = [_function_case(check) for check in checks]
     failures = str(sum(case.find("failure") is not None for case in cases))

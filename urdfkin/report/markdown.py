@@ -43,7 +43,8 @@ def as_markdown(document: Document) -> str:
     foot = [
         "",
         *_cross_check_table(document["robots"]),
-        "Worst disagreement for each quantity in eps·scale; rounding errors give 1 to 10.",
+        "The first table has the worst disagreement for each quantity in eps·scale: the difference divided by"
+        " 2^-52 and by the size of the terms in the sum. Rounding errors give 1 to 10.",
         "",
         f"<sub>urdfkin {text(document['versions'].get('urdfkin', '?'))}, {text(document['started'])}."
         " To repeat the run:</sub>",
@@ -132,7 +133,10 @@ def table_lines(
 
 
 def count_within(texts: Sequence[str], room: int) -> int:
-    """Return how many of the first texts fit into `room` characters, with a line end after each text."""
+    """Return the number of texts, counted from the first text, that fit into `room` characters.
+
+    Each text has a line end, which counts as one character.
+    """
     return sum(end <= room for end in accumulate(len(text) + 1 for text in texts))
 
 

@@ -154,7 +154,7 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
     if robot["model"] is not None:
         yield from model_contradictions(robot["model"], robot["chains"])
     elif robot["checks"] or robot["chains"]:
-        yield "`model` is missing, but something was compared"
+        yield "`model` is missing, but `checks` or `chains` is not empty"
         return
     sums = {
         "results": (robot["results"], sum(check["results"] for check in robot["checks"])),
@@ -181,7 +181,7 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
         figures = chain["metres"], chain["worst"], chain["share_of_bound"]
         if not chain["samples"] and any(figure is not None for figure in figures):
             ends = f"{chain['base']} to {chain['tip']}"
-            yield f"tables from {ends}: the tables have results, but were not compared"
+            yield f"tables from {ends}: `samples` is 0, but the tables have disagreements"
 
 
 def _subjects(robot: ReportedRobot) -> dict[str, list[str]]:
@@ -242,7 +242,7 @@ def _check(
         )
     last = max((i for i, count in enumerate(histogram) if count), default=0)
     if results and last != histogram_bin(_as_number(check["worst"]), edges):
-        yield f"`worst` is {check['worst']}, which is not in the last bin of the histogram"
+        yield f"`worst` is {check['worst']}, but the last bin with results does not contain this value"
     for name, percent, stated in (("median", 50.0, check["median"]), ("p99", 99.0, check["p99"])):
         computed = percentile(histogram, edges, _as_number(check["worst"]), percent)
         if not math.isclose(_as_number(stated), computed, rel_tol=_TOLERANCE):
@@ -254,8 +254,8 @@ def _check(
 def _share(check: ReportedCheck) -> Iterator[str]:
     """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
 
-    The ratio is at least the worst disagreement divided by the largest bound, and at most the worst
-    disagreement divided by the smallest bound.
+    The ratio must be at least `worst` divided by the largest bound. The ratio must be at most `worst` divided
+    by the smallest bound.
     """
     share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
@@ -264,7 +264,7 @@ def _share(check: ReportedCheck) -> Iterator[str]:
     if low > high:
         # Without a comparison, there is no bound.
         if share or largest or check["worst_case"]:
-            yield f"`bound` is {check['bound']}, but something was compared"
+            yield f"`bound` is {check['bound']}, but the check has a disagreement"
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
     if not (ends[0] * (1.0 - _TOLERANCE) <= share <= ends[1] * (1.0 + _TOLERANCE)):

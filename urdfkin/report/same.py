@@ -25,8 +25,11 @@ from urdfkin.robot import Robot
 
 #: Number of lines for each kind of difference that are shown without --all.
 SHOWN = 12
-#: Line for models that differ and whose joints were not matched by name.
-GUESSED = "joints are matched by their axes, because their names differ; use --map to match other joints"
+#: Line for models that differ, if the names or the order of their joints differ.
+GUESSED = (
+    "joints are matched by their axes, because their names or their order differ; use --map to match other"
+    " joints"
+)
 HEADS = ("frame", "at least", "at most", "angle at most")
 EQUIVALENT = SameQuestion()
 #: Distances up to FACTOR * (rounding error) count as rounding errors and are not printed.
@@ -40,14 +43,14 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     limits = sum(one.what == "limits" for one in found.remarks)
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if found.unlimited:
-        besides += f"; this holds while joints without limits travel at most {WIDEST:g} m"
+        besides += f"; this result holds if joints without limits travel at most {WIDEST:g} m"
     if question.within is not None:
         return _within(found, question.within) + besides
     off = "the distance of the frames has no bound"
     if math.isfinite(max(found.written)):
         off = f"in every configuration no frame is off by more than {_both(*found.written)}"
     if found.up_to_single:
-        cause = "each joint differs by no more than the rounding of the numbers in its description"
+        cause = "the difference of each joint is at most the rounding error of the numbers in its description"
         return f"SAME UP TO SINGLE PRECISION: {off}; {cause}{besides}"
     if found.within_single and found.single is not None:
         single = f"rounding to single precision can move a frame by up to {_both(*found.single)}"
@@ -55,7 +58,7 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     if found.verdict is Verdict.DIFFERS:
         by = _by(found.frames, found.rounding)
         if found.frames and not by:
-            by = ", although no common frame is off by more than rounding"
+            by = ", although the common frames differ only by rounding errors"
         single = "" if found.single is None else f"; single precision explains up to {_both(*found.single)}"
         single += f", but {found.unexplained[0]}" if single and found.unexplained else ""
         return f"DIFFERS{by}; first difference: {found.differences[0].words}{single}{besides}"
@@ -122,8 +125,8 @@ def far_frames(found: Sameness) -> list[Interval]:
 def farthest(found: Sameness) -> str:
     """Return the heading of the table of `far_frames`.
 
-    The distances are computed after the changes of B, but the verdict "same up to single precision" is about
-    the unchanged models. For this verdict, the heading therefore lists the changes.
+    The table has the distances after the changes of B. The verdict "same up to single precision" is about the
+    unchanged models. Therefore, if the models have this verdict, the heading lists the changes of B.
     """
     changed = f", after changes of {', '.join(found.up_to)}" if found.up_to_single and found.up_to else ""
     return f"Largest distance over all configurations within limits{changed}"
@@ -134,7 +137,10 @@ def rows(frames: Sequence[Interval]) -> list[list[str]]:
 
 
 def as_written(found: Sameness) -> str:
-    """Describe the largest distance between frames of A and the unchanged B, unless it is rounding."""
+    """Describe the largest distance between matching frames of A and the unchanged B.
+
+    The text is empty if B needs no changes, or if rounding errors explain the distance.
+    """
     frame = found.as_written
     off = "" if frame is None else _off(frame, found.rounding)
     return f"without changes of B, {frame.frame} is {off} off" if frame is not None and off else ""
@@ -143,7 +149,8 @@ def as_written(found: Sameness) -> str:
 def where(found: Sameness, frame: Interval) -> str:
     """Describe the configuration at which a lower bound is attained, with units.
 
-    The text has the nonzero coordinates of A, and of joints of B that match no independent joint of A.
+    The text has the nonzero coordinates of A. A joint of B that matches no independent joint of A has its own
+    coordinate; the text also has these coordinates, if they are not 0.
     """
     from urdfkin.model.configuration import coordinate_names, units
 
@@ -406,7 +413,8 @@ def _draw(
     title: str, turn: float, tip: float, lines: tuple[FloatArray, FloatArray], gap: FloatArray | None = None
 ) -> dict[str, Any]:
     c, s, up, down = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    # The rows are directions in space: the first points right on the page, the second points down.
+    # The first row is the direction in space that points to the right on the page. The second row is the
+    # direction that points down on the page.
     seen = np.array([[-s, c, 0.0], [down * c, down * s, -up]])
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])

@@ -45,7 +45,11 @@ _WIDE = 100
 
 
 def print_report(document: Document, out: Console, *, cases: bool = False) -> None:
-    """Print a report; with `cases`, every check has the command that computes its worst case again."""
+    """Print a report.
+
+    For each failed check, print the command that computes the worst case again. With `cases`, print this
+    command for every check.
+    """
     robots = document["robots"]
     out.print(
         f"worst disagreement with Pinocchio {pinocchio(document)}, in eps*scale (rounding gives 1 to 10)",
@@ -173,7 +177,7 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
         out.print(f"{robot['source']}: {second_reader_words(robot)}")
     if robot["accuracy"] is not None:
         out.print(
-            f"{robot['source']}: errors in eps*scale, compared with values at 50 digits;"
+            f"{robot['source']}: differences from values with 50 digits, in eps*scale;"
             f" {accuracy_words(robot['accuracy'])}",
             style="bold",
         )

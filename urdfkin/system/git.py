@@ -21,8 +21,8 @@ class Version:
     """The files of one commit of a git repository.
 
     Attributes:
-        files: Git's digest of the content of each file, by the name relative to `root`.
-        gone: Base names of the files that no longer exist in the working tree.
+        files: Git's digest of the content of each file. The key is the path of the file relative to `root`.
+        gone: Base names of the files of the commit that do not exist in the working tree.
     """
 
     root: Path

@@ -46,8 +46,8 @@ def _is_scratch(entry: str) -> bool:
 def ask_python(command: list[str], request: bytes, patience: float, most: int) -> tuple[bytes, int | None]:
     """Run a process with a minimal environment and a request on standard input.
 
-    The process is killed after `patience` seconds, and after more than `most` bytes of output. Return at most
-    `most` + 1 bytes of output, and the exit status; after a timeout, the status is None.
+    The process is killed after `patience` seconds, and after more than `most` bytes of output. Return the
+    output, cut off after `most` + 1 bytes, and the exit status. After a timeout, the status is None.
     """
     import subprocess
 

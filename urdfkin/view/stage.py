@@ -70,7 +70,10 @@ def jacobian_arrows(x: FrameMotion, rates: tuple[str, ...], reach: float, *, ang
 
 
 def acceleration_arrows(x: FrameMotion, reach: float) -> Arrows:
-    """Return arrows for the acceleration's parts and sum; `x` has one sample in LOCAL_WORLD_ALIGNED."""
+    """Return an arrow for each part of the acceleration, and an arrow for the sum of the parts.
+
+    The motion `x` has one sample in LOCAL_WORLD_ALIGNED. An acceleration of at most 1e-9 m/s^2 has no arrow.
+    """
     parts = np.vstack([x.parts.by_kind[0, :, :3], x.acceleration[0, :3]])
     keep = np.linalg.norm(parts, axis=1) > 1e-9
     names = tuple(name for name, used in zip((*KINDS, "sum"), keep, strict=True) if used)
@@ -192,7 +195,10 @@ class Stage:
         initial.position, initial.look_at = camera(self._points_in_view, aspect=1.2, fov=_FOV)
 
     def _add_shapes(self, tree: KinematicTree) -> bool:
-        """Add the shapes; return whether the skeleton must replace missing shapes."""
+        """Add the visual shapes, and return whether the scene also needs the skeleton.
+
+        The scene needs the skeleton if the robot has no shapes, or if a shape cannot be shown.
+        """
         self.missing: list[Shape] = []
         for k, shape in enumerate(shapes(self.robot)):
             handle = self._add_shape(f"/robot/{tree.link_index(shape.link)}/shape{k}", shape)

@@ -40,7 +40,7 @@ from urdfkin.view.stage import (
 
 #: Joint ranges (rad, m) and velocity limits (rad/s, m/s) of at least this size count as unlimited.
 _UNLIMITED = 100.0
-#: Change of an angle by an arrow key, in degrees or in radians.
+#: Step of a slider for an angle, in degrees or in radians. An arrow key changes the angle by one step.
 _DEGREES, _RADIANS = 1.0, 0.01
 #: Minimum number of steps of a slider for a length; a step is 1, 2 or 5 times a power of ten.
 _STEPS = 50.0
@@ -53,7 +53,10 @@ _MOST_MISSING = 5
 
 @dataclass(frozen=True, slots=True)
 class SliderRow:
-    """A slider for one number of q, v or a; `turns` is True for angles and their derivatives."""
+    """A slider for one number of q, v or a.
+
+    `turns` is True if the number is an angle or a derivative of an angle.
+    """
 
     at: int
     name: str
@@ -120,7 +123,8 @@ class Sliders:
                         replace(mark, value=end, label=label)
                         for mark, (end, label) in zip(handle._marks, _marks(lower, upper), strict=True)
                     )
-                # A slider with this value is not set, because a conversion of units could round the value.
+                # A slider that already has the value is not set again, because a conversion of units could
+                # round the value.
                 if float(handle.value) / scale != value:
                     handle.value = scale * value
         finally:
