@@ -129,7 +129,9 @@ class Call:
             )
         self.question.read()
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
-            raise InputError("out must not share memory with q, v or a, because the check reads them again")
+            raise InputError(
+                "out must not share memory with q, v or a, because the check reads the inputs again"
+            )
         return out.reshape(self.n, len(self.links), *shape)
 
     def in_shape(self, result: FloatArray) -> FloatArray:

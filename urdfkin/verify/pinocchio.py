@@ -163,7 +163,11 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
     ids = [int(model.getJointId(name)) for name in locked]
     for i, (name, value) in zip(ids, locked.items(), strict=True):
         if i >= model.njoints:
-            raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
+            raise OracleError(
+                "Pinocchio's model does not contain the joint to lock",
+                where=str(model.name),
+                found=repr(name),
+            )
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]

@@ -19,7 +19,7 @@ the length of the path from the root to the table's base plus the length of the 
 Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
 reach, the bound uses this sum instead of the reach, but at most `PROMISED` times the reach. In a table with
 Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic rules. The
-bound on a Jacobian column is therefore proportional to the sum of the multipliers of these joints.
+bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this

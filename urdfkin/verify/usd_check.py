@@ -115,7 +115,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
     joints = read.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
-        f"compared with OpenUSD {version()}: its UsdPhysics parser reads the same {len(joints)} joints"
+        f"compared with OpenUSD {version()}: UsdPhysics and urdfkin read the same {len(joints)} joints"
         f" ({share:.1%} of the bound of single precision)"
     )
     rest, remarks = _compare_prims(verifier.tree, read.answer)
@@ -281,7 +281,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         worst = max(worst[0], off), max(worst[1], angle)
         if share > 1.0:
             what = (
-                f"the prim is {off:.3g} m and {np.degrees(angle):.3g} degrees from where the joints place it"
+                f"the prim's pose and the pose by the joints differ by {off:.3g} m"
+                f" and {np.degrees(angle):.3g} degrees"
             )
             remarks.append(
                 Remark("rest-pose", path, what, "correct the joint's frames or the prim's transform")
