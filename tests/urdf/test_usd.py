@@ -126,7 +126,7 @@ def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks
     certificate = robot.certificate()
     assert certificate.verified
     assert re.search(
-        r"OpenUSD [\d.]+: its UsdPhysics parser reads the same 2 joints \(.*\); "
+        r"OpenUSD [\d.]+: UsdPhysics and urdfkin read the same 2 joints \(.*\); "
         r"UsdGeom's transforms of 3 prims agree at q = 0",
         certificate.reading or "",
     )

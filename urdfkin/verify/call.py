@@ -29,8 +29,9 @@ _PLAIN = np.ndarray, np.memmap
 class Part(NamedTuple):
     """Some of the configurations of a call, converted for urdfkin and, independently, for the oracle.
 
-    `rates` contains arrays (n, nv): () for a placement, (v,) for a velocity, (v, a) for an acceleration.
-    `state` (n or 1, 24) is the state of the moving base, and `query` the input of the oracle.
+    `rates` is an empty tuple for a placement, (v,) for a velocity, and (v, a) for an acceleration. The arrays
+    v and a have the shape (n, nv). `state` (n or 1, 24) is the state of the moving base. `query` is the input
+    of the oracle.
     """
 
     plan: CompiledTree
@@ -95,7 +96,7 @@ class Call:
             raise InputError("the batch shapes of q, v, a and base do not broadcast", found=found) from None
 
     def _flat_input(self, array: FloatArray) -> FloatArray:
-        """Return an input as an array (n, width); a single configuration is repeated without a copy."""
+        """Return an input as an array (n, width); NumPy's broadcasting repeats a single configuration."""
         width = array.shape[-1]
         if array.shape[:-1] == self.shape:
             return np.ascontiguousarray(array.reshape(self.n, width))
@@ -128,7 +129,9 @@ class Call:
             )
         self.question.read()
         if any(np.may_share_memory(out, array) for array in (*self.inputs, self.q, *self.rates)):
-            raise InputError("out must not share memory with q, v or a, because the check reads them again")
+            raise InputError(
+                "out must not share memory with q, v or a, because the check reads the inputs again"
+            )
         return out.reshape(self.n, len(self.links), *shape)
 
     def in_shape(self, result: FloatArray) -> FloatArray:

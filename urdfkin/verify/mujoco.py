@@ -52,7 +52,8 @@ _DEEPEST = 1_000
 #: MuJoCo's joints that replace a planar or floating joint, in the order of the coordinates.
 _PARTS = {"planar": ("slide x", "slide y", "hinge"), "floating": ("slide x", "slide y", "slide z", "ball")}
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Number of coordinates and of joint velocities in urdfkin; (1, 1) for kinds that are not listed.
+#: Number of coordinates and number of joint velocities of a joint in urdfkin, by the kind of the joint.
+#: All other kinds have one coordinate and one joint velocity.
 _SIZES = {"fixed": (0, 0), "planar": (3, 3), "floating": (7, 6)}
 
 
@@ -67,10 +68,11 @@ class _Joint:
 
 @dataclass(frozen=True, slots=True)
 class _MujocoIndices:
-    """First indices of a moving joint in q and v of MuJoCo and of urdfkin, and the joint's mimic rule.
+    """Indices of a moving joint's first values in the vectors of MuJoCo and of urdfkin, and its mimic rule.
 
-    For the joint of a moving base, q and v are -1. For a locked joint, v is -1, and the offset is the locked
-    value.
+    `qpos` and `qvel` are indices in MuJoCo's vectors; `q` and `v` are indices in urdfkin's vectors. The index
+    -1 means that urdfkin's vector has no value for the joint: `q` and `v` of a moving base, and `v` of a
+    locked joint. A locked joint has the multiplier 0, and its offset is the locked value.
     """
 
     kind: str
@@ -328,7 +330,11 @@ class MujocoOracle(Oracle):
         return qpos, rates, second
 
     def _spread(self, q: FloatArray) -> FloatArray:
-        """Return S (n or 1, MuJoCo's nv, nv), with qvel = S v."""
+        """Return the matrices S that convert urdfkin's v to MuJoCo's qvel: qvel = S v.
+
+        The shape is (n, MuJoCo's nv, nv). If S is the same in all configurations, the first axis has the
+        length 1.
+        """
         S = np.zeros((1 if self._constant else len(q), self._model.nv, self.nv))
         for joint in self._indices:
             at, v = joint.qvel, joint.v

@@ -15,7 +15,8 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.pinocchio import pinocchio
 
-#: Upper bound on the sum of the rounding errors of urdfkin and of Pinocchio, in eps: less than 8 eps each.
+#: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio.
+#: The error of each program is less than 8 eps.
 #: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
 #: Quaternions need a square root, a quotient and products of two numbers.
 _ROUNDINGS = 16.0

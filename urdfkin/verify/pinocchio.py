@@ -163,7 +163,11 @@ def _reduced(model: Any, text: str, lock: Mapping[str, float], *, coupled: bool)
     ids = [int(model.getJointId(name)) for name in locked]
     for i, (name, value) in zip(ids, locked.items(), strict=True):
         if i >= model.njoints:
-            raise OracleError("Pinocchio has no such joint to lock", where=str(model.name), found=repr(name))
+            raise OracleError(
+                "Pinocchio's model does not contain the joint to lock",
+                where=str(model.name),
+                found=repr(name),
+            )
         # With mimic=True, a mimic joint has nq = 0.
         at, numbers = model.joints[i].idx_q, model.joints[i].nq
         q[at : at + numbers] = (value,) if numbers == 1 else (np.cos(value), np.sin(value))[:numbers]
@@ -215,7 +219,8 @@ class PinocchioOracle(Oracle):
     def _put_on_free_flyer(self, joints: Sequence[int]) -> tuple[list[int], list[int]]:
         """Add a free-flyer for the base's motion; return the new indices of the joints and of the frames."""
         pin, model, identity = self._pin, self._model, self._pin.SE3.Identity()
-        # `appendModel` rejects a link with the name of a joint or of the free-flyer, so all names change.
+        # `appendModel` rejects a link that has the same name as a joint or the free-flyer.
+        # All joints and frames therefore get unique names.
         for j in joints:
             model.names[j] = f"joint {j}"
         for i in range(1, model.nframes):
@@ -321,7 +326,8 @@ class PinocchioOracle(Oracle):
         - The returned NumPy array has C order, but the numbers are in Eigen's order: the first index varies
           fastest.
         - In LOCAL, entries [i, j] of two velocities i and j of the same joint may differ from 0. The true
-          value is 0, because a joint does not move its own axes relative to the frame.
+          value is 0, because the joint's own motion does not change the joint's axes in the frame's
+          coordinates.
         """
         pin, model, data = self._pin, self._model, self.data
         ids, wanted, nv = self._ids(x), self._reference(x.reference), model.nv
@@ -400,7 +406,7 @@ def _blocks(compute: _Next, n: int, memory: FloatArray) -> Iterator[FloatArray]:
 
 
 def _block(*shape: int) -> int:
-    """Return the number of configurations in a block, for one result of the given shape."""
+    """Return how many configurations fit in a block; `shape` is the shape of one configuration's result."""
     return _BLOCK_SIZE // (math.prod(shape) or 1) or 1
 
 

@@ -14,11 +14,12 @@ results come from `urdfkin.kinematics.equations`, so this module implements the 
 
 The bound is the sum of the rounding errors of urdfkin and of Pinocchio. Snapping rounds the angles of a table
 that are close to a multiple of 15 degrees. If snapping has changed a table, the bound also includes the
-deviation that the table states. The bound on rounding errors is proportional to the robot's reach. The reach
-is the length of the path from the root to the table's base plus the length of the path from the root to the
-tip. Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
-reach, the bound uses this sum. The bound uses at most `PROMISED` times the reach. Tables with Hayati rows
-never exceed this limit. The bound on a Jacobian column is multiplied by the multipliers of its mimic joints.
+effect of the rounded angles. The bound on rounding errors is proportional to the robot's reach. The reach is
+the length of the path from the root to the table's base plus the length of the path from the root to the tip.
+Both lengths include prismatic displacements. If the sum of all lengths in the table is larger than the
+reach, the bound uses this sum instead of the reach, but at most `PROMISED` times the reach. In a table with
+Hayati rows, no single length exceeds this limit. A coordinate can move several joints by mimic rules. The
+bound on a Jacobian column is therefore proportional to the sum of |multiplier| over these joints.
 
 A row has only four parameters, so nearly parallel axes can require lengths of kilometres in the table. If two
 such lengths cancel, the tip has an error of eps times these lengths. urdfkin accepts a difference within this
@@ -67,11 +68,13 @@ class TableCheck:
     Attributes:
         metres: Distance between the table's tip and Pinocchio's tip, m.
         radians: Angle between the orientations of the table's tip and Pinocchio's tip, rad.
-        units: Differences of "placement", "jacobian" and "acceleration", in eps * scale.
-        shares: Ratios of the differences `units` to their bounds. A ratio above 1 is a disagreement, unless
-            `loss` explains the difference.
+        units: Differences of "placement", "jacobian" and "acceleration", each divided by eps and by the
+            quantity's scale. The scale is computed from `Sizes`; the scale of an angle is 1.
+        shares: Ratio of the difference to its bound, for the same three quantities. A ratio above 1 is a
+            disagreement, unless `loss` explains the difference.
         snapped: Whether snapping changed the table. The bound then includes the effect of snapping.
-        loss: Explanation of a difference above the bound that very large lengths in the table cause.
+        loss: Explanation of a difference above the bound, if very large lengths in the table cause the
+            difference. Otherwise None.
     """
 
     samples: int
@@ -140,7 +143,7 @@ def own_length(table: DHTable) -> float:
 
 
 def _loss(table: DHTable) -> str:
-    """Return a text with the length that has the largest rounding error, and a remedy."""
+    """Return a text that names the longest length in the table, its rounding error and a remedy."""
     length, cell, joint = max(
         (abs(value), name, row.joint) for row in table.rows for name, value in (("a", row.a), ("d", row.d))
     )
@@ -164,7 +167,8 @@ def _measured(
     one = np.ones_like(size.reach)
     columns = size.turning + size.sliding
     reach, slides = size.reach[:, None], 1.0 if size.sliding.any() else 0.0
-    #: Pairs (scale, slack) for the linear and for the angular differences.
+    #: One pair for the linear and one for the angular differences. The first value is multiplied by the
+    #: relative rounding error; the second value is the effect of snapping.
     limits: dict[str, tuple[tuple[FloatArray, FloatArray | float], tuple[FloatArray, FloatArray | float]]] = {
         "placement": ((size.reach, slack.metres), (one, slack.turn)),
         "jacobian": (
@@ -282,7 +286,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
 
 
 class _Slack:
-    """Allowed differences between the robot and a table with snapped angles, in addition to rounding errors.
+    """Largest effect of snapping (rounding the table's angles) on the quantities of a table.
 
     Snapping rotates an axis by at most `turn`, and displaces a joint origin or the tip by at most `metres`. A
     vector z x d therefore changes by at most turn * reach + 2 * metres. A product of two such vectors changes

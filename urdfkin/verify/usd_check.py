@@ -4,7 +4,7 @@ Pinocchio reads the URDF text that urdfkin writes for the tree. Pinocchio's chec
 from the USD stage (scene) to the tree. `load` therefore makes two comparisons:
 
 - with OpenUSD's parser UsdPhysics. UsdPhysics and urdfkin's parser must find the same bodies, frames, degrees
-  of freedom and limits for each joint. A difference is an error.
+  of freedom and limits for each joint. A difference raises OracleError.
 - with the transforms of the prims (scene objects) that OpenUSD's module UsdGeom computes. The stage shows the
   robot in one configuration, in which each link must have the placement of its prim. The file states the
   prims' transforms separately from the joint frames. A difference means that the file contradicts itself;
@@ -115,7 +115,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
     joints = read.answer["joints"]
     share = max((_check_joint(verifier.tree.name, path, *pair) for path, pair in joints.items()), default=0.0)
     line = (
-        f"compared with OpenUSD {version()}: its UsdPhysics parser reads the same {len(joints)} joints"
+        f"compared with OpenUSD {version()}: UsdPhysics and urdfkin read the same {len(joints)} joints"
         f" ({share:.1%} of the bound of single precision)"
     )
     rest, remarks = _compare_prims(verifier.tree, read.answer)
@@ -129,7 +129,7 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
-      is twice this length, 16 u. The sum is `_ROTATION` u.
+      is twice this length, 16 u. Both angle errors together are 18 u; `_ROTATION` is this factor 18.
     - Origin: three rounding errors (`_ORIGIN`): of the scale factor, of the scaled origin, and of the
       transformed origin.
     """
@@ -209,8 +209,8 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     B^-1 is at most e, and the position error at most w + e |p|.
 
     - Revolute joint: the term e |p| is 0. If p is not zero, urdfkin writes B as a separate fixed joint after
-      the revolute joint. The entry of the revolute joint includes the errors of B, so the fixed joint has no
-      entry.
+      the revolute joint. In `single`, the numbers of the revolute joint include the errors of B. The fixed
+      joint therefore has no numbers in `single`.
     - Other joints: `single` contains |p| as the last of five numbers.
     - Locked prismatic joint: the value q also displaces the child link. |q| is at most the length of the
       joint's constant offset plus the lengths of the two origins.
@@ -242,16 +242,18 @@ def _largest(joint: Joint) -> float:
 def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
     """Compare the placements of links with the transforms of their prims, in the stage's configuration.
 
-    Each joint on the path counts as one operation of a transform. With u = `SINGLE`, the angle error of one
-    operation is at most `_TRANSFORM` u, the largest of these three values:
+    The bound assumes that a prim's transform consists of several operations: one operation for each joint on
+    the path from the root, and one more. With u = `SINGLE`, the angle error of one operation is at most
+    `_TRANSFORM` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
     - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the
       quaternion changes the rotation by at most 2 u. The parallel component changes the length of the
       quaternion. UsdGeom does not normalize the quaternion, so a rotation by the angle t changes by at most 2
       u sin t. The sum is at most 4 u.
-    - Matrix: the vector of the nine errors is at most sqrt(3) u long, also after the rows are normalized. A
-      rotation by a small angle t changes the matrix by a vector of length sqrt(2) t: sqrt(3/2) u.
+    - Matrix: the nine errors form a vector with a length of at most sqrt(3) u. Normalizing the rows does not
+      increase this length. A rotation by a small angle t changes the nine entries by a vector of the length
+      sqrt(2) t. The angle error is therefore at most sqrt(3/2) u.
     """
     prims: dict[str, str] = answer["prims"]
     rows = unpacked(answer["rest"])
@@ -279,7 +281,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         worst = max(worst[0], off), max(worst[1], angle)
         if share > 1.0:
             what = (
-                f"the prim is {off:.3g} m and {np.degrees(angle):.3g} degrees from where the joints place it"
+                f"the prim's pose and the pose by the joints differ by {off:.3g} m"
+                f" and {np.degrees(angle):.3g} degrees"
             )
             remarks.append(
                 Remark("rest-pose", path, what, "correct the joint's frames or the prim's transform")

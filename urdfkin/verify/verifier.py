@@ -1,6 +1,7 @@
 """Compare a robot's results with an oracle (Pinocchio or MuJoCo), and record the checks.
 
-The oracle receives the user's arguments. Results are compared in the shape that a method returns.
+The oracle receives the user's arguments. `Verifier.check` receives a result in the shape that the method
+returns to the user, so the check also finds errors in this shape.
 """
 
 from __future__ import annotations
@@ -70,9 +71,10 @@ class NotVerifiedWarning(UserWarning):
 class Verifier:
     """Checks the results of one robot and records them.
 
-    `unverifiable` is a known reason why Pinocchio cannot check the robot. `oracle` checks the results of the
-    robot's methods; Pinocchio always checks tables, the accuracy study and enclosures. `reading` describes
-    the check of a conversion to URDF, and is empty for a URDF.
+    `unverifiable` is a known reason why Pinocchio cannot check the robot. `oracle` is the name of the library
+    that checks the results of the robot's methods. Pinocchio checks tables, the accuracy study and
+    enclosures, whatever the value of `oracle`. If the source is not a URDF, `reading` is a text about the
+    conversion to URDF and its check; otherwise `reading` is empty.
     """
 
     def __init__(
@@ -184,7 +186,7 @@ class Verifier:
     # -- quantities ----------------------------------------------------------------------------------
 
     def check(self, quantity: Quantity, call: Call, result: FloatArray, verify: Verify | None) -> None:
-        """Check and record the results of a call; raise VerificationError for a too large difference."""
+        """Check and record the results of a call; raise VerificationError if a difference is too large."""
         ledger, policy = self.ledger, self.policy_of_call(verify)
         if policy is False:
             ledger.unchecked(quantity.name, call.results)
