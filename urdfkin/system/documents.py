@@ -159,7 +159,10 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Convert a result to dicts, lists, texts and numbers, infinity included; `typed` is the inverse."""
+    """Convert a result to dicts, lists, strings and numbers; `typed` converts the data back.
+
+    Infinity and NaN stay numbers.
+    """
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
 
