@@ -318,7 +318,7 @@ def _remove_handlers(server: Any) -> None:
                 websocket_server.unregister_handler(message)
         accepted = {message.__name__ for message in websocket_server._incoming_handlers}
     except (AttributeError, AssertionError) as error:
-        raise UnguardedError("the message handlers of viser cannot be listed") from error
+        raise UnguardedError("urdfkin cannot find the message handlers of viser") from error
     if accepted != set(_ACCEPTED):
         names = ", ".join(sorted(accepted)) or "(none)"
         raise UnguardedError(f"viser accepts the unexpected messages {names}")
