@@ -49,10 +49,9 @@ class _ImportLock:
     for the end of the import.
 
     A fork also acquires the lock of `logging`, because `logging` requests this from Python. The import that
-    holds the import lock may need the lock of `logging`. To avoid a
-    deadlock, a fork must acquire the import lock before the lock of `logging`. Python calls registered
-    functions in reverse order of registration, so `register` imports `logging` before registering
-    `_before_fork`.
+    holds the import lock may need the lock of `logging`. To avoid a deadlock, a fork must acquire the import
+    lock before the lock of `logging`. Python calls registered functions in reverse order of registration, so
+    `register` imports `logging` before registering `_before_fork`.
     """
 
     def __init__(self) -> None:
