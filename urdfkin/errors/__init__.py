@@ -243,7 +243,7 @@ class RepresentationSingularityError(InputError):
     def __init__(self, sequence: str, distance: float, sample: tuple[int, ...]) -> None:
         super().__init__(
             f"the Euler angles {sequence} are at their representational singularity: "
-            "no angle rates exist there for some angular velocities",
+            "some angular velocities correspond to no angle rates",
             where=f"sample {list(sample)}" if sample else None,
             found=f"a middle angle {distance:.3g} rad from it",
             remedy="describe the orientation by another sequence or by a quaternion",

@@ -94,7 +94,10 @@ def json_text(data: Any) -> str:
 
 
 def escape(c: str) -> str:
-    """Return a character's escape sequence for Python and TOML, and up to U+FFFF also for JSON."""
+    """Return the escape sequence of a character in Python and TOML.
+
+    For characters up to U+FFFF, JSON has the same escape sequence.
+    """
     return f"\\u{ord(c):04x}" if ord(c) < 0x10000 else f"\\U{ord(c):08x}"
 
 

@@ -187,10 +187,10 @@ def _cell(checks: Sequence[ReportedCheck], where: dict[str, list[int]]) -> HeatC
 
 
 def _share(check: ReportedCheck, subject: int) -> float:
-    """Return at least the ratio of a disagreement to its error bound, for one frame, joint or column.
+    """Return an upper limit of (disagreement / error bound) for one frame, joint or column.
 
-    The document has no error bound for a single frame, joint or column, so the disagreement is divided by the
-    check's smallest error bound. The result is at most the check's largest ratio.
+    The document has no error bound for a single frame, joint or column. This function therefore divides the
+    disagreement by the check's smallest error bound. The result never exceeds the check's largest ratio.
     """
     value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
     # A disagreement of 0 lies within every bound.

@@ -57,7 +57,10 @@ def units(value: Units, *, compared: bool = True) -> str:
 
 
 def percent(share: Units) -> str:
-    """Format the ratio of a disagreement to its bound: as a percentage below 10, otherwise as a factor."""
+    """Format the ratio of a disagreement to its bound.
+
+    A ratio below 10 is written as a percentage, another ratio as a factor.
+    """
     if share is None:
         return "inf"
     return f"{share:.1%}" if share < 10.0 else f"{share:.2g} x"
@@ -158,7 +161,7 @@ def second_oracle_rows(robots: Sequence[ReportedRobot], title: str) -> Iterator[
 
 
 def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str]:
-    """Return the cells of a row below the headings `second_oracle_heads`.
+    """Return the cells of one row; `second_oracle_heads` returns the headings of these cells.
 
     Each ratio is the largest (disagreement / bound) of all `checks`.
     """

@@ -50,16 +50,16 @@ class Header(TypedDict):
     sha256: Annotated[
         list[Sha256 | None],
         says(
-            "SHA-256 of each robot's text as UTF-8, or of its MJCF file, in the order of the robots; "
-            "null: unknown."
+            "One SHA-256 digest for each robot, in the order of the robots: of the URDF's text as UTF-8, or "
+            "of the MJCF or USD file. null means that the digest is unknown."
         ),
     ]
     verdict: Annotated[str, says("Verdict of the document as a whole.")]
     command: Annotated[
         str | None,
         says(
-            "Command that makes the document again; null: unknown. The text has a line for each set of "
-            "options, and a line for each robot that was given as text (`-`: standard input)."
+            "Command that makes the document again, or null if it is unknown. The robots in a line have the "
+            "same options. At most one robot in a line was given as text (`-`: standard input)."
         ),
     ]
 
@@ -159,7 +159,10 @@ def _unknown_entry(data: Any, document: Any, place: str = "$") -> tuple[str, str
 
 
 def as_data(value: Any) -> Any:
-    """Convert a result to dicts, lists, texts and numbers, infinity included; `typed` is the inverse."""
+    """Convert a result to dicts, lists, strings and numbers; `typed` converts the data back.
+
+    Infinity and NaN stay numbers.
+    """
     return msgspec.to_builtins(value, enc_hook=lambda x: str(x) if isinstance(x, str) else x.tolist())
 
 

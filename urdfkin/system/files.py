@@ -148,7 +148,7 @@ def read_start_of_standard_input(count: int) -> bytes:
 
 
 def exists(path: Path) -> bool:
-    """Return whether a path exists; a path that is too long counts as existing."""
+    """Return whether a path exists, or True if the check fails, for example for a path that is too long."""
     try:
         return path.exists()
     except OSError:
@@ -232,7 +232,7 @@ def write_file(path: Path, data: bytes) -> None:
             path.write_bytes(data)
             return
         path = path.resolve()
-        # Renaming the temporary file would ignore a missing write permission.
+        # `Path.replace` also replaces a read-only file, so this check comes first.
         if path.exists() and not os.access(path, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()

@@ -18,8 +18,8 @@ _acquired: dict[int, list[threading.RLock]] = {}
 def lock_over_forks() -> threading.RLock:
     """Return a lock that is unlocked in a child process after a fork.
 
-    A fork waits until the lock is free. A fork acquires all locks in reverse order of their creation, so a
-    thread that needs two locks must also acquire the newer lock first.
+    A fork waits until the lock is free. A fork acquires the newest lock first and the oldest lock last.
+    A thread that needs two locks must acquire them in the same order; otherwise a deadlock is possible.
 
     Use this function only for module variables, because this module stores each lock until the process ends.
     """
@@ -37,7 +37,7 @@ def _before_fork() -> None:
 
 
 def _after_fork() -> None:
-    # The list is empty if another thread registered this function during the fork.
+    # If another thread registered the functions during the fork, `_before_fork` has not run.
     for lock in reversed(_acquired.pop(threading.get_ident(), [])):
         lock.release()
 
@@ -48,10 +48,10 @@ class _ImportLock:
     Without this lock, another thread could fork a child during the import, and the child would wait for ever
     for the end of the import.
 
-    A fork also acquires the lock of `logging`, and an imported module may need that lock. To avoid a
-    deadlock, a fork must acquire the import lock before the lock of `logging`. Python calls registered
-    functions in reverse order of registration, so `register` imports `logging` before registering
-    `_before_fork`.
+    A fork also acquires the lock of `logging`, because `logging` requests this from Python. The import that
+    holds the import lock may need the lock of `logging`. To avoid a deadlock, a fork must acquire the import
+    lock before the lock of `logging`. Python calls registered functions in reverse order of registration, so
+    `register` imports `logging` before registering `_before_fork`.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class _ImportLock:
             return
         with self._lock:
             if not self._registered:
-                # This import registers `logging`'s lock before `_before_fork`, see the docstring.
+                # The docstring of the class says why this import precedes the registration.
                 import logging  # noqa: F401
 
                 os.register_at_fork(

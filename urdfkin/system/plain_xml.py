@@ -26,7 +26,7 @@ def plain_xml(text: str) -> Element:
 
 
 def order_words(urdf: str, joints: Sequence[str]) -> str:
-    """Return a sentence that compares the order of a URDF's joints with `joints`, the order of q."""
+    """Return a sentence that says whether the URDF contains its joints in the order `joints` of q."""
     known = set(joints)
     written = [e.get("name", "") for e in plain_xml(urdf) if e.tag == "joint" and e.get("name") in known]
     ours = [name for name in joints if name in set(written)]

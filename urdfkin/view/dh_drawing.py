@@ -28,7 +28,10 @@ _ELEVATION, _AZIMUTH = math.radians(20.0), math.radians(-55.0)
 
 
 def drawing(table: DHTable, q: ArrayLike | Mapping[str, float] | None = None) -> str:
-    """Return an SVG of the table's chain at q (rad and m, or by name); None is the zero configuration."""
+    """Return an SVG drawing of the table's chain at one configuration.
+
+    `q` contains the joint positions (rad or m), or maps joint names to them. None is the zero configuration.
+    """
     frames = table.frames(q)
     if frames.ndim != 3:
         raise InputError(
@@ -60,7 +63,10 @@ def _projection() -> FloatArray:
 
 @dataclass
 class _Canvas:
-    """A two-dimensional drawing; the rows of `projection` (2, 3) are right and up in the base's axes."""
+    """A two-dimensional drawing of points and directions, which are given in the axes of the base.
+
+    The first row of `projection` (2, 3) points to the right in the drawing, and the second row points up.
+    """
 
     axes: Any
     projection: FloatArray
@@ -108,7 +114,7 @@ class _Canvas:
 
 
 def row_corners(table: DHTable, frames: FloatArray) -> FloatArray:
-    """Return for each row of the table the point (n, 3) where the offset d and the length a meet."""
+    """Return one point (n, 3) for each row of the table: the common end of the segments d and a."""
     corners = np.empty((len(table.rows), 3))
     for i, row in enumerate(table.rows):
         # In the standard convention, the offset d comes before the length a.

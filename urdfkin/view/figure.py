@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Axes = matplotlib.axes.Axes
     Figure = matplotlib.figure.Figure
 
-#: Each placeholder colour of a drawing, and the colour of the page's style that replaces it.
+#: Map each placeholder colour in a drawing to the CSS variable that replaces it in a page.
 PAGE_COLOURS = {
     "#010101": "var(--plot-text)",
     "#020202": "var(--plot-grid)",
@@ -65,7 +65,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def style(**more: Any) -> Any:
-    """Return a context in which matplotlib stores text as characters, and equal drawings as equal files."""
+    """Return a context in which SVGs contain text as text, and equal figures get equal SVG ids."""
     return _matplotlib().rc_context(_STYLE | {key.replace("_", "."): value for key, value in more.items()})
 
 

@@ -137,7 +137,10 @@ class Player:
 
 
 def _new_picture(client: Any, last: np.ndarray | None) -> np.ndarray:
-    """Request a picture, and repeat the request if a busy browser has drawn the previous pose again."""
+    """Request a picture up to five times, until the picture differs from `last`.
+
+    A busy browser can draw the previous pose again.
+    """
     for _ in range(5):
         picture: np.ndarray = client.get_render(height=_SIZE[1], width=_SIZE[0], timeout=60.0)
         if last is None or not np.array_equal(picture, last):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from urdfkin.view.figure import Axes, Figure
 
 
-#: Function that draws a motion over time (s) into axes.
+#: A panel is a function that draws a motion against the time (s) in the given axes.
 Panel = Callable[["Axes", FrameMotion, FloatArray], None]
 
 #: Line styles, which make lines distinguishable without colours.
@@ -79,7 +79,7 @@ def singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
-    # If the axis has fewer than two powers of ten, three other values get a tick.
+    # An axis that shows fewer than two powers of ten gets three ticks at other values.
     if np.floor(np.log10(upper)) < np.ceil(np.log10(lower)) + 1.0:
         axes.set_yticks([float(f"{lower * (upper / lower) ** share:.2g}") for share in (0.1, 0.5, 0.9)])
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -93,7 +93,10 @@ def manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit:
 
 
 def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-    """Draw the difference from Pinocchio, in units of eps * scale, and the bound (thin line)."""
+    """Draw the disagreement with Pinocchio, and its bound as a thin line, in units of eps * scale.
+
+    eps is 2**-52. The scale is an upper bound on the sum of the absolute values of the terms of a number.
+    """
     axes.set_ylabel("disagreement [eps·scale]\nthin: bound")
     if x.not_verified is not None:
         axes.text(0.5, 0.5, "not verified", transform=axes.transAxes, ha="center", va="center")
@@ -105,7 +108,7 @@ def disagreement(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
         if outside.any():
             axes.plot(t[outside], check.units[outside], "x", color=BAD, label="outside the bound")
     # The axis is logarithmic, because bounds are about a hundred times the usual disagreement.
-    # Below 1, the size of one rounding error, the axis is linear.
+    # The axis is linear below 1, because 1 is the size of one rounding error.
     axes.set_yscale("symlog", linthresh=1.0)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_ylim(bottom=0.0)
@@ -126,9 +129,9 @@ PANELS: dict[str, Panel] = {
     "disagreement": disagreement,
 }
 
-#: Suffix of the units of q, v and a after "rad" or "m".
+#: Suffix that follows "rad" or "m" in the unit of q, v or a.
 _PER = {"q": "", "v": "/s", "a": "/s²"}
-#: Names of the panels of coordinates; each panel has a plot for each unit.
+#: Names of the panels that draw q, v and a. Each name stands for one panel per unit (rad, m or none).
 COORDINATES = tuple(_PER)
 
 
@@ -180,9 +183,10 @@ def _coordinates(
 
 
 def _outside(robot: Robot, what: str, i: int, values: FloatArray) -> np.ndarray:
-    """Return whether each value is outside its limits by more than one unit in the last place of a double.
+    """Return for each value whether it is outside its limits.
 
-    This tolerance covers the rounding of a limit in decimal notation.
+    A double that is next to a limit still counts as inside. This tolerance covers the rounding of a
+    limit in decimal notation.
     """
     lower, upper = _limits(robot, what, i)
     return np.asarray((values < np.nextafter(lower, -np.inf)) | (values > np.nextafter(upper, np.inf)))
@@ -199,9 +203,9 @@ def _limits(robot: Robot, what: str, i: int) -> tuple[float, float]:
 _PAGE = (7.6, 10.4)
 #: Height of a panel, and height of the title and the footer together, in inches.
 _PANEL_HEIGHT, _TEXT_HEIGHT = 2.1, 0.9
-#: Number of letters in one inch of the footer, and in one inch of a legend.
+#: Number of letters that fit into one inch of the footer, and into one inch of a legend.
 _LETTERS, _LETTERS_OF_LEGEND = 16, 22
-#: Width of the sample line in a legend, in letters.
+#: Width of a legend entry without its text, as a number of letters.
 _HANDLE = 8
 _RATES_UNCHECKED = (
     "Pinocchio checks the formulas at these q, v and a, not whether v and a are the derivatives of q"
@@ -209,7 +213,7 @@ _RATES_UNCHECKED = (
 
 
 def sheet(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
-    """Return a figure with the named panels of `COORDINATES` and `PANELS`; no names mean all panels."""
+    """Return a figure with the named panels of `COORDINATES` and `PANELS`, or with all panels by default."""
     drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)

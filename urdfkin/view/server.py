@@ -12,9 +12,9 @@ Four independent measures keep them out:
 
 Viser checks neither the Host header nor the Origin header, and has no option to check them. To start its web
 server, viser calls `websockets.asyncio.server.serve`. This module replaces `serve` by a function that checks
-each request. Before a robot is shown, the module sends forbidden requests to the running server, and stops
-the server if it accepts one of these requests. A new version of viser can therefore make the viewer fail, but
-not make the viewer insecure.
+each request. Before the viewer shows a robot, this module sends forbidden requests to the running server. If
+the server accepts a forbidden request, this module stops the server. A new version of viser can therefore
+make the viewer fail, but not make the viewer insecure.
 
 The address is not passed to the browser on its command line, which every user of the machine can read.
 Instead the browser opens a file in a private folder. This file redirects the browser to the address.
@@ -165,7 +165,8 @@ LOOPBACK = "127.0.0.1"
 
 #: The only message that the server accepts from a page: a control has changed.
 _ACCEPTED = ("GuiUpdateMessage",)
-#: Replacements that add the nonce to viser's script, and to the script element that this script creates.
+#: Two replacements in viser's page. The first adds the nonce to viser's script. This script creates a script
+#: element, to which the second replacement adds the nonce.
 _SCRIPTS = (
     ("<script data-p=", '<script nonce="{nonce}" data-p='),
     ('e.type="module";', 'e.type="module";e.nonce="{nonce}";'),
@@ -231,7 +232,10 @@ def _require_address(host: str) -> None:
 
 
 def _process_request(requests: RequestFilter, page: Callable[[str], bytes]) -> Callable[[Any, Any], Any]:
-    """Return a callback of the library websockets: it returns a response, or None to accept a connection."""
+    """Return the callback that the library websockets calls for each request.
+
+    The callback returns a response, or None to accept a WebSocket.
+    """
     from websockets.datastructures import Headers
     from websockets.http11 import Response
 
@@ -255,7 +259,7 @@ def _process_request(requests: RequestFilter, page: Callable[[str], bytes]) -> C
 
 
 def _page() -> Callable[[str], bytes]:
-    """Return a function that makes viser's page for a nonce."""
+    """Return a function that takes a nonce and returns viser's page (HTML) with this nonce."""
     import viser
 
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
@@ -281,7 +285,7 @@ def _page() -> Callable[[str], bytes]:
 
 @contextlib.contextmanager
 def _filtered(process_request: Callable[[Any, Any], Any]) -> Iterator[None]:
-    """While the context is open, new servers call `process_request`, and log no refused request."""
+    """Return a context in which each new server checks requests with `process_request` and logs nothing."""
     from websockets.asyncio import server as module
 
     original: Any = module.serve
@@ -303,7 +307,10 @@ def _filtered(process_request: Callable[[Any, Any], Any]) -> Iterator[None]:
 
 
 def _remove_handlers(server: Any) -> None:
-    """Remove viser's handlers of messages from a page, such as sharing, uploads and commands."""
+    """Remove the handlers with which viser processes messages from a page, except those in `_ACCEPTED`.
+
+    For example, viser has handlers for sharing, uploads and commands.
+    """
     try:
         websocket_server = server._websock_server
         for message in list(websocket_server._incoming_handlers):
@@ -311,7 +318,7 @@ def _remove_handlers(server: Any) -> None:
                 websocket_server.unregister_handler(message)
         accepted = {message.__name__ for message in websocket_server._incoming_handlers}
     except (AttributeError, AssertionError) as error:
-        raise UnguardedError("the message handlers of viser cannot be listed") from error
+        raise UnguardedError("urdfkin cannot find the message handlers of viser") from error
     if accepted != set(_ACCEPTED):
         names = ", ".join(sorted(accepted)) or "(none)"
         raise UnguardedError(f"viser accepts the unexpected messages {names}")
