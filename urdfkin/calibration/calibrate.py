@@ -346,7 +346,7 @@ def _check_measured(
             found=f"{len(T)} poses, q of shape {np.shape(q)}",
         )
     if not len(T):
-        raise InputError("no poses", remedy="give more measured numbers than there are parameters")
+        raise InputError("no poses", remedy="give poses; a fit needs more measured numbers than parameters")
     measured = Measured(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measured(values, T)
     demand_metres(model, measured)
     return path_q, measured
@@ -509,7 +509,7 @@ def _warnings(found: Calibration) -> Iterator[str]:
         yield (
             "poorly observable: "
             + first_names((f"{name[k]} ({x:.0f} times the usual uncertainty)" for k, x in worst), _NAMED)
-            + "; the usual uncertainty is that of the same number of random configurations"
+            + "; the usual uncertainty is the uncertainty at the same number of random configurations"
         )
     if not fitted.is_judged:
         yield "the fit cannot be checked, because there are as many parameters as measured numbers"

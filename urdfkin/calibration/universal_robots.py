@@ -140,7 +140,7 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> R
     residual = np.abs(found.fitted.errors).max() if found.fitted is not None else 0.0
     if residual > _MOST_RESIDUAL:
         raise InputError(
-            "no origins make the robot move like the calibrated arm",
+            "no choice of joint origins makes the robot move like the calibrated arm",
             where=f"{robot.name}, {base} to {tip}",
             found=f"a residual of {residual:.3g} m or rad",
             remedy="compare the URDF with that of an uncalibrated arm of this type: urdfkin same A.urdf"
