@@ -64,7 +64,8 @@ _WEAK = 10.0
 _WEAK_SEED = 1
 #: A Jacobian J = Q R counts as rank-deficient if an |R_ii| is at most this fraction of the largest |R_ij|.
 _DEPENDENT = 1e-12
-#: The robot's size divided by these numbers gives the coordinates of a target that lies on no joint axis.
+#: The coordinates of a target are the robot's size divided by these numbers.
+#: Such a target lies on no joint axis.
 _TARGET_DIVISORS = {"x": 5.0, "y": 6.0, "z": 7.0}
 #: Factor of `ParametricChain.rounding` for the comparison with Pinocchio.
 #: Pinocchio rounds more often, because it reads the written file and computes base and tip separately.
@@ -89,8 +90,9 @@ class Calibration:
         before: The fit of only base and tool, with the robot's original parameters.
         odd: Indices of the outlier poses.
         without_odd: The fit without the outliers.
-        weak: Indices of poorly observable parameters, each with a ratio of uncertainties: the uncertainty at
-            the measured configurations, divided by the uncertainty at as many random configurations.
+        weak: Indices of poorly observable parameters, each with a ratio of two uncertainties. The first is
+            the uncertainty at the measured configurations. It is divided by the uncertainty at the same
+            number of random configurations.
         certificate: The result of checking the written model with Pinocchio.
         stated: Whether the user stated the noise.
         written_fit: The fit of the written parameters; the other parameters have their original values.
@@ -207,8 +209,8 @@ def calibrate(
 ) -> Calibration:
     """Fit the parameters of a robot or a table to measured poses.
 
-    Afterwards urdfkin loads the written model, and compares the tip's poses at the measured configurations
-    with the poses that Pinocchio computes.
+    Afterwards urdfkin loads the written model, and compares the tip's poses with the poses that Pinocchio
+    computes. A URDF is compared at the measured configurations, and a table at q = 0.
 
     Args:
         source: A robot, a source for `load`, or a Denavit-Hartenberg table.
@@ -237,7 +239,7 @@ def calibrate(
         ImplausibleError: the fit is not plausible; the message names the likeliest reason.
         UnknownNameError: a frame or a set of parameters does not exist.
         UrdfError, SourceError: as for `load`.
-        VerificationError: Pinocchio computes another result for the written model.
+        VerificationError: for the written model, the results of urdfkin and Pinocchio differ.
 
     Example:
         >>> import urdfkin
@@ -313,7 +315,10 @@ def fitted_model(
 
 
 def _general_target(model: CalibrationModel) -> FloatArray:
-    """Return start values (p,); a fitted position of the tool's target lies on no joint axis."""
+    """Return the parameters (p,) of the original model.
+
+    If the tool is fitted, its target is moved to a position that lies on no joint axis.
+    """
     at = model.chain.start.copy()
     for k, parameter in enumerate(model.chain.parameters):
         if parameter.end and parameter.where == "tool" and parameter.unit == "m":
@@ -341,7 +346,7 @@ def _check_measured(
             found=f"{len(T)} poses, q of shape {np.shape(q)}",
         )
     if not len(T):
-        raise InputError("no poses", remedy="give more measured numbers than there are parameters")
+        raise InputError("no poses", remedy="give poses; a fit needs more measured numbers than parameters")
     measured = Measured(values, T[:, :3, 3], T[:, :3, :3]) if T.ndim == 3 else Measured(values, T)
     demand_metres(model, measured)
     return path_q, measured
@@ -454,9 +459,10 @@ def _weak(
 
 
 def _verify_written(found: Calibration, measured: Measured, q: ArrayLike) -> Certificate | None:
-    """Compare the written model with Pinocchio: a URDF at the measured configurations, a table at q = 0.
+    """Compare the written model with Pinocchio.
 
-    A URDF cannot contain base, tool or gains, so these parameters are 0 in the comparison of a URDF.
+    A URDF is compared at the measured configurations, and a table at q = 0. A URDF cannot contain base, tool
+    or gains, so these parameters are 0 in the comparison of a URDF.
     """
     model, fitted = found.model, found.written_fit
     if fitted is None:
@@ -503,7 +509,7 @@ def _warnings(found: Calibration) -> Iterator[str]:
         yield (
             "poorly observable: "
             + first_names((f"{name[k]} ({x:.0f} times the usual uncertainty)" for k, x in worst), _NAMED)
-            + "; the usual uncertainty is that of the same number of random configurations"
+            + "; the usual uncertainty is the uncertainty at the same number of random configurations"
         )
     if not fitted.is_judged:
         yield "the fit cannot be checked, because there are as many parameters as measured numbers"

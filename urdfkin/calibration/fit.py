@@ -16,10 +16,10 @@ unknown.
 Orthogonal elimination chooses which parameters are fitted, joint by joint, from base to tip. Each parameter
 has a column in the Jacobian. In each step, the elimination subtracts from each remaining column its
 projection onto the chosen columns. The length of the remainder measures how independent the column is. A
-column is a candidate if its remainder is at least half as long as the longest remainder. Among the
-candidates, the elimination keeps the first in the model's order of preference, and this parameter is fitted.
-Without this choice, four parameters of nearly parallel axes would become hundreds of metres and cancel each
-other.
+column is a candidate if its remainder is at least half as long as the longest remainder. The elimination
+chooses the candidate that comes first in the model's order of preference. The parameter of the chosen column
+is fitted. Without this choice, four parameters of nearly parallel axes would become hundreds of metres and
+cancel each other.
 
 **Fit.** Damped Gauss-Newton (`urdfkin.kinematics.least_squares`) minimizes the errors of the tip's poses.
 Each error is divided by the standard deviation of its noise. At the minimum, let J be the weighted Jacobian
@@ -39,16 +39,17 @@ distributed. A position has 3 degrees of freedom, and a full pose has 6. The lim
 one of a hundred data sets without outliers exceeds the limit. One outlier can hide another, so each step
 removes only the largest outlier and fits the other poses again. The steps end when no outlier is left.
 
-**Start values.** Base and tool are computed from the poses before the fit. The robot's poses T_i, the
-measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i and R_X be the
-rotations of these poses. The equations R_B^T R_Mi = R_i R_X are linear in the unknown rotations R_B and R_X.
-Together, R_B and R_X form the null vector of these equations (Shah, 2013). Let p_i be the robot's positions.
-The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown translations: x of the tool and
-b of the base.
+**Start values.** Before the fit, start values of base and tool are computed from the measured poses. The
+robot's poses T_i, the measured poses M_i, the base B and the tool X satisfy M_i = B T_i X. Let R_B, R_Mi, R_i
+and R_X be the rotations of these poses. The equations R_B^T R_Mi = R_i R_X are linear in the unknown
+rotations R_B and R_X. Together, R_B and R_X form the null vector of these equations (Shah, 2013). Let p_i be
+the robot's positions. The measured positions p_Mi = R_B (R_i x + p_i) + b are linear in the unknown
+translations: x of the tool and b of the base.
 
-If only positions are measured, the base and the position of the target on the tip are unknown. The equations
-for the base are linear if the target is known. The equations for the target are linear if the base is known.
-The module therefore computes base and target alternately.
+If only positions are measured, the base and the position of the target on the tip are unknown. If the
+target's position is known, the base's rotation can be computed directly. If the base's rotation is known, the
+equations for the positions of base and target are linear. The module therefore computes the rotation and the
+two positions alternately.
 """
 
 from __future__ import annotations
@@ -73,7 +74,8 @@ from urdfkin.verify.singular_values import singular_values
 _AS_GOOD = 0.5
 #: Maximum number of fitted parameters that a message lists for one fixed parameter.
 _NAMED = 3
-#: A message lists fitted parameters whose share of the fixed parameter's effect exceeds this fraction.
+#: A parameter stays fixed if fitted parameters together have the same effect; a message lists them.
+#: The message omits a fitted parameter that contributes at most this fraction of the effect.
 _SHARE = 1e-6
 
 
@@ -162,10 +164,11 @@ def first_names(names: Iterable[str], most: int) -> str:
     return ", ".join(every[:most]) + (f" and {len(every) - most} more" if len(every) > most else "")
 
 
-#: Smallest total redundancy of a fit that can be checked; the exact total redundancy is an integer.
+#: A fit can be checked if its total redundancy is at least this number.
+#: The exact total redundancy is an integer, so 0.5 separates 0 from 1 in spite of rounding.
 _ONE_OR_MORE = 0.5
 #: Eigenvalues of the matrix I - H_ii below this fraction of the largest eigenvalue are replaced by zero.
-#: The residuals do not show pose errors along the eigenvectors of these eigenvalues.
+#: The fit absorbs pose errors along the eigenvectors of these eigenvalues, so no residual shows such errors.
 _UNOBSERVED = 1e-9
 #: Maximum number of estimates of the noise.
 _ESTIMATES = 20
@@ -173,7 +176,7 @@ _ESTIMATES = 20
 _CONSTANT = 1e-3
 #: Probability that an outlier is reported for a data set without outliers.
 FALSE_ALARM = 0.01
-#: Number of standard deviations by which a parameter must change to be written.
+#: Number of standard deviations above which the change of a parameter is significant.
 SIGMAS = 2.0
 _MOST_OUTLIERS = 0.25
 
@@ -300,7 +303,10 @@ def best_fit(
 
 
 def _estimate_noise(found: Fit, model: CalibrationModel, measured: Measured) -> Noise:
-    """Estimate the noise from the residuals; the noise is a divisor, so it is at least the rounding error."""
+    """Estimate the noise from the residuals.
+
+    The residuals are divided by the noise. The estimate is therefore at least the rounding error, never 0.
+    """
     rounding = model.chain.rounding(measured.values)
 
     def of(part: slice, least: float, former: float) -> float:
@@ -384,10 +390,10 @@ def outliers(
 def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]) -> NDArray[np.bool_]:
     """Select the parameters that changed by more than `SIGMAS` standard deviations, by backward elimination.
 
-    Each step resets the least significant parameter to its old value. The covariance gives the resulting
-    change of the other parameters. If the measurements determine only a combination of two parameters, one of
-    the two remains selected. A `fixed` parameter is always selected. Unknown entries of the covariance are
-    inf.
+    Each step resets the least significant parameter to its old value. The covariance determines how this
+    reset changes the other parameters. If the measurements determine only a combination of two parameters,
+    resetting one of the two can make the other significant. A `fixed` parameter is always selected. Unknown
+    entries of the covariance are inf.
 
     >>> significant(np.array([3.0, 1.0]), np.eye(2), [False, False]).tolist()
     [True, False]
@@ -410,12 +416,16 @@ def significant(moved: FloatArray, covariance: FloatArray, fixed: Sequence[bool]
 
 
 def quantile(share: float, freedom: int) -> float:
-    """Return the chi^2 quantile by the approximation of Wilson and Hilferty (1931), to a few per cent."""
+    """Return the chi^2 quantile by the approximation of Wilson and Hilferty (1931).
+
+    The relative error is at most a few per cent.
+    """
     step = 2.0 / (9.0 * freedom)
     return freedom * (1.0 - step + NormalDist().inv_cdf(share) * math.sqrt(step)) ** 3
 
 
-#: Maximum number of repetitions; each repetition computes the pose of the base, then the target's position.
+#: Maximum number of repetitions.
+#: Each repetition computes the base's rotation, then the positions of base and target.
 _REPETITIONS = 200
 #: The repetitions end when the relative change of the target's position is at most this number.
 _CONSTANT_TARGET = 1e-9

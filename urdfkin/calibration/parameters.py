@@ -3,16 +3,17 @@
 A model is a path (`urdfkin.model.path`): a product of constant poses and elementary motions. Each joint
 origin of a URDF is such a product, and so is each row of a Denavit-Hartenberg table. The angle or length of
 an elementary motion is a parameter or a joint's value. A joint can have a gain g, which multiplies the
-joint's value by (1 + g). The derivative of the tip's pose by g is the derivative by the motion's angle or
-length, multiplied by the joint's value.
+joint's value by (1 + g). The joint's motion has the angle or length (1 + g) q, where q is the joint's value.
+The derivative of the tip's pose by g is therefore q times the pose's derivative by this angle or length.
 
-**URDF.** Each joint of the path has six parameters of its origin. Let T be the joint's original origin, and
-let A be the rotation that maps the z axis to the joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z)
-Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the parameter z always shifts the origin along the joint's axis. A
-change of rz changes the zero position of a revolute joint. The other four parameters move the axis. The gain
-is a seventh parameter, which a URDF cannot store. `base` and `tool` have six parameters each. The path begins
-with the motions of `base`: the pose of the robot's base in the instrument's frame. The path ends with the
-motions of `tool`: the pose of the target in the tip's frame.
+**URDF.** Each moving joint of the path has six parameters of its origin, and so has a fixed joint directly
+before the tip. Let T be the joint's original origin, and let A be the rotation that maps the z axis to the
+joint's axis. The new origin is T . A . Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz) . A^-1. Therefore, the
+parameter z always shifts the origin along the joint's axis. A change of rz changes the zero position of a
+revolute joint. The other four parameters move the axis. The gain is a seventh parameter, which a URDF cannot
+store. `base` and `tool` have six parameters each. The path begins with the motions of `base`: the pose of the
+robot's base in the instrument's frame. The path ends with the motions of `tool`: the pose of the target in
+the tip's frame.
 
 **Table.** The parameters of a row are the row's cells. If the row's axis is parallel to the next axis within
 `PARALLEL`, the row also has beta, Hayati's fifth parameter. In such a row, d has the same effect as
@@ -115,7 +116,8 @@ class ParametricChain:
     ) -> tuple[FloatArray, FloatArray]:
         """Return poses (s, 4, 4), and their Jacobian (s, 6, p) by the parameters, linear rows first.
 
-        `frames`, if given, must be the result of the method `frames` for `values` and `at`.
+        The argument `frames` contains the poses that the method `frames` returns for `values` and `at`. If it
+        is None, this method computes the poses.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
         T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
@@ -138,7 +140,7 @@ class ParametricChain:
     def rounding(self, values: FloatArray) -> float:
         """Bound the rounding error (m) of each number that `columns` returns.
 
-        For numbers in radians, the bound is the result divided by `size`.
+        For numbers in radians, divide the returned bound by `size`.
         """
         slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
@@ -154,8 +156,10 @@ FITTED = ("base", "tool", "offsets", "origins", "gains")
 #: The motions are multiplied in this order.
 SIX = (("x", False, 0), ("y", False, 1), ("z", False, 2), ("rx", True, 0), ("ry", True, 1), ("rz", True, 2))
 _ALL = tuple(what for what, *_ in SIX)
-#: Order in which parameters are fitted if their effects are equal, for revolute (True) and prismatic joints.
-#: The joint's zero comes first, then motions of the joint axis, then motions of the frame only.
+#: Order of preference for revolute (True) and prismatic (False) joints.
+#: If several parameters have the same effect, the first of them is fitted and the others stay fixed.
+#: The parameter of the joint's zero comes first. The parameters that move the joint axis follow.
+#: Then come the parameters that move only the frame, and the gain is last.
 _KEPT = {True: ("rz", "x", "y", "rx", "ry", "z", "gain"), False: ("z", "rx", "ry", "x", "y", "rz", "gain")}
 _ROW = (("theta", True, 2), ("d", False, 2), ("a", False, 0), ("alpha", True, 0), ("beta", True, 1))
 _KEPT_CELLS = ("theta", "a", "alpha", "beta", "d", "gain")

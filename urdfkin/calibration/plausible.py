@@ -1,10 +1,11 @@
 """Check whether a fit is plausible, and find the likeliest mistake in the measured data if it is not.
 
-Joint angles in degrees, shifted rows of q or the reversed sign of a joint do not prevent a fit. A fit is
-refused if the residuals are a large fraction of the robot's reach, or hardly smaller than the residuals of
-the original model. A fit that tilts a joint's axis by a large angle, or that has no
-redundancy, is refused too. To find the reason, the module corrects common mistakes in the data, one at a
-time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest one.
+Least squares computes a fit even if joint angles are in degrees, rows of q are shifted, or the sign of a
+joint is reversed. A fit is refused if the residuals are a large fraction of the robot's reach, or hardly
+smaller than the residuals of the original model. A fit that tilts a joint's axis by a large angle, or that
+has no redundancy, is refused too. To find the reason, the module corrects common mistakes in the data, one
+at a time, and fits again. If the fit is plausible after a correction, the corrected mistake is the likeliest
+one.
 """
 
 from __future__ import annotations
@@ -33,9 +34,11 @@ from urdfkin.model.tree import LARGEST_ANGLE, FloatArray, JointKind, KinematicTr
 
 #: Fraction of the reach above which the rms position error of a fit is not plausible.
 _LARGE_ERROR = 0.05
-#: An rms error above both fractions, of the reach and of the positions' spread, is not plausible.
+#: An rms position error is not plausible if it exceeds both limits.
+#: The limits are a fraction of the reach, and a fraction of the spread of the measured positions.
 _UNEXPLAINED_OF_REACH, _UNEXPLAINED_OF_SPREAD = 0.01, 0.25
-#: An rms error above both fractions, of the reach and of the error before the fit, is not plausible.
+#: An rms position error is not plausible if it exceeds both limits.
+#: The limits are a fraction of the reach, and a fraction of the rms position error before the fit.
 _NO_BETTER_OF_REACH, _NO_BETTER_OF_BEFORE = 0.03, 0.7
 #: Largest plausible rms orientation error, rad.
 _LARGE_ORIENTATION_ERROR = 0.2
@@ -46,11 +49,15 @@ _LARGEST_TILT, _LARGEST_GAIN = 0.5, 0.5
 #: Difference of joint values (rad, m) below which two configurations count as one.
 _ONE_CONFIGURATION = 1e-6
 #: Number of standard deviations that are subtracted from a change before it is compared with a limit.
-#: Changes that the data determine poorly, such as the tilt of an axis near the target, are then accepted.
+#: Because of this subtraction, a change that the data determine poorly does not make a fit implausible.
+#: For example, positions determine the tilt of an axis poorly if the target is near the axis.
 _UNCERTAIN = 5.0
-#: Maximum error after a correction, divided by the error before: for accepted fits, and for refused fits.
+#: Maximum error after a correction, divided by the error before the correction.
+#: `_NOT_WORSE` applies if the fit is not plausible, or if a joint zero changed by half a turn.
+#: Otherwise `_BETTER` applies.
 _BETTER, _NOT_WORSE = 0.25, 1.5
-#: Number of corrections that are fitted, beginning with the most promising.
+#: Number of corrections for which the parameters are fitted again.
+#: These corrections have the smallest errors if only base and tool are computed.
 _FITTED = 4
 #: Numbers of rows by which a correction shifts q relative to the poses.
 _SHIFTS = (1, -1, 2, -2)
@@ -72,7 +79,10 @@ class Plausibility:
 
 @dataclass(frozen=True, eq=False)
 class FitWithData:
-    """A fit with its data; `q` (s, c) are path coordinates, and `before` is the fit of base and tool only."""
+    """A fit with its data.
+
+    `q` (s, c) contains the coordinates of the path. In the fit `before`, only base and tool are fitted.
+    """
 
     model: CalibrationModel
     q: FloatArray
@@ -228,7 +238,10 @@ def _coordinates(model: CalibrationModel) -> Iterator[tuple[str, bool, float, fl
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """Configurations with one possible mistake corrected; they belong to the poses [first:last]."""
+    """The configurations `q` after the correction of one possible mistake.
+
+    Row i of `q` belongs to the pose with the index `first` + i.
+    """
 
     reason: str
     q: FloatArray
@@ -284,7 +297,10 @@ def _likeliest(fit: FitWithData, limit: float) -> _Trial | None:
 
 
 def _several_signs(fit: FitWithData) -> _Trial | None:
-    """Reverse signs of joints one by one while the error decreases; return None for fewer than two."""
+    """Reverse the signs of joints one by one while the error decreases.
+
+    Return None if fewer than two signs are reversed.
+    """
     signs = np.ones(fit.q.shape[1])
     best, least = None, math.inf
     for _ in signs:
@@ -308,7 +324,7 @@ class _Trial:
         self.measured = Measured(model.coupling.values(correction.q), chosen.p, chosen.R)
         self.start = start_values(model, self.measured)
         errors_before = _norm(errors(model, self.measured, self.start), original.reach)
-        #: Error (m) per pose if only base and tool are fitted.
+        #: Error (m) per pose if only base and tool are computed from the poses.
         self.error_before = errors_before / math.sqrt(len(self.measured))
 
     @cached_property

@@ -1,17 +1,17 @@
 """Apply the factory calibration of a Universal Robots arm, from the YAML file of its ROS driver.
 
-The controller stores Denavit-Hartenberg parameters. Two axes of the arm are parallel except for about a
-milliradian, so their common normal is far away. The d of one row is therefore hundreds of metres, and the d
-of the next row compensates it. The driver's program `ur_calibration` shifts the link frames along their axes,
-so that these large offsets disappear. The program writes the pose of each joint in the frame of the previous
-joint: x, y, z, roll, pitch and yaw.
+The controller stores Denavit-Hartenberg parameters. The angle between two nominally parallel axes of the arm
+is about a milliradian, so their common normal is far away. The parameter d of one row can therefore be
+hundreds of metres, and d of the following rows cancels this offset. The driver's program `ur_calibration`
+shifts the link frames along their axes, so that these large offsets disappear. The program writes the pose of
+each joint in the frame of the previous joint: x, y, z, roll, pitch and yaw.
 
 The order of the rotations is ambiguous. The driver computes the angles from R = Rx(roll) Ry(pitch) Rz(yaw)
 (Eigen's `eulerAngles(0, 1, 2)`). The ROS description copies the angles into a URDF, where the rotation is
-Rz(yaw) Ry(pitch) Rx(roll). If one angle is a quarter turn, the second angle is small (1e-5 to 1e-4 rad) and
-the third angle is 0, the products differ by about 1.4 times the small angle. The order "driver" agrees with
-the robot's controller. With the order "urdf", the result agrees with the URDF that the ROS package generates
-from the file.
+Rz(yaw) Ry(pitch) Rx(roll). Let one angle be a quarter turn, let the second angle be small (1e-5 to 1e-4 rad),
+and let the third angle be 0. The two products then differ by about 1.4 times the small angle. With the order
+"driver", the result agrees with the robot's controller. With the order "urdf", the result agrees with the
+URDF that the ROS package generates from the file.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _origin(kinematics: Mapping[Any, Any], link: str, sequence: str, where: str)
     six = []
     for name in _SIX:
         # The driver writes 0.00001 as 1e-05, which YAML 1.1 reads as a string.
-        # The message prints no list: with YAML references, a short file can contain a very long list.
+        # The message names only the type of a list, because a list with YAML references can be very long.
         value = entry.get(name)
         number = parse_float(str(value)) if isinstance(value, int | float | str) else None
         if number is None:
@@ -108,9 +108,9 @@ def calibrated_tree(origins: Mapping[str, FloatArray]) -> KinematicTree:
 def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -> Rewritten:
     """Apply a calibration file to the URDF of a Universal Robots arm.
 
-    If all six joints turn about z, as in the current ROS description, the file's origins replace the joint
-    origins. In other URDFs, such as the older ROS description, the joint origins are fitted. After the fit,
-    the poses of `tool0` in `base` are those of the calibrated arm.
+    If all six joints turn about z, as in the current ROS description, the origins in the calibration file
+    replace the joint origins of the URDF. In other URDFs, such as the older ROS description, the joint
+    origins are fitted. After the fit, the poses of `tool0` in `base` are those of the calibrated arm.
     """
     robot = robot if isinstance(robot, Robot) else load(robot)
     origins = read_calibration(path, order)
@@ -140,7 +140,7 @@ def _fit_origins(robot: Robot, calibrated: FrameChain, tip: str, base: str) -> R
     residual = np.abs(found.fitted.errors).max() if found.fitted is not None else 0.0
     if residual > _MOST_RESIDUAL:
         raise InputError(
-            "no origins make the robot move like the calibrated arm",
+            "no choice of joint origins makes the robot move like the calibrated arm",
             where=f"{robot.name}, {base} to {tip}",
             found=f"a residual of {residual:.3g} m or rad",
             remedy="compare the URDF with that of an uncalibrated arm of this type: urdfkin same A.urdf"
