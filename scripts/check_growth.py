@@ -6,9 +6,9 @@
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. If a
 check takes longer than `--patience`, the script does not check larger documents of the same kind.
 
-Each kind of content has a function that takes a size in bytes. The function returns a URDF of about this
-size, in which the content repeats. A faulty exporter or an attacker could write such files. urdfkin rejects
-most of these files. The time and memory of the rejection must be proportional to the size of the file.
+For each kind of content, a function returns a URDF of about a given size (bytes), which repeats this content.
+A faulty exporter or an attacker could write such files. urdfkin rejects most of these files. The time and
+memory of the rejection must be proportional to the size of the file.
 """
 
 import argparse

@@ -1,8 +1,8 @@
-"""Measure the cost of a campaign: serial, with two processes, with a store, and on a local cluster.
+"""Measure the cost of a validation run: in one process, with stored results, in two processes, in a cluster.
 
     python scripts/measure_campaigns.py ur5 --samples 10000 --rounds 3
     python scripts/measure_campaigns.py --all --samples 1000 --rounds 1 --ways serial,jobs
-    python scripts/measure_campaigns.py --chunk     # compute, store, read and add one chunk of the UR5
+    python scripts/measure_campaigns.py --chunk     # compute, store, read and add one chunk of samples
 
 The variants alternate, so that other load of the machine affects all of them. The script prints medians
 over rounds. Processor time includes all processes, and hardly depends on other load.
@@ -37,7 +37,7 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 
 
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
-    """Validate with two local Dask workers; the time includes the end of the workers, but not their start."""
+    """Validate with two local Dask workers; print the time without the start and the end of the workers."""
     with connected("local:2") as two:
         validate("planar_two_link", samples=400, executor=two)  # the workers load their modules
         chunks = len(Cut(how["samples"])) * len(robots[0])
