@@ -51,7 +51,7 @@ _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
 #: A PyTorch or JAX file contains a Hessian up to this number of joint velocities, because the check is slow.
-#: An `array` file contains a Hessian for PyTorch, but not for JAX, which would compile the Hessian for minutes.
+#: An `array` file contains a Hessian for PyTorch, but not for JAX, which would compile it for minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -87,7 +87,7 @@ def shares(written: FrameCode, folder: Path, ways: Collection[str]) -> Iterator[
 
 
 def _largest(found: Sequence[float], count: int) -> float:
-    """Return the largest ratio of an error to its bound; NaN if one is NaN or if there are not `count` ratios."""
+    """Return the largest ratio of an error to its bound; NaN if one is NaN or one is missing."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
