@@ -58,10 +58,10 @@ FAMILIES = {
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
-    "URDF508": "The limits are missing or zero, so samples within them do not move the joint.",
+    "URDF508": "Both limits are zero; missing limits count as zero. Samples do not move the joint.",
     "URDF510": "The value has no effect, as expected.",
-    "URDF527": "A mirrored finger has the limits of the mimicked finger; kinematics applies the mimic rule.",
-    "URDF702": "No body has these moments of inertia; kinematics does not use them.",
+    "URDF527": "The multiplier is -1, but both joints have equal limits; kinematics applies the mimic rule.",
+    "URDF702": "No body can have these moments of inertia; kinematics does not use moments of inertia.",
     "URDF706": "The address of the mesh is wrong, or is a path on another machine; kinematics needs no mesh.",
     "URDF708": "Only a colour is missing.",
 }

@@ -44,8 +44,11 @@ def cluster(*robots: Any, **how: Any) -> ValidationReport:
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)
         own = 1e3 * (time.process_time() - before) / chunks
-        print(f"    {time.perf_counter() - begin:.1f} s without start and end")
-        print(f"    {own:.1f} ms of processor time per chunk in client and scheduler, {chunks} chunks")
+        print(f"    {time.perf_counter() - begin:.1f} s without the start and the end of the workers")
+        print(
+            f"    {own:.1f} ms of processor time in client and scheduler per chunk of samples;"
+            f" {chunks} chunks of samples"
+        )
         return report
 
 
@@ -102,7 +105,7 @@ if __name__ == "__main__":
     parser.add_argument("--samples", type=int, default=10_000)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--ways", default=",".join(WAYS), help=f"default: {','.join(WAYS)}")
-    parser.add_argument("--chunk", action="store_true", help="measure the cost of one chunk")
+    parser.add_argument("--chunk", action="store_true", help="measure the cost of one chunk of samples")
     given = parser.parse_args()
     if given.chunk:
         measure_chunk()
