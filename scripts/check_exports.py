@@ -13,9 +13,10 @@
 
 Each exported function is compared with Pinocchio before it is written. The results of the exported code are
 compared with results at fifty digits. The code runs with GCC and Clang if they are installed, for one
-configuration and in batches. It also runs with NumPy, and with NumPy as an array API namespace, in both
-precisions. GCC compiles CUDA's host functions. The leaf links have a fixed random order, so that a stopped
-run has checked a random sample. Exit 1: a number is outside its bound, or a compiler prints a warning.
+configuration and in batches. The Python code runs with NumPy, and with NumPy as an array API namespace, in
+both precisions. GCC compiles CUDA's host functions. The leaf links have a fixed random order, so that a
+stopped run has checked a random sample. Exit 1: a number is outside its bound, or a compiler prints a
+warning.
 """
 
 import argparse
@@ -49,8 +50,8 @@ _COMPILED = (("c", ".c", ("gcc", "clang"), _STRICT), ("cuda", ".cpp", ("g++",), 
 _WAYS = ("c", "cuda", "numpy", "array")
 #: Languages that are checked only if `--ways` names them.
 _NAMED = ("sympy-exact",)
-#: Files for robots with more joint velocities contain no Hessian, because its check in PyTorch is slow.
-#: The Hessian in files of the format `array` is not checked with JAX, which would compile for minutes.
+#: A PyTorch or JAX file contains a Hessian up to this number of joint velocities, because the check is slow.
+#: An `array` file contains a Hessian for PyTorch, but not for JAX, which would compile it for minutes.
 _HESSIANS = 16
 _SHARE = re.compile(r"worst error (\S+) of the bound")
 
@@ -86,7 +87,7 @@ def shares(written: FrameCode, folder: Path, ways: Collection[str]) -> Iterator[
 
 
 def _largest(found: Sequence[float], count: int) -> float:
-    """Return the largest share; NaN if a share is NaN or if the number of shares is wrong."""
+    """Return the largest ratio of an error to its bound; NaN if one is NaN or one is missing."""
     return max(found) if len(found) == count and not any(map(math.isnan, found)) else float("nan")
 
 
@@ -157,7 +158,7 @@ def check_library(library: str, environment: Path, package: str | None, keep: Pa
 
 
 def _files(library: str, folder: Path) -> Iterator[Path]:
-    """Write each tip in a library's format, and in the format `array`."""
+    """Yield files with the code of each robot's tip frame, in a library's format and in `array`."""
     for number, (_, robot, frame) in enumerate(subjects(tips=True)):
         wanted = ("placement", "jacobian", "velocity", "acceleration") if robot.nv else ("placement",)
         differentiable = robot.nv and all(joint.nv <= 1 for joint in robot.tree.joints)

@@ -6,9 +6,9 @@
 If the cost grows linearly, all numbers in a row are equal. Each document is checked in its own process. If a
 check takes longer than `--patience`, the script does not check larger documents of the same kind.
 
-Each kind of content has a function that takes a size in bytes. The function returns a URDF of about this
-size, in which the content repeats. A faulty exporter or an attacker could write such files. urdfkin rejects
-most of these files. The time and memory of the rejection must be proportional to the size of the file.
+For each kind of content, a function returns a URDF of about a given size (bytes), which repeats this content.
+A faulty exporter or an attacker could write such files. urdfkin rejects most of these files. The time and
+memory of the rejection must be proportional to the size of the file.
 """
 
 import argparse
@@ -176,10 +176,14 @@ def cost(kind: str, size: int) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     option = parser.add_argument
-    option("words", nargs="*", help="parts of the names of the kinds to measure (default: all)")
+    option(
+        "words",
+        nargs="*",
+        help="measure only kinds of content whose names contain one of these texts (default: all)",
+    )
     option("--sizes", default="1,4,16,64", help="sizes of the documents in megabytes, separated by commas")
     option("--patience", type=float, default=600.0, help="time limit of one document in seconds")
-    option("--one", type=int, help="check one document of this many bytes in this process")
+    option("--one", type=int, help="check only one document of this size (bytes) in this process")
     given = parser.parse_args()
     if given.one is not None:
         print(cost(given.words[0], given.one))

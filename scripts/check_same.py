@@ -1,14 +1,15 @@
-"""Check `urdfkin same` on all known changes of all robots: the verdicts and the distance intervals.
+"""Check the verdicts and the distance intervals of `urdfkin same` for changed robots of the catalogue.
 
     python scripts/check_same.py --keep pairs.jsonl          # continues a stopped run
     python scripts/check_same.py --keep pairs.jsonl panda    # only some robots
 
-There are twenty-one changes. After eleven of these changes, a robot is still the same
-(`tests/comparison/pairs.py`): all links must then have the poses that `same` predicts, at random
-configurations. After any other change, the robot differs from the original. An independent global search then
-looks for the largest distance between a frame of the robot and the frame of the changed robot. This distance
-is computed with fifty digits from the decimals in the texts of the two robots, and must lie in the interval
-of `same`. Exit 1: a distance is outside its interval, or a verdict is wrong.
+`tests/comparison/pairs.py` defines twenty-one changes of a robot. Eleven changes leave the robot the same.
+After such a change, all links must have the poses that `same` predicts, at random configurations. After any
+other change, the robot differs from the original; only rounding may leave it unchanged. An independent global
+search then looks for the largest distance between a frame of the robot and the corresponding frame of the
+changed robot. The script computes this distance with fifty digits from the decimal numbers in the two URDF
+texts. The distance must lie in the interval of `same`. Exit 1: a distance is outside its interval, or a
+verdict is wrong.
 """
 
 import argparse

@@ -205,7 +205,7 @@ def _motions(asked: MeasuredMotion) -> Iterator[Row]:
     at = asked.mj_data.xpos[asked.body]
     mujoco.mj_jac(asked.mj_model, asked.mj_data, columns[:3], columns[3:], at, asked.body)
     yield (
-        "rows of a Jacobian, from J v",
+        "rows of a Jacobian J, determined from J v",
         which(robot.jacobian(asked.q, "l3") @ asked.v, readings),
         which(pin.getFrameJacobian(*frame, pin.LOCAL_WORLD_ALIGNED) @ asked.v, readings),
         f"`mj_jac`, `jacp` above `jacr`: {which(columns @ asked.v, readings)}",

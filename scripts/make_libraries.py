@@ -5,8 +5,9 @@
 
 Each library gets its own environment outside the repository; docs/libraries.toml states its version. In this
 environment, the library loads small robots with one feature of URDF each (robots/features.toml,
-docs/libraries.toml). urdfkin/verify/adapters.py calls the library. The expected poses are urdfkin's, which
-Pinocchio checks; tests/test_libraries.py compares them with a reader that was written from the URDF standard.
+docs/libraries.toml). urdfkin/verify/adapters.py calls the library. urdfkin computes the expected poses, and
+Pinocchio checks these poses. tests/test_libraries.py compares the expected poses with those of a reader that
+was written from the URDF standard.
 """
 
 import argparse

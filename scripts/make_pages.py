@@ -5,8 +5,8 @@
 
 Run this script after a change of an equation, a finding, a robot or a schema. Tests compare the pages
 with the output of this script. The accuracy study and the enclosures take minutes, so tests check only a part
-of their numbers. The figures of docs/performance.md and its picture are those of docs/performance.json, which
-`python scripts/benchmark.py --json docs/performance.json` writes.
+of their numbers. The tables and the picture of docs/performance.md show the numbers of docs/performance.json.
+`python scripts/benchmark.py --json docs/performance.json` measures these numbers.
 """
 
 import argparse
@@ -58,10 +58,10 @@ FAMILIES = {
 REMARKS = {
     "URDF207": "URDF has no origin in a link; every reader ignores this pose.",
     "URDF405": "A slash in a name is legal; urdfkin does not use names as paths.",
-    "URDF508": "The limits are missing or zero, so samples within them do not move the joint.",
+    "URDF508": "Both limits are zero; missing limits count as zero. Samples do not move the joint.",
     "URDF510": "The value has no effect, as expected.",
-    "URDF527": "A mirrored finger has the limits of the mimicked finger; kinematics applies the mimic rule.",
-    "URDF702": "No body has these moments of inertia; kinematics does not use them.",
+    "URDF527": "The multiplier is -1, but both joints have equal limits; kinematics applies the mimic rule.",
+    "URDF702": "No body can have these moments of inertia; kinematics does not use moments of inertia.",
     "URDF706": "The address of the mesh is wrong, or is a path on another machine; kinematics needs no mesh.",
     "URDF708": "Only a colour is missing.",
 }
@@ -228,7 +228,7 @@ def _of_robots() -> Iterator[tuple[object, ...]]:
                 for p in proofs
                 for part in (p.placement, p.velocity, p.acceleration, p.jacobian, p.jacobian_rate)
             ]
-            # A step is the distance between neighbouring doubles at the larger end of an interval.
+            # A step is the distance between neighbouring doubles at the quantity's largest number.
             ends = [np.maximum(np.abs(part.lower), np.abs(part.upper)).max(initial=1e-300) for part in parts]
             steps = max(
                 float((part.width / np.spacing(end)).max()) for part, end in zip(parts, ends, strict=True)

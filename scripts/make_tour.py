@@ -100,7 +100,7 @@ def integral_of_w(figure: Any) -> None:
     for row, (title, order) in enumerate(cases):
 
         def w(t: float, order: tuple[int, int] = order) -> FloatArray:
-            """Return the angular velocity of a turn of 90 deg in 1 s about one axis, then about another."""
+            """Return the angular velocity: 90 deg/s about one axis for 1 s, then about the other axis."""
             axis: FloatArray = np.eye(3)[order[0 if t < 1.0 else 1]]
             return np.pi / 2 * axis
 

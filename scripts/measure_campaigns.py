@@ -1,8 +1,8 @@
-"""Measure the cost of a campaign: serial, with two processes, with a store, and on a local cluster.
+"""Measure the cost of a validation run: in one process, with stored results, in two processes, in a cluster.
 
     python scripts/measure_campaigns.py ur5 --samples 10000 --rounds 3
     python scripts/measure_campaigns.py --all --samples 1000 --rounds 1 --ways serial,jobs
-    python scripts/measure_campaigns.py --chunk     # compute, store, read and add one chunk of the UR5
+    python scripts/measure_campaigns.py --chunk     # compute, store, read and add one chunk of samples
 
 The variants alternate, so that other load of the machine affects all of them. The script prints medians
 over rounds. Processor time includes all processes, and hardly depends on other load.
@@ -37,15 +37,18 @@ def store(*robots: Any, **how: Any) -> ValidationReport:
 
 
 def cluster(*robots: Any, **how: Any) -> ValidationReport:
-    """Validate with two local Dask workers; the time includes the end of the workers, but not their start."""
+    """Validate with two local Dask workers; print the time without the start and the end of the workers."""
     with connected("local:2") as two:
         validate("planar_two_link", samples=400, executor=two)  # the workers load their modules
         chunks = len(Cut(how["samples"])) * len(robots[0])
         begin, before = time.perf_counter(), time.process_time()
         report = validate(*robots, executor=two, **how)
         own = 1e3 * (time.process_time() - before) / chunks
-        print(f"    {time.perf_counter() - begin:.1f} s without start and end")
-        print(f"    {own:.1f} ms of processor time per chunk in client and scheduler, {chunks} chunks")
+        print(f"    {time.perf_counter() - begin:.1f} s without the start and the end of the workers")
+        print(
+            f"    {own:.1f} ms of processor time in client and scheduler per chunk of samples;"
+            f" {chunks} chunks of samples"
+        )
         return report
 
 
@@ -102,7 +105,7 @@ if __name__ == "__main__":
     parser.add_argument("--samples", type=int, default=10_000)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--ways", default=",".join(WAYS), help=f"default: {','.join(WAYS)}")
-    parser.add_argument("--chunk", action="store_true", help="measure the cost of one chunk")
+    parser.add_argument("--chunk", action="store_true", help="measure the cost of one chunk of samples")
     given = parser.parse_args()
     if given.chunk:
         measure_chunk()

@@ -22,7 +22,7 @@ EXTRAS = ("plots", "view", "xacro", "mujoco", "usd", "descriptions", "cluster")
 def closure(name: str, extras: Iterable[str] = (), without: str = "") -> dict[str, int]:
     """Return the sizes (bytes) of a package and its dependencies.
 
-    The package `without` is left out, and so are the packages that only `without` needs.
+    The result contains neither the package named by `without` nor packages that only this package needs.
     """
     found: dict[str, int] = {}
     seen: set[tuple[str, frozenset[str]]] = set()

@@ -5,11 +5,13 @@
     python scripts/mutate.py --only urdfkin.validation.error_stats:17
     python scripts/mutate.py --named                       the mutants of tests/attacks/named_mutants.toml
 
-The script runs the quick tests near the mutated file. With --slow it then runs the slow tests near this file,
-and with --whole all other quick tests. The script prints every undetected mutant, and skips the mutants
-that docs/mutation.md lists as harmless. In the past, no test detected the named mutants. A named mutant
-replaces a text of a file, and one given test must now fail. Exit 0: all mutants are detected or harmless.
-1: some mutants are not detected, or there is no mutant. 2: a part does not exist.
+The script runs the quick tests that mention the mutated module or belong to its package. If no test fails,
+--slow adds the slow tests of this kind, and --whole adds all other quick tests. The script prints every
+undetected mutant, and skips the mutants that docs/mutation.md lists as harmless. In the past, no test
+detected the named mutants. A named mutant replaces a text of a file, and one given test must now fail.
+
+Exit 0: all mutants are detected or harmless. 1: some mutants are not detected, or there is no mutant. 2: no
+file of the package begins with the given path.
 """
 
 import argparse
@@ -38,7 +40,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = ROOT / "urdfkin", ROOT / "tests"
 _NO_TESTS = 5  # Pytest's exit code if no test was collected.
 _QUICK, _SLOW = "not slow and not browser", "slow and not browser"
-#: Numba compiles the source text of these files, so a changed syntax tree has no effect.
+#: The script mutates syntax trees, but Numba compiles the source text of these files. The script skips them.
 #: tests/laws/test_mutation.py mutates them without the compiler.
 COMPILED = {
     "compiled/machine/kernels.py", "compiled/machine/memory.py", "compiled/machine/numbers.py",
@@ -70,7 +72,7 @@ def _texts() -> dict[Path, str]:
 
 
 def near_tests(path: Path) -> list[str]:
-    """Return tests that mention a module, then tests of its package or of the whole robot."""
+    """Return the tests that mention a module, and the tests of its package (if none: of the whole robot)."""
     package, _, name = module_of(path).rpartition(".")
     named = re.compile(
         rf"\b{re.escape(package)}\.{name}\b(?!\.)|from {re.escape(package)} import .*\b{name}\b"
@@ -122,7 +124,7 @@ class Mutant:
     file: str
     line: int
     what: str  # the text before and after
-    place: str  # the function of the mutant; it identifies the mutant even after other changes of the file
+    place: str  # the function that contains the mutant; unlike `line`, it survives other changes of the file
 
 
 @dataclass(frozen=True)
@@ -219,8 +221,8 @@ def main() -> int:
     option("--seed", type=int, default=0)
     option("--jobs", type=int, default=1)
     option("--timeout", type=float, default=300.0, help="time limit of one mutant's tests in seconds")
-    option("--slow", action="store_true", help="also run the slow tests near the mutated file")
-    option("--whole", action="store_true", help="also run all tests that are not slow")
+    option("--slow", action="store_true", help="also run the slow tests of the mutated module")
+    option("--whole", action="store_true", help="also run all quick tests")
     option("--only", help="run only the mutant with this name")
     option("--named", action="store_true", help="run only the named mutants, each with its own test")
     option("--count", action="store_true", help="print the number of mutants and exit")

@@ -3,10 +3,11 @@
     python scripts/run_exported.py torch robot_torch.py robot_array.py
     python scripts/run_exported.py jax robot_jax.py robot_array.py
 
-The script runs each file's own check. A file of the format `array` runs with the named library. If a file has
-a Hessian, the derivatives of the Jacobian by PyTorch or JAX are compared with the Hessian's true values in
-the file, within the Hessian's bound. For the first file of PyTorch code, the script also compiles the
-functions with `torch.compile`. `scripts/check_exports.py --library` calls this script.
+The first argument names the library, `torch` or `jax`. The script runs each file's own check; files of the
+format `array` use this library. A file with a Hessian contains the Hessian's true values and error bound. The
+library then differentiates the Jacobian, and each difference from these values must lie within the bound. For
+the first file of PyTorch code, the script also compiles the functions with `torch.compile`.
+`scripts/check_exports.py --library` calls this script.
 """
 
 import importlib

@@ -166,7 +166,7 @@ def _share(start: int, stop: int) -> None:
     _here["loop"](out, *inputs)
 
 
-# Inputs and results in another order of rows or coordinates are reordered outside the measured time.
+# Some libraries order rows or coordinates differently. The measured time does not include the reordering.
 
 #: Row order that converts [angular; linear] to [linear; angular].
 LINEAR_FIRST = [3, 4, 5, 0, 1, 2]
@@ -179,16 +179,17 @@ def positions(ours: Sequence[str], theirs: Sequence[str]) -> list[int]:
 
 
 def spread(J: FloatArray, columns: Sequence[int], nv: int) -> FloatArray:
-    """Return `J` (n, 6, m) as an array (n, 6, nv) with the given columns; all other columns are zero."""
+    """Return an array (n, 6, nv): the columns of `J` (n, 6, m) at the indices `columns`, else zeros."""
     full = np.zeros((*J.shape[:-1], nv))
     full[..., list(columns)] = J
     return full
 
 
 def dynibo(subject: Subject, quantity: str) -> Iterator[Calls]:
-    """Yield the calls of dynibo. Its Jacobians have rows [angular; linear] and breadth-first columns.
+    """Yield the calls of dynibo.
 
-    dynibo returns matrices column by column.
+    Its Jacobians have rows [angular; linear] and one column for each joint, in breadth-first order of the
+    joints. dynibo returns matrices column by column.
     """
     import dynibo
 

@@ -43,7 +43,7 @@ _STRUCTURE = (
     *("reparent", "close_a_loop", "swap_names", "rename", "kind_changed", "mimic_added", "element_moved"),
     *("origin_changed", "axis_changed", "limit_changed"),
 )
-#: Mutants of the structure are three times as frequent, because most other mutants are rejected.
+#: `_STRUCTURE` is chosen three times as often as another family, because most other mutants are rejected.
 FAMILIES = (_BYTES, _TOKENS, _ATTRIBUTES, *3 * (_STRUCTURE,))
 _VALUE = re.compile(rb'([\w:]+)\s*=\s*"([^"]*)"')
 _NUMBER = re.compile(rb"-?[0-9]+\.?[0-9]*(?:e-?[0-9]+)?")
