@@ -17,7 +17,7 @@ Entry = Mapping[str, Any]
 _SHARE = "speed, generated code = 1"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
-#: For each section about growth: its title, and the cells of a row.
+#: Title and row format of the sections that vary the number of joints, frames or configurations.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
