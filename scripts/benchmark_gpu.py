@@ -118,7 +118,7 @@ def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
 def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
     found = [json.loads(line) for line in lines]
     if not found or "bandwidth" not in found[0]:
-        raise ValueError("the program printed no bandwidth of the memory")
+        raise ValueError("the compiled program did not print the bandwidth of the GPU's memory")
     functions = {f.name: f for f in code.functions}
     for row in found[1:]:
         a_second = row["n"] / row["s"]
@@ -198,7 +198,7 @@ def main(words: list[str] | None = None) -> int:
     if (compiler := nvcc()) is None:
         return _failed("nvcc is not installed. Install CUDA, or run `make nvcc`.")
     if not given.compile_only and not gpus():
-        return _failed("CUDA's driver finds no GPU here. Run on a machine with one, or use --compile-only.")
+        return _failed("CUDA's driver finds no GPU here. Use a machine with a GPU, or --compile-only.")
     robot = urdfkin.load(given.robot)
     frame = given.frame or robot.tip_frame
     code = code_of_robot(robot, frame, QUANTITIES, "local_world_aligned")

@@ -202,7 +202,7 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         loop, function, refused, array, computed, prepared, method = times(works, rounds).values()
         parts = {
             "Python's call of a method": function - loop,
-            "call of the forward recursion by this method": refused - loop,
+            "call from this method to the forward recursion": refused - loop,
             "forward recursion": computed - refused,
             "rest of the prepared evaluator": prepared - computed - (function - loop),
             "NumPy's new array": array - loop,

@@ -183,7 +183,7 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
         "speed compiled for this robot, 1 thread, Pinocchio's loop = 1": compiled,
         _SHARE: number(ceiling / one) if ceiling else "not measured",
         "fastest other library, ns": f"{best['who']}, {number(best['median_ns'])}",
-        "speed of urdfkin, 1 thread, this library = 1": number(best["median_ns"] / one),
+        "speed of urdfkin, 1 thread, relative to this library": number(best["median_ns"] / one),
     }
 
 
