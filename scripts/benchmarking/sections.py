@@ -138,7 +138,8 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
 
 # The time of a step of a batch is the difference between the times of two kernels. Only one of these kernels
 # has the step's instructions. For a call for one configuration, the benchmark also measures calls that do
-# only a part of the work, such as a call with a rejected argument. Differences of these times are the steps.
+# only a part of the work, such as a call with a rejected argument. The time of a step is a difference of
+# these measured times.
 
 #: The kernel's instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
@@ -249,7 +250,7 @@ def _entry(
 ) -> dict[str, Any]:
     """Return the median time of each step over all rounds.
 
-    In each round, the time of a step is the difference between two times of the same round.
+    The time of a step in a round is computed only from times that were measured in the same round.
     """
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
