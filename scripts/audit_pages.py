@@ -126,7 +126,7 @@ def reports(folder: Path) -> dict[str, Callable[[], str]]:
         return as_html(validate(robots, samples=samples).as_dict())
 
     def disagreement() -> str:
-        """Report disagreements, with Pinocchio's velocities changed by a factor of 1 + 1e-6."""
+        """Make a report with disagreements: Pinocchio's velocities are multiplied by 1 + 1e-6."""
         with patch.object(PinocchioOracle, "velocities", lambda *args: right(*args) * (1.0 + 1e-6)):
             return page(["panda", "ur5"], 6)
 

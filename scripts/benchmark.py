@@ -56,7 +56,7 @@ def document(plan: Plan, sections: Sequence[str], contenders: Sequence[Contender
     """Measure everything; raise DifferenceError if two libraries have different results."""
     name, frame = SUBJECTS[0]
     n, rounds = plan.configurations, plan.rounds
-    ways: dict[str, Iterator[Row]] = {  # A generator measures when its rows are read.
+    ways: dict[str, Iterator[Row]] = {  # Each generator starts its measurements when its first row is read.
         **{name: measured.contest_rows(name, n, contenders, rounds) for name in SECTIONS[:4]},
         "joints": measured.joint_rows(plan.joints, plan.numbers, rounds),
         "frames": measured.frame_rows(plan.frame_configurations, plan.frames, rounds),

@@ -7,13 +7,15 @@ The program first runs the file's test vectors on the GPU; a wrong number ends t
 median of several launches. The share of the memory's bandwidth is the data rate of the code, divided by the
 data rate of a copy in the GPU's memory. A data rate counts the bytes that are read and written.
 
-If PyTorch with CUDA is installed, the program also measures the export for PyTorch, called directly and by
-`torch.compile`. If PyTorch Kinematics is installed, the program also measures its Jacobian. The numbers of
-both libraries are checked before the times are measured.
+If PyTorch with CUDA is installed, the program also measures the code exported for PyTorch, with and without
+`torch.compile`. If PyTorch Kinematics is installed too, the program also measures this library's Jacobian.
+The program checks results of the exported code (without `torch.compile`) and of PyTorch Kinematics before it
+measures their times.
 
 The program needs nvcc, which `make nvcc` installs into the checkout's environment.
 
-Exit 1: a number is outside its bound. 2: no GPU, no nvcc, or the program does not compile.
+The exit code is 1 if a number is outside its error bound. The exit code is 2 if there is no GPU or no nvcc,
+or if the program does not compile.
 """
 
 import argparse
@@ -116,7 +118,7 @@ def compiled(code: FrameCode, folder: Path, compiler: str) -> dict[str, Path]:
 def rows(code: FrameCode, lines: Iterable[str]) -> Iterator[dict[str, Any]]:
     found = [json.loads(line) for line in lines]
     if not found or "bandwidth" not in found[0]:
-        raise ValueError("the program printed no bandwidth of the memory")
+        raise ValueError("the compiled program did not print the bandwidth of the GPU's memory")
     functions = {f.name: f for f in code.functions}
     for row in found[1:]:
         a_second = row["n"] / row["s"]
@@ -164,7 +166,10 @@ def of_torch(robot: Robot, frame: str, code: FrameCode, device: str = "cuda") ->
 
 
 def _chain(robot: Robot, frame: str, device: str) -> Callable[[Any], Any]:
-    """Return PyTorch Kinematics' Jacobian of the path; raise ValueError if it is not that of `robot`."""
+    """Return PyTorch Kinematics' function for the Jacobian of the path from the root to the frame.
+
+    Raise ValueError if its Jacobian differs from the Jacobian that `robot` computes.
+    """
     import pytorch_kinematics
     import torch
 
@@ -193,7 +198,7 @@ def main(words: list[str] | None = None) -> int:
     if (compiler := nvcc()) is None:
         return _failed("nvcc is not installed. Install CUDA, or run `make nvcc`.")
     if not given.compile_only and not gpus():
-        return _failed("CUDA's driver finds no GPU here. Run on a machine with one, or use --compile-only.")
+        return _failed("CUDA's driver finds no GPU here. Use a machine with a GPU, or --compile-only.")
     robot = urdfkin.load(given.robot)
     frame = given.frame or robot.tip_frame
     code = code_of_robot(robot, frame, QUANTITIES, "local_world_aligned")

@@ -3,9 +3,9 @@
 The count states how many files a reader must open to follow such a call. Code that runs while a module is
 imported does not count.
 
-    python scripts/count_files.py               load and same of two robots of this repository
-    python scripts/count_files.py ARM.urdf      load of another file
-    python scripts/count_files.py A.urdf B.urdf load of A, and same of A and B
+    python scripts/count_files.py                # load(A) and same(A, B) for two robots of this repository
+    python scripts/count_files.py A.urdf         # load(A)
+    python scripts/count_files.py A.urdf B.urdf  # load(A) and same(A, B)
 """
 
 import sys

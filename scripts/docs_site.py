@@ -191,7 +191,7 @@ def subject_page(page: str) -> str:
     parts = [f"# {title}", words]
     for name in names.split():
         options = [f"heading: {_short(name)}", f"toc_label: {_short(name).removeprefix('Robot.')}"]
-        # The methods of `Robot` have their own headings, on the pages of their subjects.
+        # The page of a method's subject documents the method, so the entry of `Robot` lists no methods.
         options += ["members: []"] if name == "Robot" else []
         lines = "\n".join(f"      {option}" for option in options)
         parts.append(f"::: {address(name)}\n    options:\n{lines}")

@@ -95,7 +95,10 @@ def imports() -> Mapping[str, frozenset[str]]:
 
 @cache
 def _reexported(package: str) -> frozenset[str]:
-    """Return the names that a package's `__init__` imports; each name hides a submodule of equal name."""
+    """Return the names that a package's `__init__` imports from other modules.
+
+    If a submodule has such a name, `from package import name` returns the object, not the submodule.
+    """
     path = modules().get(package)
     if path is None or path.name != "__init__.py":
         return frozenset()
@@ -132,7 +135,10 @@ _ROW, _LEFT, _TOP, _CELL = 30, 118, 88, 24
 
 
 def picture() -> str:
-    """Draw the packages in order, with a dot for each imported package."""
+    """Draw a row and a column for each package.
+
+    A dot shows that the package of the row imports the package of the column.
+    """
     place = {package.name: number for number, package in enumerate(PACKAGES)}
     width, height = _LEFT + _CELL * len(PACKAGES) + 470, _TOP + _ROW * len(PACKAGES) + 12
     lines = [

@@ -33,7 +33,7 @@ PLAIN = {
     r"\bfollowers?\b": "mimic joint",
     r"\bwhom\b": "name the person or the thing",
     r"\bwhoever\b": "name the person",
-    r"\bnobody\b": "no one; or name what does not happen",
+    r"\bnobody\b": "no one",
     r"\bdoes otherwise\b": "differs",
     r"\bis told (of|by|that)\b": "receives, reports",
     r"\bsays so\b": "reports it, states it",

@@ -10,14 +10,14 @@ usd-exchange contain modules with equal names:
     python -m venv CONVERTER && CONVERTER/bin/pip install urdf-usd-converter
     python scripts/survey_converters.py urdf-usd-converter=CONVERTER/bin/python
 
-With one tool, a row of the table shows the verdict, the largest distance and the largest angle. With several
-tools, a row has one cell for each tool, with the largest distance between the unchanged models; long verdicts
-are printed to standard error. To save time, the bounds are computed without branch and bound, so they may be
-larger.
+With one tool, a row of the table shows the verdict, and bounds on the distance and on the angle between
+matching frames. With several tools, a row has one cell for each tool. The cell shows a short verdict and the
+bound on the distance. The full verdicts are printed to standard error. With several tools, the bounds are
+computed without branch and bound to save time, so they may be larger.
 
 The script removes shapes, because a converter would search for their meshes. MuJoCo refuses a moving body
-without mass, so the script sets options with which MuJoCo gives such a body a small mass and corrects
-impossible inertias.
+without mass. The script therefore sets options of MuJoCo. With these options, MuJoCo gives such a body a
+small mass and corrects impossible inertias.
 """
 
 import argparse
@@ -108,7 +108,7 @@ class RefusalError(Exception):
 
 
 def converted(tool: str, pythons: Mapping[str, str], urdf: Path, folder: Path) -> tuple[Path, Path]:
-    """Return the file that a tool reads for a URDF, and the file that it writes."""
+    """Convert a URDF, and return the paths of the tool's input file and of the tool's output file."""
     reads, program, writes = TOOLS[tool]
     source = converted(reads, pythons, urdf, folder)[1] if reads else urdf
     to = folder / tool.replace(" ", "-")
@@ -148,9 +148,10 @@ def _without_shapes(urdf: str, folder: Path) -> Path:
 
 
 def row_of(tool: str, pythons: Mapping[str, str], robot: urdfkin.Robot) -> tuple[str, str, str]:
-    """Return the verdict, and the largest distance and angle between the models as written.
+    """Return the verdict, and bounds on the distance and the angle between matching frames.
 
-    For a converter from URDF to USD, the largest distance from single precision replaces the angle.
+    The models are compared as they are written. For `urdf-usd-converter`, they are compared after the changes
+    that make them equivalent. The angle is then replaced by the distance that single precision can cause.
     """
     try:
         found = _compared(tool, pythons, robot)

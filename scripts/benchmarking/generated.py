@@ -3,8 +3,8 @@
 CasADi writes the textbook's equations with the robot's constants as straight-line C, without products with 0
 and 1. Each number is a SIMD vector of doubles: several configurations are computed together (`generated.c`).
 The time includes sine, cosine and the transposition of the arrays. The code does not check its inputs: a
-non-finite number, or an angle of a million turns, gives a wrong result. Sine and cosine lack urdfkin's
-correction of the last digit.
+non-finite number, or an angle of a million turns, gives a wrong result. urdfkin corrects the last digit of
+sine and cosine, and this code does not.
 """
 
 import ctypes

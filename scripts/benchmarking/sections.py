@@ -39,8 +39,9 @@ ONE_PASS, ONE_BY_ONE = "urdfkin, all in one pass", "urdfkin, one after the other
 def contest_rows(section: str, n: int, contenders: Sequence[Contender], rounds: int) -> Iterator[Row]:
     """Measure Jacobians and accelerations by all contenders, compared with Pinocchio.
 
-    The sections are `batch`, `single` (calls for one configuration), `checked` (the same calls with a check),
-    and `verified` (batches with a check of all results, of a sample, or of none).
+    The section `batch` measures batches, and `single` measures calls for one configuration. The section
+    `checked` measures urdfkin's calls for one configuration with a check of each result. The section
+    `verified` measures batches with a check of all results, of a sample of the results, or of no result.
     """
     for subject, quantity, table in _contests(section, n):
         what = f"{subject.name}, {'' if section == 'batch' else f'{section} '}{quantity}"
@@ -135,8 +136,10 @@ def frame_rows(n: int, counts: Sequence[int], rounds: int) -> Iterator[Row]:
             yield from measure(table, works, rounds, works[1])
 
 
-# The time of a step of a batch is the difference between a kernel with and without the step's instructions.
-# The steps of a single call are measured by calls that end early, such as a call with rejected arguments.
+# The time of a step of a batch is the difference between the times of two kernels. Only one of these kernels
+# has the step's instructions. For a call for one configuration, the benchmark also measures calls that do
+# only a part of the work, such as a call with a rejected argument. The time of a step is a difference of
+# these measured times.
 
 #: The kernel's instructions for each step of a batch, in the order of the steps.
 PARTS: Mapping[str, frozenset[Op]] = {
@@ -200,7 +203,7 @@ def parts_of_calls(n: int, rounds: int) -> Iterator[dict[str, Any]]:
         loop, function, refused, array, computed, prepared, method = times(works, rounds).values()
         parts = {
             "Python's call of a method": function - loop,
-            "call of the forward recursion by this method": refused - loop,
+            "call from this method to the forward recursion": refused - loop,
             "forward recursion": computed - refused,
             "rest of the prepared evaluator": prepared - computed - (function - loop),
             "NumPy's new array": array - loop,
@@ -233,7 +236,7 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
     for line in (
         "q",  # A line without a call measures the time of the loop.
         f"function({q_v_a}, out=out)",
-        f"compute({q_v_a}, shape)",  # The array check rejects the tuple `shape`.
+        f"compute({q_v_a}, shape)",  # `compute` needs an array as `out`, and rejects a tuple.
         "empty(shape)",
         f"compute({q_v_a}, out)",
         f"fast.{quantity}({q_v_a}, out=out)",
@@ -245,7 +248,10 @@ def _calls(subject: Subject, quantity: str) -> Iterator[Calls]:
 def _entry(
     kind: str, subject: Subject, quantity: str, parts: Mapping[str, FloatArray], total: FloatArray
 ) -> dict[str, Any]:
-    """Return the medians over all rounds; each part is a difference of times from one round."""
+    """Return the median time of each step over all rounds.
+
+    The time of a step in a round is computed only from times that were measured in the same round.
+    """
     medians = {part: round(float(np.median(taken)), 2) for part, taken in parts.items()}
     ns = round(float(np.median(total)), 2)
     return {"kind": kind, "robot": subject.name, "quantity": quantity, "ns": ns, "parts": medians}

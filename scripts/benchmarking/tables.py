@@ -17,7 +17,7 @@ Entry = Mapping[str, Any]
 _SHARE = "speed, generated code = 1"
 NOT_MEASURED = "Not measured yet."
 _SEVERAL = re.compile(r"urdfkin, \d+ threads")
-#: For each section about growth: its title, and the cells of a row.
+#: Title and row format of the sections that vary the number of joints, frames or configurations.
 _GROWTH: dict[str, tuple[str, Callable[[Entry], dict[str, str]]]] = {
     "joints": (
         "chains: the tip's result, one thread",
@@ -183,7 +183,7 @@ def _best(title: str, group: list[Entry]) -> dict[str, str]:
         "speed compiled for this robot, 1 thread, Pinocchio's loop = 1": compiled,
         _SHARE: number(ceiling / one) if ceiling else "not measured",
         "fastest other library, ns": f"{best['who']}, {number(best['median_ns'])}",
-        "speed of urdfkin, 1 thread, this library = 1": number(best["median_ns"] / one),
+        "speed of urdfkin, 1 thread, relative to this library": number(best["median_ns"] / one),
     }
 
 

@@ -183,7 +183,7 @@ def _rows(inputs: Any) -> Any:
 def _function(
     names: Mapping[str, Any], arguments: str, head: str, body: tuple[str, ...]
 ) -> Callable[..., Any]:
-    """Compile a function: the line `head`, the lines `body` below it, and the variables `names`."""
+    """Compile a function: first the line `head`, then the indented lines `body`, which may use `names`."""
     here = {"rows": _rows, **names}
     parameters = ", ".join((arguments, *(f"{name}={name}" for name in here)))
     source = "\n".join([f"def function({parameters}):", f"    {head}", *(f"        {line}" for line in body)])

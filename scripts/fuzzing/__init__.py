@@ -25,7 +25,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The outcome of a test: `word` is one of `GOOD`, or the name of a failure."""
+    """The outcome of a test; `word` is an element of `GOOD` if the test passed, else it names the failure."""
 
     word: str
     details: str = ""

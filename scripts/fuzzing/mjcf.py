@@ -149,7 +149,10 @@ def compiled(data: bytes) -> mujoco.MjModel | None:
 
 
 def difference(robot: Robot, model: mujoco.MjModel, seed: int) -> str | None:
-    """Return a message about a body, a site or a joint coupling that differs from MuJoCo's, or None."""
+    """Return a message about the first difference from MuJoCo, or None if there is no difference.
+
+    The placements of bodies and sites are compared, and the equality constraints are checked.
+    """
     data = mujoco.MjData(model)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     warned = {one.name for one in robot.findings if one.code == "MJCF101" and one.element == "equality"}

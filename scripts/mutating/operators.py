@@ -26,7 +26,10 @@ _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Change:
-    """One mutant: a new value at the index `place` of the list `home`, or in a field of the node `home`."""
+    """One mutant, which puts a new value into the list or syntax node `home`.
+
+    `place` is an index of the list, or the name of a field of the node.
+    """
 
     shown: ast.AST  # The text of this node is printed.
     home: Any
@@ -156,7 +159,7 @@ def _other(value: bool | int | float) -> bool | int | float:
 
 
 def _of_text(node: ast.BinOp | ast.AugAssign) -> bool:
-    """Return whether an operand is a string or None, as in `"a" + b` or `int | None`."""
+    """Return whether an operand is written as a string or as None, as in `"a" + b` or `int | None`."""
     parts = [node.value] if isinstance(node, ast.AugAssign) else [node.left, node.right]
     return any(
         isinstance(part, ast.JoinedStr)

@@ -175,7 +175,7 @@ def test_the_fraction_of_the_bandwidth_counts_the_bytes_of_inputs_and_results() 
     (found,) = benchmark_gpu.rows(written, [json.dumps({"bandwidth": 1.12e9}), json.dumps(row)])
     assert found["a_second"] == pytest.approx(1e6)
     assert found["share"] == pytest.approx(0.1)
-    with pytest.raises(ValueError, match="no bandwidth"):
+    with pytest.raises(ValueError, match="did not print the bandwidth"):
         list(benchmark_gpu.rows(written, [json.dumps(row)]))
 
 
