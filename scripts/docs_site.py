@@ -86,7 +86,7 @@ LIBRARY: dict[str, tuple[str, str, str]] = {
 }
 _FORMULA = re.compile(r"(?:<p>)?\$<code>(.*?)</code>\$(?:</p>)?", re.DOTALL)
 _DISPLAYED = re.compile(r"^```math\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-#: Pattern of a picture with a light and a dark version, in GitHub's notation.
+#: Regular expression for GitHub's markup of an image with a light and a dark version.
 _PICTURE = re.compile(
     r'<picture><source media="[^"]*dark[^"]*" srcset="([^"]+)"><img src="([^"]+)"(.*?)></picture>'
 )

@@ -128,7 +128,7 @@ class ParametricChain:
         return T, columns
 
     def _amounts(self, values: FloatArray, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the angle or length (s, motions) of each motion, and its derivative by the parameter."""
+        """Return the angle or length (s, motions) of each motion, and the derivatives by the parameters."""
         factors = np.empty((len(values), len(self._drives)))
         numbers = np.ones(len(self._drives))
         for k, drive in enumerate(self._drives):

@@ -290,7 +290,7 @@ def command(context: click.Context, /, files: Sequence[str], **options: Any) -> 
       urdfkin check --statistics
       urdfkin check --select URDF503 --fix arm.urdf
       urdfkin explain URDF502
-    """  # noqa: D301  not a raw string, because click needs the backspace to leave the paragraph unwrapped
+    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     if options["fix"] and options["diff"]:
         reject_unused_options(context, ("fix",), "with --diff")
     if not (options["fix"] or options["diff"]):

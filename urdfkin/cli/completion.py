@@ -110,7 +110,7 @@ def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> No
     \b
     Example:
       urdfkin completion bash
-    """  # noqa: D301  not a raw string, because click needs the backspace to leave the paragraph unwrapped
+    """  # noqa: D301  not a raw string: the backspace tells click not to wrap the paragraph
     script = get_completion_class(shell)
     # The script sets the variable _URDFKIN_COMPLETE, so that click prints completions.
     say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())

@@ -184,7 +184,7 @@ def _quantity_in_name(function: str) -> str | None:
 
 
 def _functions(target: str) -> dict[str, Callable[..., object]]:
-    """Return the function FILE.py:FUNCTION, or all functions of FILE.py with a quantity in their names."""
+    """Return the function FILE.py:FUNCTION, or all functions of FILE.py that are named after quantities."""
     path, _, name = target.rpartition(":") if not target.endswith(".py") else (target, "", "")
     if not path.endswith(".py"):
         raise InputError(

@@ -62,7 +62,7 @@ from urdfkin.verify.verifier import as_verify
 #: Number of random configurations at which Pinocchio checks the distances between matching frames.
 CONFIRMED = 8
 #: Maximum number of frames whose upper bound is computed on the finer grid `FINE`.
-#: For the unchanged models, the largest distance is also searched for at most this many frames.
+#: For the unchanged models, also the maximum number of frames whose largest distance is searched.
 FARTHEST = 4
 #: Maximum length (m) of a path from the root to a link; the square of a longer length would overflow.
 LONGEST = 1e150

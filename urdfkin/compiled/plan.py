@@ -332,8 +332,8 @@ class Head(IntEnum):
 LANES = 8
 #: Number of integers for an instruction: the operation, three operands, and the index of its constants.
 WIDTH = 5
-#: Number of integers for a joint angle. The integers are the scratch row of the angle, the scratch row of the
-#: sine, the index of the mimic rule, and a flag. The flag is 1 if the mimic rule changes the angle.
+#: Number of integers that describe a joint angle in a program: the scratch row of the angle, the scratch row
+#: of the sine, the index of the mimic rule, and a flag. The flag is 1 if the mimic rule changes the angle.
 ANGLE_WIDTH = 4
 #: First rows of scratch memory: the number 0, the number 1, results of a frame, a joint angle, other numbers.
 ZERO_ROW, ONE_ROW, OUT_ROW, ANGLE_ROW, FIRST_ROW = 0, 1, 2, 18, 19

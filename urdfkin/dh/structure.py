@@ -347,7 +347,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
 
 
 def _candidate_tables(path: FrameChain) -> Iterator[DHTable]:
-    """Yield an OPW table for each choice of the signs of a1, a2 and b.
+    """Yield a table with OPW parameters (ortho-parallel, wrist) for each choice of the signs of a1, a2 and b.
 
     The lengths in the tables are approximately the arm's lengths.
     """

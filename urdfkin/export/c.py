@@ -143,7 +143,7 @@ def advance(code: FrameCode, function: Function) -> str:
 
 
 class InputLayout:
-    """Order of the array `in`: inputs, angles that are inputs, computed angles, sines, cosines."""
+    """Order of the array `in`: inputs that are no angles, input angles, computed angles, sines, cosines."""
 
     def __init__(self, function: Function) -> None:
         inputs = [node for node in function.nodes if node.op in function.inputs]

@@ -122,7 +122,7 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 
 
 def _without_minus(node: Node) -> Node:
-    """Return x for an expression -x, because no variable stores a negation."""
+    """Return x if the expression is -x; exported code stores x in a variable, and negates x at each use."""
     return node.of[0] if node.op == "neg" else node
 
 

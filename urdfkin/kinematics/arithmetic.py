@@ -1,4 +1,6 @@
-"""Copies of the textbook's equations with other basic operations, for example for NumPy arrays or LaTeX.
+"""Copy the textbook's equations with other definitions of sum, product, sine and other operations.
+
+For example, one copy computes with NumPy arrays, and another copy writes LaTeX.
 
 This module does not import NumPy.
 """

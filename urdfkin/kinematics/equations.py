@@ -188,7 +188,7 @@ def free_angular_acceleration(alpha, w, o, b):
 
 
 def free_acceleration(acc, w, o, u, b):
-    """7.130: acceleration of the link after a joint with linear velocity u and angular velocity o.
+    """7.130: acceleration of a link, whose joint moves with linear velocity u and angular velocity o.
 
     The vector b contains the time derivatives of the components of u.
     """

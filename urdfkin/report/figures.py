@@ -71,7 +71,7 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
     _annotate_left(axes, f"{exact:.0%}" if exact else "", base, 2, fontsize=8)
     _bound(axes, base, checks)
     largest = worst(check["worst"] for check in checks)
-    # A result outside the axis has a mark at the right end of the axis.
+    # A result beyond the range of the plot is drawn as a mark at the plot's right end.
     if largest is None or largest > right:
         text = "✗ not finite" if largest is None else f"✗ {units(largest)} ▸"
         place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}

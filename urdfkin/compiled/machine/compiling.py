@@ -84,7 +84,7 @@ _register: Any = register_pass
 
 class _InlinedLibrary(_Library):  # type: ignore[misc]
     def finalize(self) -> None:
-        """Mark the library as complete without generating machine code."""
+        """Mark the library as complete, but generate no machine code."""
         self._finalize_dynamic_globals()
         self._finalized = True
 

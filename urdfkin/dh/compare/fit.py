@@ -151,7 +151,7 @@ class TargetPoses:
 def tip_derivatives(
     model: TableArrays, targets: TargetPoses, frames: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tip's poses, and their derivatives (twists) with respect to free parameters and cells.
+    """Return the tip's poses, and their derivatives (twists) by the free parameters and the table's cells.
 
     The derivatives have the shapes (6 s, 12 + n) and (6 s, 5 n). The free parameters have 6 columns for the
     base, 6 for the tool, and 1 for each joint offset. Angles are multiplied by the scale.

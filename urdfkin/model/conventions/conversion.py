@@ -315,7 +315,7 @@ class Conversion:
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """Name of each number of v in the target program, and of each column of its Jacobian."""
+        """The target program's name of each element of v, and of each column of the Jacobian."""
         return tuple(rate.name for rate in self._rates)
 
     def layout(self, what: str) -> CoordinateLayout:

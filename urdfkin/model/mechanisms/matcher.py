@@ -290,10 +290,10 @@ class MechanismMatcher:
             found.frames.append(FramePair(link_a, link_b, place.previous, home, end, angle, distance))
 
     def _pair_of_tools(self, place: BodyPair, matched: list[tuple[int, int]]) -> FramePair | None:
-        """Return two links as a pair of different end-effector frames if no links of two bodies match.
+        """Return two links of matched bodies as a pair of different end-effector frames.
 
-        The result is None if links of the two bodies match. The result is also None if every link name of one
-        body occurs in the other model.
+        The result is None if a link of one body already matches a link of the other body. The result is also
+        None if every link name of one body occurs in the other model.
         """
         ours, theirs = self._own_links(place)
         if matched or not ours or not theirs:
@@ -643,7 +643,7 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
 
 def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignment:
     """Exchange the partners of two joint pairs if this is better, as for mirrored arms."""
-    # If a joint has no partner, no exchange can make A and B equal.
+    # A joint that only one model has is a difference, whichever pairs are exchanged.
     if best.only_a or best.only_b:
         return best
     tried, ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_AHEAD)
@@ -732,7 +732,7 @@ class _Rule:
         return (self.constant + self.offset + 2.0 * math.pi * turn - self.d) / self.n
 
     def wanted(self, beta: float) -> float:
-        """Return the zero offset o that gives y = alpha x + beta."""
+        """Return the offset o of the joint's zero for which y = alpha x + beta holds."""
         return self.n * beta + self.d - self.constant
 
     def allows(self, offset: float, tolerance: Tolerance) -> bool:

@@ -479,7 +479,7 @@ class FramePair:
     tool: FloatArray = field(default_factory=lambda: IDENTITY)
 
     def as_tool(self) -> FramePair:
-        """Return a copy in which the two links are different end-effector frames.
+        """Return a copy of the pair that counts the two links as different end-effector frames.
 
         The copy stores the pose of B's link relative to A's link in `tool`, and reports no difference.
         """

@@ -305,7 +305,7 @@ def _product(factor: float, reach: float) -> float:
 
 
 def start_at_frame(frame: FramePair, grid: Grid) -> tuple[Support, Support]:
-    """Return the support functions of d and y at the frame, where the recursion (module docstring) starts."""
+    """Return the start of the recursion (module docstring): the support functions of d and y at the frame."""
     p, end = frame.home[:3, 3], frame.end
     y = end[:3, :3] @ p + end[:3, 3]
     return point(grid, y - p), point(grid, y)
