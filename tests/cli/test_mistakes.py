@@ -95,7 +95,7 @@ MISTAKES = {
     "info panda --joints panda_joint1": "--lock panda_joint4=VALUE",
     "velocity panda --q panda_joint1=30deg,panda_joint4=-pi/2,panda_joint6=1.5": (
         "--q: no value for panda_joint2, panda_joint3, panda_joint5, panda_joint7, panda_finger_joint1; give"
-        " a value for each joint, or begin with a configuration: 'neutral, panda_joint1=...'"
+        " a value for each joint, or begin with 'neutral, panda_joint1=...'"
     ),
     "velocity panda --q raedy": "--q: unknown pose 'raedy'; did you mean ready?",
     "velocity panda --q '0 0 0 0 0 0 0 0 0'": "robot.from_pinocchio(q, mimic=False) converts it to ",

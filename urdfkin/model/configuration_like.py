@@ -154,7 +154,7 @@ with a configuration: 'neutral, elbow=...'
             raise InputError(
                 f"no value for {listed(missing)}",
                 where=where,
-                remedy=f"give a value for each joint, or begin with a configuration: {begin}",
+                remedy=f"give a value for each joint, or begin with {begin}",
             )
         shapes = [x.shape for x in found.values()]
         try:
