@@ -74,7 +74,7 @@ class CoordinateLayout:
         >>> arm.read("elbow=30deg")
         Traceback (most recent call last):
         urdfkin.errors.InputError: q: no value for shoulder; give a value for each joint, or begin \
-with a configuration: 'neutral, elbow=...'
+with 'neutral, elbow=...'
         """
         where = where or self.what
         if not isinstance(value, Mapping) and self._is_in_order(cells := _cells(value)):
