@@ -57,8 +57,8 @@ DEEPEST = 200
 AHEAD = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
-#: If two scores have equally many matches, their largest differences are compared.
-#: A score is better if its difference is less than `TWICE_AS_WELL` times the difference of the other score.
+#: The score with more agreeing links and axes is better.
+#: If the numbers are equal, a score is better if its difference is less than this factor times the other's.
 TWICE_AS_WELL = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
