@@ -626,9 +626,10 @@ def _orders_to_try(
         yield from islice(orders, MOST_ORDERS)
         return
     named = sorted(run, key=called.__getitem__)
-    if list(run) in (named, named[::-1]):
+    if list(run) == named:
         return
-    yield from (order for order in (named, named[::-1]) if b.allows_order(order, tolerance_of(a, b)))
+    others = [order for order in (named, named[::-1]) if order != list(run)]
+    yield from (order for order in others if b.allows_order(order, tolerance_of(a, b)))
 
 
 def _with_zeros_by_rules(best: Alignment) -> Alignment:
