@@ -24,6 +24,7 @@ from urdfkin.report.junit import functions_as_junit
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
+from urdfkin.validation.programs import Program, ProgramError
 from urdfkin.verify.quantities import recursive_quantities
 
 #: Robots with a frame: arms, a quadruped, and grippers with mimic joints.
@@ -408,6 +409,30 @@ def test_a_fault_of_a_program_is_reported_and_the_check_continues(fault: str, tm
     else:
         assert words in data["first_errors"][0]["message"]
     assert data["compared"] >= 10 - 3
+
+
+@pytest.mark.slow
+def test_a_late_line_of_a_program_is_not_the_answer_to_the_next_request(tmp_path: Path) -> None:
+    adapter = tmp_path / "adapter.py"
+    answer = "print(json.dumps(dict(result=robot.jacobian(request['q'], 'tip').tolist())), flush=True)"
+    late = f"if k == 3: print('debug', flush=True); time.sleep(0.5); {answer}; continue"
+    adapter.write_text(ADAPTER.format(fault=late))
+    done = run(
+        *("verify", f"{sys.executable} {adapter}", "planar_two_link", "--program", "--samples", "3"),
+        *("--timeout", "60", "--format", "json"),
+    )
+    assert (done.data["compared"], done.data["errors"]) == (5, 1)
+    assert done.data["share"] <= 1.0
+
+
+def test_a_program_that_answers_with_errors_gets_all_requests() -> None:
+    arm = urdfkin.load("planar_two_link")
+    command = ["sed", "-u", r's/.*"q": *\[ *0.0,.*/{"error": "singular"}/; t; s/.*/{"result": [1]}/']
+    with Program(command, arm, "jacobian", "tip", "local_world_aligned") as program:
+        for _ in range(4):
+            with pytest.raises(ProgramError, match="singular"):
+                program(np.zeros(2))
+        assert program(np.ones(2)) == [1]
 
 
 def test_a_file_named_like_a_library_does_not_replace_the_library_and_requests_have_locked_joints(
