@@ -18,7 +18,7 @@ from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
 from tests.report.test_texts import junit_of
 from tests.robots.odd_urdfs import random_tree
-from tests.urdfs import joint
+from tests.urdfs import built, joint
 from tests.urdfs import robot as robot_text
 from urdfkin.report.junit import functions_as_junit
 from urdfkin.robot import Robot
@@ -353,6 +353,28 @@ def test_a_result_that_is_no_array_of_real_numbers_is_an_error(result: Any, word
     found = check("ur5", "jacobian", lambda q: result(ur5_jacobian(q)))
     assert not found.agrees
     assert words in found.first_errors[0].message
+
+
+def test_a_mistake_that_leaves_two_percent_of_the_difference_is_not_reported() -> None:
+    fixed = [joint(f"to_{x}", "fixed", "arm", f"at_{x}", f'xyz="{x} 0 0"', "") for x in ("0.02", "1")]
+    robot = built(joint("j", "continuous", "base", "arm"), *fixed)
+
+    def at_the_arm(q: np.ndarray) -> np.ndarray:
+        T = robot.placement(q, "arm")
+        T[0, 3] += 5e-4
+        return T
+
+    found = verify_function(at_the_arm, robot, "placement", frame="at_1")
+    assert found.diagnoses == ("the function returns the result of the frame 'arm' instead of 'at_1'",)
+
+
+def test_a_function_that_only_raises_exceptions_has_no_diagnosis() -> None:
+    def refuses_zero(q: np.ndarray) -> np.ndarray:
+        assert q.any(), "zero"
+        return ur5_jacobian(q)
+
+    found = check("ur5", "jacobian", refuses_zero)
+    assert (found.agrees, found.errors, found.diagnoses) == (False, 1, ())
 
 
 def test_a_robot_without_moving_joints_is_compared_and_a_missing_column_of_a_locked_robot_is_named() -> None:
