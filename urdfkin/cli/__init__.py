@@ -32,7 +32,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "info": ("robots", "Show the whole robot: links, joints, limits, frames and coordinates."),
         "order": ("order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
         "view": ("view", "Show a robot in a browser, with a slider for each joint and verified results."),
-        "plot": ("plot", "Plot a frame's motion along a trajectory."),
+        "plot": ("view", "Plot a frame's motion along a trajectory."),
     },
     _COMPUTE: {
         "analytical-jacobian": (
