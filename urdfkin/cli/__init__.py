@@ -30,7 +30,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
         "robots": ("robots", "List the robots of the catalogue, which are loaded by name."),
         "info": ("robots", "Show the whole robot: links, joints, limits, frames and coordinates."),
-        "order": ("order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
+        "order": ("robots", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
         "view": ("view", "Show a robot in a browser, with a slider for each joint and verified results."),
         "plot": ("view", "Plot a frame's motion along a trajectory."),
     },
