@@ -73,7 +73,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "Compare the results of your function or program with those of urdfkin and Pinocchio.",
         ),
         "readers": (
-            "readers",
+            "models",
             "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
         ),
         "vectors": ("vectors", "Write test vectors for other programs: robots and results at 50 digits."),
