@@ -76,7 +76,7 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "models",
             "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
         ),
-        "vectors": ("vectors", "Write test vectors for other programs: robots and results at 50 digits."),
+        "vectors": ("export", "Write test vectors for other programs: robots and results at 50 digits."),
         "report": ("reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
