@@ -84,8 +84,8 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "explain": ("explain", "Explain the code of a finding, an equation, or a common question."),
     },
     "Shell": {
-        "completion": ("completion", "Print a completion script for bash, zsh or fish."),
-        "warm": ("warm", "Compile all kernels in advance, for container images and CI."),
+        "completion": ("shell", "Print a completion script for bash, zsh or fish."),
+        "warm": ("shell", "Compile all kernels in advance, for container images and CI."),
     },
 }
 _QUANTITY = "quantity"

@@ -9,7 +9,6 @@ from typing import Any
 
 import click
 
-from urdfkin.cli.completion import complete_table
 from urdfkin.cli.options import (
     FiniteNumber,
     combine,
@@ -22,6 +21,7 @@ from urdfkin.cli.options import (
     verify_option,
 )
 from urdfkin.cli.output import Answer, report_compilation, writes_answer
+from urdfkin.cli.shell import complete_table
 
 #: Copy of `urdfkin.dh.export.FORMATS`; the import of that module would slow --help down
 FORMATS = (

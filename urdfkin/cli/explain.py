@@ -7,7 +7,7 @@ import textwrap
 
 import click
 
-from urdfkin.cli.completion import complete_topic
+from urdfkin.cli.shell import complete_topic
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.system.files import read_text

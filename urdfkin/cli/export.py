@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.options import (
     FILE,
     frame_option,
@@ -32,6 +31,7 @@ from urdfkin.cli.output import (
     write_output,
     writes_answer,
 )
+from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, SourceError
 from urdfkin.errors.display import Table, TextDocument

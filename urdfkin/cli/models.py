@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.options import (
     FILE,
     NumberInRange,
@@ -25,6 +24,7 @@ from urdfkin.cli.options import (
     source_options,
 )
 from urdfkin.cli.output import TEXTS, Answer, check_writable, report_compilation, writes_answer
+from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_value, json_text
