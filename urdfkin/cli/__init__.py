@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 #: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
-#: A command is the function `command` of its module, or `NAME_command` if the module has several commands.
+#: A command is the function `NAME_command` of its module. `command_of` makes the commands of quantities.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
@@ -88,11 +88,10 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "warm": ("shell", "Compile all kernels in advance, for container images and CI."),
     },
 }
-_QUANTITY = "quantity"
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
-    rows = {name: (_QUANTITY, f"Compute the {row.summary}.") for name, row in by_command().items()}
+    rows = {name: ("quantity", f"Compute the {row.summary}.") for name, row in by_command().items()}
     return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
 
 
@@ -169,10 +168,7 @@ class LazyGroup(click.Group):
         module_name, _ = commands()[cmd_name]
         module = importlib.import_module(f"urdfkin.cli.{module_name}")
         command = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
-        if command is None:
-            is_quantity = module_name == _QUANTITY
-            command = module.command_of(by_command()[cmd_name]) if is_quantity else module.command
-        return cast("click.Command", command)
+        return cast("click.Command", command or module.command_of(by_command()[cmd_name]))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -272,7 +272,7 @@ limit_options = combine(
 @settings_options
 @limit_options
 @click.pass_context
-def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
+def check_command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
     A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard

@@ -187,7 +187,7 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 @form_options
 @verify_option
 @writes_answer(*FORMATS, suffixes=_SUFFIXES)
-def command(robot: str, verify: bool, **options: Any) -> Answer:
+def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
     The path may go down or up the tree of links, or first up and then down. The table has the file's angles

@@ -185,7 +185,7 @@ def _with_quantities(command: _T) -> _T:
 )
 @report_options
 @click.pass_context
-def command(
+def validate_command(
     context: click.Context,
     /,
     robots: tuple[str, ...],
