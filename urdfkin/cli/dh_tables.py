@@ -25,11 +25,11 @@ from urdfkin.dh.compare import (
 from urdfkin.dh.compare import document as comparison_document
 from urdfkin.dh.convert import to_urdf
 from urdfkin.dh.export.data import to_mapping
+from urdfkin.dh.export.text import printed
 from urdfkin.dh.parse_table import published, read_mapping, read_table_or_screws, reference_path, table_of
-from urdfkin.dh.printed import printed, printed_tree
 from urdfkin.dh.rows import last_digits
 from urdfkin.dh.snapping import snap_hint
-from urdfkin.dh.tree_parameters import as_csv, as_mapping, tree_parameters
+from urdfkin.dh.tree_parameters import as_csv, as_mapping, printed_tree, tree_parameters
 from urdfkin.dh.tree_parameters import document as tree_document
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import InputError

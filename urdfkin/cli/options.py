@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from urdfkin.cli.completion import complete_frame, complete_robot
+from urdfkin.cli.shell import complete_frame, complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, QuestionsSection, SourceError
 from urdfkin.errors.numbers import parse_float, parse_int, remedy

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from urdfkin.cli.campaign import progress, warn
-from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.exit import stoppable
 from urdfkin.cli.options import (
     WholeNumber,
@@ -25,6 +24,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import check_writable, console, report_compilation
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
+from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.lazy_import import install_remedy
@@ -185,7 +185,7 @@ def _with_quantities(command: _T) -> _T:
 )
 @report_options
 @click.pass_context
-def command(
+def validate_command(
     context: click.Context,
     /,
     robots: tuple[str, ...],
