@@ -21,7 +21,7 @@ import pytest
 from tests.attacks.test_validation_runs import Refusing
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
-from urdfkin.validation import answer, manifest, results
+from urdfkin.validation import answer, results
 from urdfkin.validation.answer import (
     Answer,
     DamagedError,
@@ -123,7 +123,7 @@ def test_changed_code_reuses_no_result_and_the_digest_covers_all_code_that_compu
     interrupt(tmp_path)
     before = Store.reading(tmp_path, pytest.fail).manifest
     changed = results.provenance() | {"code": "0" * 64}
-    monkeypatch.setattr(manifest, "provenance", lambda: changed)
+    monkeypatch.setattr("urdfkin.validation.store.provenance", lambda: changed)
     with pytest.raises(InputError, match=r"code \w{12} and 000000000000"):
         run_all(tmp_path)
     after = replace(before, provenance=changed)

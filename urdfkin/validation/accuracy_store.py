@@ -17,8 +17,7 @@ from urdfkin.system.documents import typed
 from urdfkin.system.files import read_if_there
 from urdfkin.validation.accuracy import AccuracyStudy
 from urdfkin.validation.answer import DamagedError, pack, unpack
-from urdfkin.validation.manifest import LAYOUT
-from urdfkin.validation.store import STUDY_FILE, STUDY_SUFFIX, Store
+from urdfkin.validation.store import LAYOUT, STUDY_FILE, STUDY_SUFFIX, Store
 from urdfkin.verify.oracles import version
 
 

@@ -25,11 +25,10 @@ from urdfkin.validation.answer import Answer, Failure, failure, unexpected_failu
 from urdfkin.validation.chunk import Cut
 from urdfkin.validation.collector import Progress, ResultCollector
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
-from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport, ValidationReport
 from urdfkin.validation.robot_input import RobotInput, RobotSource, subjects
-from urdfkin.validation.store import Store, open_store
+from urdfkin.validation.store import Manifest, Store, open_store
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.comparison import load_kernels
 from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
