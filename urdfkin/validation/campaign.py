@@ -28,7 +28,7 @@ from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Tas
 from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport, ValidationReport
 from urdfkin.validation.robot_input import RobotInput, RobotSource, subjects
-from urdfkin.validation.store import Manifest, Store, open_store
+from urdfkin.validation.store import AccuracyResult, FailedStudy, Manifest, Store, open_store
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.comparison import load_kernels
 from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
@@ -212,10 +212,6 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
-    if not store.has_study:
-        return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy
-
     if (results := AccuracyResult.of(store)) is None:
         return (), True
     found = [results.found(i) for i, report in enumerate(reports) if report.tallies]

@@ -29,31 +29,42 @@ import socket
 import stat
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, TypeVar
+from typing import IO, TYPE_CHECKING, TypeVar
 
 from urdfkin.errors import InputError, SourceError
-from urdfkin.system.documents import DocumentKind, as_data, parse_json
+from urdfkin.system.documents import DocumentKind, as_data, parse_json, typed
 from urdfkin.system.files import read_bytes, read_if_there
 from urdfkin.urdf.sources import Origin
-from urdfkin.validation.answer import Answer, DamagedError, Failure, decode_answer, encode_answer
+from urdfkin.validation.answer import (
+    Answer,
+    DamagedError,
+    Failure,
+    decode_answer,
+    encode_answer,
+    pack,
+    unpack,
+)
 from urdfkin.validation.chunk import Cut
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput
-from urdfkin.verify.oracles import versions
+from urdfkin.verify.oracles import version, versions
+
+if TYPE_CHECKING:
+    from urdfkin.validation.accuracy import AccuracyStudy
 
 #: Name and version of the layout of a store.
-LAYOUT = "urdfkin-campaign/1"
+_LAYOUT = "urdfkin-campaign/1"
 #: Maximum number of differences between two campaigns that an error lists.
 _SHOWN = 4
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
-#: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
-STUDY_FILE = "accuracy.json"
+#: File with the settings of the accuracy study.
+_STUDY_FILE = "accuracy.json"
 #: Suffix of a file with the accuracy result of a robot.
-STUDY_SUFFIX = ".accuracy"
+_STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: Number of attempts to acquire a lock; the attempts are 0.1 s apart.
@@ -98,18 +109,18 @@ class Manifest:
 
     @cached_property
     def _keys(self) -> list[str]:
-        settings = json.dumps([LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
+        settings = json.dumps([_LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
         return [
             hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
             for robot in self.robots
         ]
 
     def as_json(self) -> bytes:
-        return (json.dumps({"schema": LAYOUT} | as_data(self), indent=1) + "\n").encode()
+        return (json.dumps({"schema": _LAYOUT} | as_data(self), indent=1) + "\n").encode()
 
     @classmethod
     def from_json(cls, content: bytes, where: str) -> Manifest:
-        layout = DocumentKind(LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
+        layout = DocumentKind(_LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
         return layout.checked(parse_json(content, where), where)
 
     def differences(self, other: Manifest) -> list[str]:
@@ -180,7 +191,7 @@ class Store:
 
     @property
     def has_study(self) -> bool:
-        return (self.folder / STUDY_FILE).exists()
+        return (self.folder / _STUDY_FILE).exists()
 
     def write_entry(self, key: str, kind: str, data: bytes) -> None:
         self._write(self._place(key, kind), data)
@@ -198,7 +209,7 @@ class Store:
         )
         expected = {self._place(key, kind) for key in keys for kind in (_DONE, _FAILED)}
         for place in sorted((self.folder / _CHUNKS).glob("*/*")):
-            if place not in expected and place.suffix != STUDY_SUFFIX:
+            if place not in expected and place.suffix != _STUDY_SUFFIX:
                 self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:
@@ -413,3 +424,104 @@ def _holder(file: IO[bytes]) -> str:
         return f"process {int(data['process'])} on {data['host']}"
     except (OSError, ValueError, KeyError, TypeError):
         return "an unknown process"
+
+
+# -- results of the accuracy study ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class FailedStudy:
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class StudySettings:
+    """Settings of the accuracy study; `moving_base` gives each root link a random motion."""
+
+    samples: int
+    seed: int
+    moving_base: bool
+
+    @property
+    def options(self) -> str:
+        moving = " --accuracy-moving-base" if self.moving_base else ""
+        return f"--accuracy-samples {self.samples} --seed {self.seed}{moving}"
+
+
+class AccuracyResult:
+    def __init__(self, store: Store, settings: StudySettings) -> None:
+        self._store, self._settings = store, settings
+
+    @classmethod
+    def merge(cls, store: Store, others: Sequence[Store]) -> None:
+        theirs = [results for results in map(cls.of, others) if results is not None]
+        if not theirs:
+            return
+        own = cls.of(store) or cls(store, theirs[0]._settings)
+        for results in theirs:
+            own._check_same(results)
+        own.begin()
+        for results in theirs:
+            for robot in range(len(store.manifest.robots)):
+                if own.found(robot) is None and (found := results.found(robot)) is not None:
+                    own.keep(robot, found)
+
+    @classmethod
+    def of(cls, store: Store) -> AccuracyResult | None:
+        """Return the results in a store; None if there are none, or the settings are unreadable."""
+        try:
+            if (content := read_if_there(store.folder / _STUDY_FILE)) is None:
+                return None
+            settings = typed(json.loads(content), StudySettings)
+        except (OSError, ValueError, RecursionError) as error:
+            store.tell(
+                f"{store.folder / _STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
+                " accuracy results"
+            )
+            return None
+        return cls(store, settings)
+
+    def begin(self) -> None:
+        self._store.write(_STUDY_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
+
+    def found(self, robot: int) -> AccuracyStudy | FailedStudy | None:
+        return self._store.entry(self._key(robot), _STUDY_SUFFIX, _decode)
+
+    def has(self, robot: int) -> bool:
+        return self._store.has(self._key(robot), _STUDY_SUFFIX)
+
+    def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
+        key = self._key(robot)
+        self._store.write_entry(key, _STUDY_SUFFIX, pack(key, {"accuracy": found}))
+
+    def stamp(self, robot: int) -> str:
+        """Return the sha256 of the robot's text."""
+        return self._store.manifest.robots[robot][1]
+
+    def _check_same(self, other: AccuracyResult) -> None:
+        if other._settings != self._settings:
+            raise InputError(
+                "the accuracy results in the two folders were computed with different options",
+                where=str(other._store.folder),
+                found=f"{other._settings.options}, and {self._settings.options} in {self._store.folder}",
+                remedy="run the accuracy study with the same options for both folders",
+            )
+
+    def _key(self, robot: int) -> str:
+        manifest = self._store.manifest
+        origin, stamp = manifest.robots[robot]
+        origin = replace(origin, oracle=None)  # The study uses no second oracle.
+        parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), stamp]
+        return hashlib.sha256(json.dumps([_LAYOUT, "accuracy", *parts], sort_keys=True).encode()).hexdigest()
+
+
+def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
+    from urdfkin.validation.accuracy import AccuracyStudy
+
+    data = unpack(key, content).get("accuracy")
+    try:
+        if isinstance(data, dict) and "reason" in data:
+            return typed(data, FailedStudy)
+        return typed(data, AccuracyStudy)
+    except ValueError as error:
+        raise DamagedError(f"not an accuracy result of urdfkin ({error})") from error
