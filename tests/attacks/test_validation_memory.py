@@ -18,7 +18,7 @@ from urdfkin.validation import chunk as chunk_module
 from urdfkin.validation import memory
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import chunks, run_chunk
-from urdfkin.validation.outcome import ValidationVerdict
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.robot_input import subject
 from urdfkin.verify.pinocchio import PinocchioOracle
 

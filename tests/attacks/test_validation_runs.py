@@ -18,8 +18,8 @@ from urdfkin.errors import UrdfkinError
 from urdfkin.validation import answer, engines, worker_processes
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
+from urdfkin.validation.document import ValidationVerdict, outcome
 from urdfkin.validation.engines import ExecutorEngine, SerialEngine, Task
-from urdfkin.validation.outcome import ValidationVerdict, outcome
 from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.robot_input import subject
 

@@ -34,8 +34,8 @@ from urdfkin.validation.answer import (
 from urdfkin.validation.campaign import StoreWarning, chunks_of_shard, stored, validate
 from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
 from urdfkin.validation.collector import CampaignProgress, ResultCollector
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import subject
 from urdfkin.validation.store import Store
 

@@ -24,8 +24,8 @@ from urdfkin.validation import memory
 from urdfkin.validation.answer import Answer, Failure, failure, unexpected_failure
 from urdfkin.validation.chunk import Cut
 from urdfkin.validation.collector import Progress, ResultCollector
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport, ValidationReport
 from urdfkin.validation.robot_input import RobotInput, RobotSource, subjects
 from urdfkin.validation.store import AccuracyResult, FailedStudy, Manifest, Store, open_store
