@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import urdfkin
+from tests.attacks.test_validation_runs import chunks
 from tests.cli.running import python
 from tests.urdfs import chain, joint, limit
 from urdfkin.compiled import evaluate
@@ -17,7 +18,7 @@ from urdfkin.errors import OracleError
 from urdfkin.validation import chunk as chunk_module
 from urdfkin.validation import memory
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import chunks, run_chunk
+from urdfkin.validation.chunk import run_chunk
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.robot_input import subject
 from urdfkin.verify.pinocchio import PinocchioOracle

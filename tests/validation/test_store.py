@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.attacks.test_validation_runs import Refusing
+from tests.attacks.test_validation_runs import Refusing, chunks
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
 from urdfkin.validation import answer, results
@@ -32,7 +32,7 @@ from urdfkin.validation.answer import (
     unpack,
 )
 from urdfkin.validation.campaign import StoreWarning, chunks_of_shard, stored, validate
-from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
+from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, run_chunk
 from urdfkin.validation.collector import CampaignProgress, ResultCollector
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task

@@ -171,11 +171,6 @@ class Cut:
         return random + (SPECIAL if chunks.start == 0 else 0)
 
 
-def chunks(subject: RobotInput, samples: int, seed: int) -> Iterator[Chunk]:
-    cut = Cut(samples)
-    return (cut.chunk(subject, seed, index) for index in range(len(cut)))
-
-
 @dataclass(frozen=True, slots=True)
 class SecondOracleModel:
     library: OracleLibrary
