@@ -1,4 +1,4 @@
-"""Export the catalogue's leaf frames to C, NumPy and arrays, compile the C code, and run the test vectors.
+"""Export example-robot-data's leaf frames to C, NumPy and arrays, compile the C code, run the test vectors.
 
     python scripts/check_exports.py --keep leaves.jsonl         # every leaf; continues a stopped run
     python scripts/check_exports.py --ways array --keep array.jsonl  # every leaf, in some languages only

@@ -1,4 +1,4 @@
-"""Export the catalogue's tables in every format, run the exported code, and compare it with Pinocchio.
+"""Export example-robot-data's tables in every format, run the exported code, and compare it with Pinocchio.
 
     python scripts/check_forms.py                      # the tip of every robot, standard and modified
     python scripts/check_forms.py --leaves             # every leaf of every robot

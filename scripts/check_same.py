@@ -32,7 +32,7 @@ from tests.comparison.searching import far, searched
 from urdfkin.comparison.result import Verdict
 from urdfkin.urdf.catalogue import catalogue
 
-#: Maximum rounding error of a placement in a robot of a few metres (m, and entries of a rotation matrix).
+#: Maximum rounding error of a placement: of its position in metres, and of an entry of its rotation matrix.
 ROUNDING = 1e-10
 
 

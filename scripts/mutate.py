@@ -8,7 +8,7 @@
 The script runs the quick tests that mention the mutated module or belong to its package. If no test fails,
 --slow adds the slow tests of this kind, and --whole adds all other quick tests. The script prints every
 undetected mutant, and skips the mutants that docs/mutation.md lists as harmless. In the past, no test
-detected the named mutants. A named mutant replaces a text of a file, and one given test must now fail.
+detected the named mutants. A named mutant replaces code of one function, and one given test must now fail.
 
 Exit 0: all mutants are detected or harmless. 1: some mutants are not detected, or there is no mutant. 2: no
 file of the package begins with the given path.
@@ -93,15 +93,26 @@ def near_tests(path: Path) -> list[str]:
 @dataclass(frozen=True)
 class Named:
     claim: str  # the mistake that must be detected
-    module: str  # the module, such as `urdfkin.validation.error_stats`
-    before: str  # a text that occurs exactly once in the module
-    after: str  # the text that replaces `before`
+    function: str  # such as `urdfkin.dh.snapping.snap_report`; a module for code outside functions
+    before: str  # code that occurs exactly once in the function
+    after: str  # the code that replaces `before`
     test: str  # the test that fails with the mutant and passes without it
 
     @property
     def file(self) -> Path:
-        path = ROOT / self.module.replace(".", "/")
-        return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        """The file of the innermost module whose name begins the name of the function."""
+        path = ROOT
+        for name in self.function.split("."):
+            if not (path / name).is_dir():
+                module = path / f"{name}.py"
+                return module if module.is_file() else path / "__init__.py"
+            path /= name
+        return path / "__init__.py"
+
+    @property
+    def change(self) -> tuple[str, str, str]:
+        """The function's name in the file, the code, and its replacement: the arguments of `replaced`."""
+        return self.function[len(module_of(self.file)) + 1 :], self.before, self.after
 
 
 def named_mutants() -> list[Named]:
@@ -163,12 +174,12 @@ def evaluate(mutant: Mutant, *, timeout: float, slow: bool = False, whole: bool 
 
 
 def evaluate_named(named: Named, *, timeout: float) -> Outcome:
-    texts = json.dumps([named.before, named.after])
-    word, by = _run({"URDFKIN_MUTANT": named.module, "URDFKIN_MUTANT_TEXTS": texts}, [named.test], timeout)
+    change = {"URDFKIN_MUTANT": module_of(named.file), "URDFKIN_MUTANT_CODE": json.dumps(named.change)}
+    word, by = _run(change, [named.test], timeout)
     if word == "noticed" and not by.startswith(f"FAILED {named.test}"):
         word = "not run"  # The test failed, but not because of the mutant.
     file = named.file.relative_to(ROOT).as_posix()
-    mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.module)
+    mutant = Mutant(named.claim, file, 0, f"{named.before}  ->  {named.after}", named.function)
     return Outcome(mutant, word, by)
 
 
@@ -233,7 +244,7 @@ def main() -> int:
         parser.error(str(error))
     asks: list[Callable[[], Outcome]]
     if options.named:
-        named = [one for one in named_mutants() if not options.parts or one.module in modules]
+        named = [one for one in named_mutants() if not options.parts or module_of(one.file) in modules]
         asks = [partial(evaluate_named, one, timeout=options.timeout) for one in named]
     else:
         chosen = [mutant for mutant in mutants(options.parts) if options.only in (None, mutant.name)]

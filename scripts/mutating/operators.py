@@ -5,7 +5,7 @@ Texts, types and compiled kernels are not mutated.
 
 import ast
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -21,6 +21,7 @@ _OPERATIONS: dict[type[ast.operator], type[ast.operator]] = {
 _STATEMENTS: dict[type[ast.stmt], type[ast.stmt]] = {
     ast.Raise: ast.Pass, ast.Continue: ast.Break, ast.Break: ast.Continue,
 }  # fmt: skip
+_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 _NAMES = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
@@ -79,8 +80,8 @@ def mutated(source: str, number: int) -> ast.Module:
 
 @lru_cache(maxsize=1)
 def _definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef]:
-    kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-    return sorted((node for node in ast.walk(tree) if isinstance(node, kinds)), key=lambda node: node.lineno)
+    found = (node for node in ast.walk(tree) if isinstance(node, _DEFINITIONS))
+    return sorted(found, key=lambda node: node.lineno)
 
 
 def function_at(tree: ast.Module, line: int) -> str:
@@ -88,11 +89,64 @@ def function_at(tree: ast.Module, line: int) -> str:
     return ".".join(node.name for node in _definitions(tree) if node.lineno <= line <= (node.end_lineno or 0))
 
 
-def rewritten(source: str, before: str, after: str) -> ast.Module:
-    """Return a file's tree with one text replaced; raise ValueError unless it occurs exactly once."""
-    if source.count(before) != 1:
-        raise ValueError(f"found {source.count(before)} times: {before}")
-    return ast.parse(source.replace(before, after))
+def replaced(source: str, function: str, before: str, after: str) -> ast.Module:
+    """Return a file's tree in which one piece of the code of a function is replaced.
+
+    `function` names a function, a class or a method, such as `Tally.percentile`; "" is the whole file.
+    `before` and `after` are expressions, keyword arguments, or statements. Line breaks, brackets and comments
+    do not matter. Raise ValueError unless `before` occurs exactly once in the function.
+    """
+    tree = ast.parse(source)
+    wanted = [[ast.unparse(node) for node in nodes] for nodes in _readings(before)]
+    found = [
+        (node, field, at, len(texts))
+        for node in ast.walk(_definition(tree, function))
+        for field, value in ast.iter_fields(node)
+        for nodes in [value if isinstance(value, list) else [value]]
+        for texts in wanted
+        for at in range(len(nodes))
+        if [ast.unparse(x) for x in nodes[at : at + len(texts)] if isinstance(x, ast.AST)] == texts
+    ]
+    if len(found) != 1:
+        raise ValueError(f"found {len(found)} times in {function or 'the file'}: {before}")
+    (node, field, at, size), *_ = found
+    old = getattr(node, field)
+    if isinstance(old, list):
+        old[at : at + size] = _parsed(after, type(old[at]))
+    else:
+        setattr(node, field, _parsed(after, type(old))[0])
+    return ast.fix_missing_locations(tree)
+
+
+def _definition(tree: ast.Module, function: str) -> ast.AST:
+    node: ast.AST = tree
+    for name in filter(None, function.split(".")):
+        inner = (x for x in ast.walk(node) if isinstance(x, _DEFINITIONS) and x.name == name)
+        if (node := next(inner, None)) is None:  # type: ignore[assignment]
+            raise ValueError(f"the file has no function {function}")
+    return node
+
+
+def _readings(code: str) -> list[list[ast.AST]]:
+    """Return the readings of a piece of code: an expression; or else statements and keyword arguments."""
+    readings = []
+    for kinds in ((ast.expr,), (ast.stmt, ast.keyword)):
+        for kind in kinds:
+            with suppress(SyntaxError):
+                readings.append(_parsed(code, kind))
+        if any(readings):
+            return readings
+    raise ValueError(f"not code: {code}")
+
+
+def _parsed(code: str, kind: type) -> list[ast.AST]:
+    """Parse code into expressions, keyword arguments or statements, as `kind` is a class of one of these."""
+    if issubclass(kind, ast.stmt):
+        return [*ast.parse(code).body]
+    if issubclass(kind, ast.expr):
+        return [ast.parse(code, mode="eval").body]
+    call: Any = ast.parse(f"f({code})", mode="eval").body
+    return [*call.keywords]
 
 
 def _code(node: ast.AST) -> Iterator[ast.AST]:

@@ -1,23 +1,20 @@
 """Mutants that no test detected once: each runs in its own process, and its test must fail."""
 
+import ast
 from pathlib import Path
 
 import pytest
 
 from scripts.mutate import ROOT, Named, evaluate_named, named_mutants
-from scripts.mutating.operators import rewritten
+from scripts.mutating.operators import replaced
 
 MUTANTS = named_mutants()
-
-
-def _source(mutant: Named) -> str:
-    return mutant.file.read_text(encoding="utf-8")
 
 
 def test_every_listed_mutant_can_be_made_and_names_an_existing_test() -> None:
     assert len({mutant.claim for mutant in MUTANTS}) == len(MUTANTS)
     for mutant in MUTANTS:
-        rewritten(_source(mutant), mutant.before, mutant.after)
+        replaced(mutant.file.read_text(encoding="utf-8"), *mutant.change)
         file, _, name = mutant.test.partition("::")
         assert f"def {name}(" in Path(ROOT / file).read_text(encoding="utf-8"), mutant.test
 
@@ -29,7 +26,29 @@ def test_the_named_test_of_each_listed_mutant_fails(mutant: Named) -> None:
     assert outcome.word == "noticed", outcome.by
 
 
-def test_a_mutant_of_a_text_that_does_not_occur_exactly_once_is_an_error() -> None:
-    for text in ("x = 1\nx = 1\n", "y = 2\n"):
+def test_a_mutant_of_code_that_does_not_occur_exactly_once_in_its_function_is_an_error() -> None:
+    for text in ("def f():\n    x = 1\n    x = 1\n", "def f():\n    y = 2\ndef g():\n    x = 1\n"):
         with pytest.raises(ValueError, match=r"found \d times"):
-            rewritten(text, "x = 1", "x = 2")
+            replaced(text, "f", "x = 1", "x = 2")
+    with pytest.raises(ValueError, match="no function h"):
+        replaced(text, "h", "x = 1", "x = 2")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "expected"),
+    [
+        ("x + 1", "x - 1", "g(x - 1, key=2)"),  # an expression
+        ("key=2", "key=3", "g(x + 1, key=3)"),  # a keyword argument
+        ("key=2", "", "g(x + 1)"),
+        ("g(x + 1, key=2)", "x", "x"),
+    ],
+)
+def test_a_mutant_replaces_code_however_it_is_written(before: str, after: str, expected: str) -> None:
+    body = "    def f(self, x):\n        return g(\n            (x +  1), key=2,  # comment\n        )\n"
+    expected = f"class A:\n\n    def f(self, x):\n        return {expected}"
+    assert ast.unparse(replaced(f"class A:\n{body}", "A.f", before, after)) == expected
+
+
+def test_a_mutant_replaces_one_statement_by_several() -> None:
+    found = replaced("def f(x):\n    x = 1\n    return x\n", "f", "x = 1", "y = 1\nx = y")
+    assert ast.unparse(found) == "def f(x):\n    y = 1\n    x = y\n    return x"

@@ -164,6 +164,13 @@ def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_re
     assert SECRET in expanded(inside)
 
 
+def test_the_package_xml_of_another_folder_is_not_read(expanded: Expand, secret: Path) -> None:
+    manifest = secret.parent / ".hidden" / "package.xml"
+    manifest.parent.mkdir()
+    manifest.write_text(f'<robot xmlns:xacro="http://www.ros.org/wiki/xacro">{link(SECRET)}</robot>')
+    refused(expanded, f'<xacro:include filename="{manifest}"/>')
+
+
 def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path, secret: Path) -> None:
     hidden = tmp_path / "robot" / "urdf" / ".git" / "config"
     hidden.parent.mkdir(parents=True)

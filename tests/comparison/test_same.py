@@ -207,6 +207,20 @@ def test_prismatic_joints_with_equal_names_are_not_reordered(monkeypatch: pytest
     assert tried == [tuple("abcd"), tuple("dcba")]  # the order in A, and the reverse order
 
 
+@pytest.mark.parametrize("order", ["yx", "zyx", "yzx"])
+def test_prismatic_joints_with_equal_names_may_have_another_order_in_b(order: str) -> None:
+    axes = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+
+    def gantry(names: Sequence[str], links: str) -> Robot:
+        bodies = ["base", *(f"{links}{i}" for i in range(len(names) - 1)), "tool"]
+        sides = zip(names, bodies, bodies[1:], strict=False)
+        parts = [joint(n, "prismatic", p, c, "", axes[n], limit(0, 0.3)) for n, p, c in sides]
+        return built(*parts, verify=False)
+
+    found = urdfkin.same(gantry(sorted(order), "a"), gantry(order, "b"), bounds=False)
+    assert found.verdict is Verdict.SAME, found.differences
+
+
 @pytest.mark.parametrize("compared", [urdfkin.same, urdfkin.diff])
 def test_a_robot_with_an_overflowing_square_of_a_length_is_refused(compared: Any) -> None:
     joints = (joint("j", "fixed", "a", "b", f'xyz="0 0 {z}"', axis="") for z in ("1", "1e308"))

@@ -326,6 +326,15 @@ def test_a_wrong_sign_is_named_despite_a_smaller_difference() -> None:
     assert 5e-4 < found.mistakes[0].metres < 2e-3
 
 
+def test_without_a_fit_wrong_units_are_named_only_if_a_fit_does_not_suffice(tmp_path: Path) -> None:
+    text, file = reference_path("ur5").read_text(), tmp_path / "table.toml"
+    file.write_text(text.replace("d = 0.089159", "d = 0.099159"))
+    lower = run("ur5", "--compare", str(file), "--no-fit")
+    assert (lower.code, "hint:" in lower.text) == (1, False)
+    file.write_text('lengths = "millimetres"\n' + text)
+    assert "when it is read as metres" in run("ur5", "--compare", str(file), "--no-fit").text
+
+
 def test_the_command_exits_with_1_for_a_wrong_sign_and_names_the_correction(tmp_path: Path) -> None:
     file = tmp_path / "mistake.toml"
     file.write_text(reference_path("ur5").read_text().replace("d = 0.10915", "d = -0.10915"))

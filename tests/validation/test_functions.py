@@ -18,12 +18,13 @@ from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
 from tests.report.test_texts import junit_of
 from tests.robots.odd_urdfs import random_tree
-from tests.urdfs import joint
+from tests.urdfs import built, joint
 from tests.urdfs import robot as robot_text
 from urdfkin.report.junit import functions_as_junit
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
+from urdfkin.validation.programs import Program, ProgramError
 from urdfkin.verify.quantities import recursive_quantities
 
 #: Robots with a frame: arms, a quadruped, and grippers with mimic joints.
@@ -354,6 +355,28 @@ def test_a_result_that_is_no_array_of_real_numbers_is_an_error(result: Any, word
     assert words in found.first_errors[0].message
 
 
+def test_a_mistake_that_leaves_two_percent_of_the_difference_is_not_reported() -> None:
+    fixed = [joint(f"to_{x}", "fixed", "arm", f"at_{x}", f'xyz="{x} 0 0"', "") for x in ("0.02", "1")]
+    robot = built(joint("j", "continuous", "base", "arm"), *fixed)
+
+    def at_the_arm(q: np.ndarray) -> np.ndarray:
+        T = robot.placement(q, "arm")
+        T[0, 3] += 5e-4
+        return T
+
+    found = verify_function(at_the_arm, robot, "placement", frame="at_1")
+    assert found.diagnoses == ("the function returns the result of the frame 'arm' instead of 'at_1'",)
+
+
+def test_a_function_that_only_raises_exceptions_has_no_diagnosis() -> None:
+    def refuses_zero(q: np.ndarray) -> np.ndarray:
+        assert q.any(), "zero"
+        return ur5_jacobian(q)
+
+    found = check("ur5", "jacobian", refuses_zero)
+    assert (found.agrees, found.errors, found.diagnoses) == (False, 1, ())
+
+
 def test_a_robot_without_moving_joints_is_compared_and_a_missing_column_of_a_locked_robot_is_named() -> None:
     robot = urdfkin.load(robot_text(joint("j", "fixed", "a", "b", 'xyz="1 0 0"', "")))
     assert verify_function(lambda q: np.zeros((6, 0)), robot, "jacobian", samples=3).agrees
@@ -408,6 +431,30 @@ def test_a_fault_of_a_program_is_reported_and_the_check_continues(fault: str, tm
     else:
         assert words in data["first_errors"][0]["message"]
     assert data["compared"] >= 10 - 3
+
+
+@pytest.mark.slow
+def test_a_late_line_of_a_program_is_not_the_answer_to_the_next_request(tmp_path: Path) -> None:
+    adapter = tmp_path / "adapter.py"
+    answer = "print(json.dumps(dict(result=robot.jacobian(request['q'], 'tip').tolist())), flush=True)"
+    late = f"if k == 3: print('debug', flush=True); time.sleep(0.5); {answer}; continue"
+    adapter.write_text(ADAPTER.format(fault=late))
+    done = run(
+        *("verify", f"{sys.executable} {adapter}", "planar_two_link", "--program", "--samples", "3"),
+        *("--timeout", "60", "--format", "json"),
+    )
+    assert (done.data["compared"], done.data["errors"]) == (5, 1)
+    assert done.data["share"] <= 1.0
+
+
+def test_a_program_that_answers_with_errors_gets_all_requests() -> None:
+    arm = urdfkin.load("planar_two_link")
+    command = ["sed", "-u", r's/.*"q": *\[ *0.0,.*/{"error": "singular"}/; t; s/.*/{"result": [1]}/']
+    with Program(command, arm, "jacobian", "tip", "local_world_aligned") as program:
+        for _ in range(4):
+            with pytest.raises(ProgramError, match="singular"):
+                program(np.zeros(2))
+        assert program(np.ones(2)) == [1]
 
 
 def test_a_file_named_like_a_library_does_not_replace_the_library_and_requests_have_locked_joints(

@@ -57,7 +57,7 @@ from urdfkin.verify.certificate import Certificate
 
 #: Number of random configurations for `Calibration.general`.
 _GENERAL = 40
-#: Number of standard deviations between residuals and stated noise above which a warning is given.
+#: A warning is given if the residuals differ from the stated noise by more standard deviations than this.
 _UNLIKELY = 4.0
 #: Ratio of uncertainties (`Calibration.weak`) above which a parameter is poorly observable.
 _WEAK = 10.0

@@ -1,4 +1,4 @@
-"""Complete commands, options, robots, files, frames, tables, finding codes and equation numbers in a shell.
+"""Shell completion of commands, options, robots, files, frames, tables, finding codes and equation numbers.
 
 Completion runs at each press of the Tab key, so completion imports no large package. A name in a malicious
 file, such as `$(...)`, could make the shell run a command. Completion therefore offers only names without

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -20,6 +20,7 @@ from urdfkin.dh.compare import (
     compare,
     convention_that_fits,
     diagnose,
+    fast_fit_errors,
 )
 from urdfkin.dh.compare import document as comparison_document
 from urdfkin.dh.convert import to_urdf
@@ -33,6 +34,7 @@ from urdfkin.dh.tree_parameters import document as tree_document
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Strong, TextDocument
+from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import draw
 from urdfkin.robot import Robot
 from urdfkin.system.files import at_home
@@ -219,7 +221,7 @@ def _compare(request: DHRequest, name: str) -> Answer:
             error.remedy = f"{error.remedy}; {mistake}" if error.remedy else str(mistake)
         raise
     found = compare(chain, reference, tolerance, fit=request.fit, digits=last_digits(data))
-    mistake = None if found.agrees or found.mistakes else diagnose(chain, data, tolerance, found.metres)
+    mistake = _better_interpretation(chain, data, reference, found)
     if request.format_ == "json":
         text = json.dumps(_comparison(found, reference, mistake), indent=2, allow_nan=False) + "\n"
     else:
@@ -228,6 +230,20 @@ def _compare(request: DHRequest, name: str) -> Answer:
         parts = [*notes, Strong(document.title), *document.parts, *hints]
         text = TextDocument("", parts).written(request.format_)
     return _answer(request, text, 0 if found.passes else 1)
+
+
+def _better_interpretation(
+    chain: FrameChain, data: Mapping[str, Any], reference: DHTable, found: TableComparison
+) -> BetterInterpretation | None:
+    if found.agrees or found.mistakes:
+        return None
+    metres = found.metres
+    if not found.fitted:
+        # `diagnose` fits every interpretation, so the interpretation of the file is fitted too.
+        metres, radians = fast_fit_errors(chain, reference, found.tolerance)
+        if max(metres, radians * found.reach) <= found.tolerance:
+            return None
+    return diagnose(chain, data, found.tolerance, metres)
 
 
 def _frame_of_robot(request: DHRequest, name: object) -> str | None:

@@ -48,7 +48,8 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--strict",
     is_flag=True,
-    help="Also exit 1 if the models are equivalent but not the same, or if their joint limits differ.",
+    help="Also exit 1 if the models are equivalent but not the same, or have differences without effect on"
+    " motion, such as limits, or links that only one model has.",
 )
 @click.option(
     "--within",
@@ -113,9 +114,9 @@ def same_command(
     rounding of its numbers to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
-    1: the models are different. With --strict, also 1 if the models are equivalent but not the same, or if
-    their joint limits differ. 2: bad input. With --within, the command does not change B before the
-    comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
+    1: the models are different. With --strict, also 1 if the models are equivalent but not the same, or have
+    differences without effect on motion, such as limits. 2: bad input. With --within, the command does not
+    change B before the comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
     from urdfkin.comparison.bounds import MOST_BOXES
     from urdfkin.comparison.certificate import certificate

@@ -20,7 +20,7 @@ VECTORS = ("plus", "minus", "times", "dot", "cross", "rotate", "transposed", "pr
 def bound(
     *, decorate: Callable[[Callable[..., Any]], Any] = lambda function: function, **vectors: Any
 ) -> SimpleNamespace:
-    """Copy all functions of `equations`, and replace their basic operations by `vectors`.
+    """Copy all functions of `equations`; the copies use the operations `vectors`, such as `plus` and `cross`.
 
     >>> lengths = bound(plus=lambda x, y: x + y, cross=lambda x, y: x * y)
     >>> lengths.point_velocity(1.0, 2.0, 3.0)

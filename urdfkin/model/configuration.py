@@ -50,8 +50,8 @@ class NarrowedRange:
     """A mimicked joint's own range, and the part of this range that its mimic joints allow.
 
     Attributes:
-        allowed: The part of `own` in which all mimic joints are within their limits; None if no value is
-            allowed.
+        allowed: The part of `own` in which all mimic joints are within their limits; None if at most one
+            value is allowed.
         by: Names of the mimic joints whose limits make the range smaller.
     """
 
@@ -65,7 +65,7 @@ class NarrowedRange:
         names = ", ".join(self.by)
         own = f"joint {self.joint} ranges over {range_words(self.own)} {self.unit}"
         if self.allowed is None:
-            return f"{own}; no value keeps all its mimic joints within their limits ({names})"
+            return f"{own}; at most one value keeps all its mimic joints within their limits ({names})"
         allowed = range_words(self.allowed)
         return f"{own}; its mimic joints are within their limits only for values from {allowed} ({names})"
 

@@ -70,7 +70,10 @@ EXTRAS = {
 
 
 def install_remedy(extra: str) -> str:
-    """Return the command that installs the package of an extra; no package index has `urdfkin[...]` yet."""
+    """Return the command that installs the library of an extra, such as `pip install 'viser>=1'`.
+
+    The command names the library, because no package index has urdfkin yet.
+    """
     return f"pip install '{EXTRAS[extra]}'"
 
 

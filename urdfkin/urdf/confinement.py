@@ -39,10 +39,13 @@ class Ground:
             The target of a symbolic link must also be one of these files, or be in one of these folders.
         installed: Folders with installed packages. A symbolic link in these folders may point to a package in
             any other folder. `colcon build --symlink-install` writes such links.
+        manifests: The paths of package.xml in the folders above the xacro file. The search for packages reads
+            these files.
     """
 
     roots: list[str] = field(default_factory=list)
     installed: list[str] = field(default_factory=list)
+    manifests: list[str] = field(default_factory=list)
 
     @classmethod
     def around(cls, path: Path, search: list[str], arguments: list[str]) -> Ground:
@@ -55,15 +58,15 @@ class Ground:
         real = [place.resolve() for place in wide if _exists(place)]
         near = [path, path.parent, path.resolve().parent, *map(Path, search)]
         roots = [*(place.resolve() for place in near), *(place for place in real if place not in everything)]
-        return cls([str(root) for root in roots], search)
+        manifests = [str(folder / "package.xml") for folder in path.absolute().parents]
+        return cls([str(root) for root in roots], search, manifests)
 
     def holds(self, path: str) -> bool:
         real = os.path.realpath(path)
-        # The search for packages may read every package.xml.
-        if os.path.basename(real) == "package.xml":  # noqa: PTH119
+        as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
+        if as_written in self.manifests and os.path.basename(real) == "package.xml":  # noqa: PTH119
             return True
         roots = self.roots
-        as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
         if any(_lies_in(root, as_written) for root in self.installed):
             roots = [*roots, *map(str, _nearest_folder_with("package.xml", Path(real)))]
         return any(_lies_in(root, real) for root in roots)

@@ -414,7 +414,7 @@ CANDIDATES, WORK = 5_000, 250_000
 #: `FOLDED_EXTRAS` applies to the codes URDF7xx, about content that kinematics does not use.
 FOLDED, FOLDED_EXTRAS = 4, 2
 
-#: Maximum number of errors with one code that are reported separately.
+#: If more errors than this have the same code, the further errors are combined into one.
 ERRORS_SHOWN = 100
 
 #: Maximum number of complete findings with one code. For further findings, only the line number is stored.

@@ -3,8 +3,8 @@
 This file is in a folder on PYTHONPATH, so that each Python process of a test run loads it at its start.
 
 `URDFKIN_MUTANT` is the module's name and the mutant's number, for example
-`urdfkin.validation.error_stats:17`. Without a number, `URDFKIN_MUTANT_TEXTS` contains a text of the module
-and its replacement, as JSON.
+`urdfkin.validation.error_stats:17`. Without a number, `URDFKIN_MUTANT_CODE` contains a function of the
+module, a piece of its code, and the replacement, as JSON.
 """
 
 import importlib.abc
@@ -17,15 +17,15 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 MODULE, _, NUMBER = os.environ.get("URDFKIN_MUTANT", "").partition(":")
-TEXTS = os.environ.get("URDFKIN_MUTANT_TEXTS", "")
+CODE = os.environ.get("URDFKIN_MUTANT_CODE", "")
 
 
 class _Loader(importlib.machinery.SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
-        from scripts.mutating.operators import mutated, rewritten
+        from scripts.mutating.operators import mutated, replaced
 
         source = Path(self.path).read_text(encoding="utf-8")
-        tree = mutated(source, int(NUMBER)) if NUMBER else rewritten(source, *json.loads(TEXTS))
+        tree = mutated(source, int(NUMBER)) if NUMBER else replaced(source, *json.loads(CODE))
         return compile(tree, str(self.path), "exec")
 
 

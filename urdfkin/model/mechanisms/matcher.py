@@ -57,8 +57,8 @@ DEEPEST = 200
 AHEAD = 6
 #: Maximum number of poses of B's root that the search for an exact match tries.
 MOST_ROOT_POSES = 48
-#: If two scores have equally many matches, their largest differences are compared.
-#: A score is better if its difference is less than `TWICE_AS_WELL` times the difference of the other score.
+#: The score with more agreeing links and axes is better.
+#: If the numbers are equal, a score is better if its difference is less than this factor times the other's.
 TWICE_AS_WELL = 0.5
 
 #: A zero offset (rad or m), or a pose for a planar or floating joint.
@@ -626,9 +626,10 @@ def _orders_to_try(
         yield from islice(orders, MOST_ORDERS)
         return
     named = sorted(run, key=called.__getitem__)
-    if list(run) in (named, named[::-1]):
+    if list(run) == named:
         return
-    yield from (order for order in (named, named[::-1]) if b.allows_order(order, tolerance_of(a, b)))
+    others = [order for order in (named, named[::-1]) if order != list(run)]
+    yield from (order for order in others if b.allows_order(order, tolerance_of(a, b)))
 
 
 def _with_zeros_by_rules(best: Alignment) -> Alignment:

@@ -35,9 +35,9 @@ from urdfkin.verify.bounds import DecimalErrors
 DIGITS = 50
 #: Number of digits before the additional digit for each joint: twice the 15 decimal digits of a double.
 _TWO_DOUBLES = 30
-#: Number of bits for each decimal digit of an interval.
+#: Number of bits that store one decimal digit.
 _BITS = math.log2(10.0)
-#: Number of bits to add to the bits of an interval's decimal digits, so that 15 digits have 50 + 5 bits.
+#: Number of additional bits of an interval; for example, 15 digits have 50 + 5 bits.
 #: With 53 bits, an interval could be four times as wide as the distance between neighbouring doubles.
 _MORE_BITS = 5
 #: Number of significant digits of a written decimal; 17 digits determine every double.

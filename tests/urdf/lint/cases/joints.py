@@ -76,6 +76,7 @@ CASES = [
     Case("mimic-beyond-its-limits", follows('joint="j1" offset="1"'), WARN, "URDF527:7"),
     Case("mimic-at-rest-outside-its-limits", follows(_REST), WARN, "URDF523:7 URDF527:7"),
     Case("mimic-nowhere-within", follows('joint="j1" offset="5"'), WARN, "URDF527:7"),
+    Case("mimic-within-at-one-value", follows('joint="j1" offset="4"'), WARN, "URDF527:7"),
     Case("mimic-mirrored-within", follows('joint="j1" multiplier="-1"'), ACCEPT),
     Case("mimic-beyond-by-a-digit", follows('joint="j1" multiplier="1.0005"'), ACCEPT),
     Case("mimic-prismatic-of-revolute", arm(second='type="prismatic"', follow=_MIMIC), ACCEPT),

@@ -415,11 +415,14 @@ class _MimicChecker:
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
-        low, high = allowed_range(rule, Limit(*limits, math.inf, math.inf), *moving)
+        bounds = Limit(*limits, math.inf, math.inf)
+        low, high = allowed_range(rule, bounds, *moving)
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - LEAST_LOST) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        allowed = f"only {range_words((low, high))}" if low < high else "no value"
+        # Rounding errors narrow a range of one value to an empty range.
+        single = [f"only {end:.6g}" for end in moving if allowed_range(rule, bounds, end, end) == (end, end)]
+        allowed = f"only {range_words((low, high))}" if low < high else (*single, "no value")[0]
         message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
