@@ -55,7 +55,7 @@ def chain_command(
 
     Exit 0: verified. 1: a disagreement. 2: bad input. 3: not checked.
     """
-    from urdfkin.verify.chain_checks import check_chain
+    from urdfkin.verify.conversions import check_chain
 
     loaded = load_robot(robot, verify=verify)
     path = loaded.chain(tip, base)
@@ -146,7 +146,7 @@ def screws_command(robot: str, base: str | None, tip: str | None, digits: int, v
     """
     from urdfkin.dh.export.toolboxes import write_screws
     from urdfkin.dh.screws import screws_document
-    from urdfkin.verify.chain_checks import check_screws
+    from urdfkin.verify.conversions import check_screws
 
     loaded = load_robot(robot, verify=verify)
     screws = loaded.screws(tip, base, verify=False)
@@ -181,7 +181,7 @@ def structure_command(
     """
     from urdfkin.dh.structure import opw_of, structure
     from urdfkin.system.documents import plain
-    from urdfkin.verify.chain_checks import check_opw, check_screws
+    from urdfkin.verify.conversions import check_opw, check_screws
 
     if opw is not None:
         reject_unused_options(click.get_current_context(), ("format_",), "with --opw")

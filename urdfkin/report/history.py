@@ -25,8 +25,7 @@ from urdfkin.report.reading import checked, stored_document
 from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, worst
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, parse_json, plain, says
 from urdfkin.system.files import MOST, is_folder, read_bytes, shortened
-from urdfkin.validation.document import VALIDATION, Document, ReportedRobot, Units
-from urdfkin.validation.outcome import OUTCOMES
+from urdfkin.validation.document import OUTCOMES, VALIDATION, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports in a history, and maximum number of files in a folder.

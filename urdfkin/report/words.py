@@ -13,8 +13,8 @@ from urdfkin.validation.document import (
     ReportedCheck,
     ReportedRobot,
     Units,
+    ValidationVerdict,
 )
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.verify.oracles import ORACLES
 from urdfkin.verify.quantities import QUANTITIES
 

@@ -170,8 +170,7 @@ def _load_table(
     from urdfkin.dh.parse_table import read_table_or_screws
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
-    from urdfkin.verify.chain_checks import check_screws
-    from urdfkin.verify.model_check import check_table_source
+    from urdfkin.verify.conversions import check_screws, check_table_source
 
     _refuse_arguments(xacro_args, "a table")
     table: DHTable | ProductOfExponentials
@@ -282,7 +281,7 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[LoadOptions]) -> Robot:
     from urdfkin.urdf.foreign import tree_of_model
-    from urdfkin.verify.model_check import check_model_source
+    from urdfkin.verify.conversions import check_model_source
 
     _refuse_arguments(xacro_args, "a pinocchio.Model")
     read = tree_of_model(source)
