@@ -8,28 +8,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urdfkin.dh.export.text import at_most, constant_of
-from urdfkin.dh.snapping import SAMPLES, samples_within_limits, travel
+from urdfkin.dh.snapping import SAMPLES, samples_within_limits
 from urdfkin.dh.table import DHRow, DHTable, is_identity
 from urdfkin.dh.tree_parameters import TreeParameters, TreeRow
 from urdfkin.dh.units import Units, cell_in_si, read_number
-from urdfkin.model.configuration import axis_range
+from urdfkin.model.configuration import TRAVEL_CONDITION, axis_range, largest_value
 from urdfkin.model.tree import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class PrintedPrecision:
-    """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits."""
+    """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits.
+
+    If `unlimited` is true, a prismatic joint has no limits. The error and the bound then assume a travel of
+    at most `WIDEST`.
+    """
 
     digits: int
     metres: float
     bound: float | None
     samples: int
+    unlimited: bool = False
 
     def __str__(self) -> str:
         proven = "" if self.bound is None else f"; the proven bound is {at_most(self.bound)} m"
+        condition = f"; this holds if {TRAVEL_CONDITION}" if self.unlimited else ""
         return (
             f"printed with {self.digits} digits, the table gives the tip within {at_most(self.metres)} m"
-            f" of its exact position on {self.samples} samples{proven}"
+            f" of its exact position on {self.samples} samples{proven}{condition}"
         )
 
 
@@ -43,7 +49,8 @@ def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> Pri
     distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
     bound = _bound(table, rows, base, tool)
     finite_bound = bound if math.isfinite(bound) else None
-    return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), finite_bound, SAMPLES)
+    measured, unlimited = float(distances.max(initial=0.0)), bool(table.unlimited)
+    return PrintedPrecision(units.digits, measured, finite_bound, SAMPLES, unlimited)
 
 
 def _printed_row(row: DHRow, units: Units) -> DHRow:
@@ -82,11 +89,11 @@ def _bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: Floa
     lever = float(np.linalg.norm(table.tool[:3, 3]))
     total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
     for row, printed_row in zip(reversed(table.rows), reversed(rows), strict=True):
-        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else travel(row.limit))
+        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_value(row.limit))
         if row.mimic is not None and printed_row.mimic is not None:
-            largest_value = max(abs(bound) for bound in axis_range(row.kind, row.limit))
+            largest = max(map(abs, axis_range(row.kind, row.limit)))
             multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
-            total += multiplier_error * largest_value * max(lever, 1.0)
+            total += multiplier_error * largest * max(lever, 1.0)
         errors = np.abs(np.subtract(row.cells, printed_row.cells))
         total += float(errors[[0, 2]].sum() + errors[[1, 3, 4]].sum() * lever)
     base_error = base - table.base

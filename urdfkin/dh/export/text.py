@@ -14,6 +14,7 @@ from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import Angles, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
+from urdfkin.model.configuration import TRAVEL_CONDITION
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
@@ -123,9 +124,10 @@ def snap_lines(table: DHTable) -> list[str]:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
     metres, radians = at_most(snap.metres), at_most(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
+    condition = f"limits and {TRAVEL_CONDITION}" if table.unlimited else "limits"
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
-        f"{radians} rad; this is guaranteed if prismatic joints are within their limits",
+        f"{radians} rad; this is guaranteed if prismatic joints are within their {condition}",
         f"({measured} measured on {snap.samples} samples).",
     ]
     for change in snap.changes:
@@ -198,8 +200,9 @@ def _caption(table: DHTable) -> str:
     if table.snap is not None and table.snap.changes:
         caption += (
             f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
-            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m."
+            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m"
         )
+        caption += f" if {TRAVEL_CONDITION}." if table.unlimited else "."
     return caption
 
 
