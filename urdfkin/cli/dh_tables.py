@@ -262,6 +262,7 @@ def _comparison(
         "tip_turned_at_most_rad": found.radians,
         "proven_tip_off_at_most_m": found.most_metres,
         "proven_tip_turned_at_most_rad": found.most_radians,
+        "proven_if": found.condition or None,
         "as_written_tip_off_at_most_m": found.written_metres,
         "as_written_tip_turned_at_most_rad": found.written_radians,
         "base_took_up": {"metres": found.base.metres, "radians": found.base.radians},

@@ -28,13 +28,12 @@ import numpy as np
 from urdfkin.dh.derive import Choices, derive
 from urdfkin.dh.make import derive_like, reversed_like
 from urdfkin.dh.screws import ProductOfExponentials
-from urdfkin.dh.snapping import travel
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration import axis_range, values_within
+from urdfkin.model.configuration import axis_range, largest_value, values_within
 from urdfkin.model.path import elementary
-from urdfkin.model.tree import FloatArray, JointKind
+from urdfkin.model.tree import FloatArray, JointKind, is_bounded
 
 #: A property is reported if its deviation is at most this angle (rad) and this length (m).
 NEAR_ANGLE, NEAR_LENGTH = 0.02, 0.005
@@ -85,6 +84,7 @@ class Structure:
 
     `reach` is an upper bound (m) of the tip's distance from the point of axis 1 that is nearest to axis 2.
     `reached` is the largest such distance in sampled configurations.
+    A prismatic joint without limits makes `reach` infinite; its samples are within `WIDEST` of zero.
     """
 
     robot: str
@@ -243,12 +243,13 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
     """Bound the tip's distance (m) from `origin`, a point of the first axis, within the joint limits.
 
     The bound is the length of a polygonal chain from `origin` to the tip. Each vertex is the point of the
-    next axis that is nearest to the previous vertex. Travel of prismatic joints is added.
+    next axis that is nearest to the previous vertex. Travel of prismatic joints is added. The bound is
+    infinite if a prismatic joint has no limits.
     """
     point, total = origin, 0.0
     for i, joint in enumerate(screws.joints):
         if not joint.kind.turns:
-            total += travel(joint.limit) if joint.limit else math.inf
+            total += largest_value(joint.limit) if is_bounded(joint.limit) else math.inf
             continue
         z = _axis(screws, i)
         nearest = screws.points[i] + z * float(z @ (point - screws.points[i]))
@@ -259,7 +260,7 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
-    ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
+    ranges = [axis_range(joint.kind, joint.limit) for joint in screws.joints]
     values = values_within(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 

@@ -42,7 +42,11 @@ from urdfkin.model.tree import (
 
 #: Sampled ranges are cut off at +-`WIDEST` (rad or m). A missing limit is replaced by +-`WIDEST`.
 #: The range of a continuous joint is -pi to pi.
+#: All bounds assume this largest distance (m) from zero for a joint without limits that translates.
+#: Few linear axes of robots are longer. A bound for a travel of 10 m also holds for a shorter travel.
 WIDEST = 10.0
+#: The condition of a bound, as text, if a joint that translates has no limits.
+TRAVEL_CONDITION = f"joints without limits travel at most {WIDEST:g} m"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,11 +83,16 @@ def range_words(ends: tuple[float, float]) -> str:
     return f"{ends[0]:.6g} to {ends[1]:.6g}"
 
 
-def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
-    """Return the ends of a joint's range; without limits, -pi to pi (rad) or -`slide` to `slide` (m)."""
+def axis_range(kind: JointKind, limit: Limit | None) -> tuple[float, float]:
+    """Return the ends of a joint's range; without limits, -pi to pi (rad) or -`WIDEST` to `WIDEST` (m)."""
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
-    return (-math.pi, math.pi) if kind.turns else (-slide, slide)
+    return (-math.pi, math.pi) if kind.turns else (-WIDEST, WIDEST)
+
+
+def largest_value(limit: Limit | None) -> float:
+    """Return the largest absolute value (rad or m) within limits; `WIDEST` without limits."""
+    return max(abs(limit.lower), abs(limit.upper)) if is_bounded(limit) else WIDEST
 
 
 def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:
