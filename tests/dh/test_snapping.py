@@ -20,7 +20,7 @@ from urdfkin.dh.table import SnapChange, SnapReport
 from urdfkin.dh.units import Units
 from urdfkin.model.chain import chain
 from urdfkin.model.configuration import WIDEST
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree
 
 
 def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) -> KinematicTree:
@@ -185,6 +185,19 @@ def test_the_error_of_printed_digits_states_the_assumed_travel_of_a_joint_withou
     assert str(endless).endswith(f"m; this holds if joints without limits travel at most {WIDEST:g} m")
     assert "travel" not in str(limited)
     assert limited.metres < endless.metres <= present(endless.bound)
+
+
+@pytest.mark.parametrize("base", ["base", "a"])
+def test_the_bound_of_printed_digits_covers_a_small_multiplier_of_a_mimic_rule(base: str) -> None:
+    # The printed multiplier has 10 digits. Its error is multiplied by the value of the mimicked joint.
+    rule, ahead = Mimic("big", 1.0 / 29.0, 0.0), shift(1.0, 0.0, 0.0)
+    joints = [
+        (z_joint("big", limit=Limit(-3.0, 3.0, 1.0, 1.0)), "base", "a"),
+        (z_joint("small", ahead, limit=Limit(-0.11, 0.11, 1.0, 1.0), mimic=rule), "a", "b"),
+        (z_joint("end", ahead, JointKind.FIXED), "b", "tip"),
+    ]
+    found = printed(dh_table(build_tree("arm", "base", joints), "tip", base), Units(digits=15))
+    assert 0.0 < found.metres <= present(found.bound)
 
 
 def test_a_snap_report_sums_the_bounds_of_all_changes() -> None:

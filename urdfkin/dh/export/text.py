@@ -288,6 +288,20 @@ def _printed_pose(T: FloatArray, digits: int) -> FloatArray:
     return T if is_identity(T) else np.array([[float(f"{x:.{digits}g}") for x in row] for row in T])
 
 
+def _largest_coordinate(table: DHTable, row: DHRow) -> float:
+    """Return the largest absolute value (rad or m) of the joint that the joint of a row mimics.
+
+    If the table has no row of the mimicked joint, the limits of the mimic joint limit its value.
+    """
+    if row.mimic is None or row.mimic.multiplier == 0.0:
+        return 0.0
+    for other in table.rows:
+        if other.joint == row.mimic.leader:
+            return max(map(abs, axis_range(other.kind, other.limit)))
+    largest = max(map(abs, axis_range(row.kind, row.limit)))
+    return (largest + abs(row.mimic.offset)) / abs(row.mimic.multiplier)
+
+
 def _printed_bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
     """Return a bound (m) of the tip error that the rounded numbers of a printed table cause together.
 
@@ -299,9 +313,8 @@ def _printed_bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, to
     for row, printed_row in zip(reversed(table.rows), reversed(rows), strict=True):
         lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_value(row.limit))
         if row.mimic is not None and printed_row.mimic is not None:
-            largest = max(map(abs, axis_range(row.kind, row.limit)))
             multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
-            total += multiplier_error * largest * max(lever, 1.0)
+            total += multiplier_error * _largest_coordinate(table, row) * max(lever, 1.0)
         errors = np.abs(np.subtract(row.cells, printed_row.cells))
         total += float(errors[[0, 2]].sum() + errors[[1, 3, 4]].sum() * lever)
     base_error = base - table.base
