@@ -326,7 +326,7 @@ def test_a_function_in_a_convention_agrees_and_exchanged_rows_are_named(
 def test_a_function_for_the_centre_of_mass_in_the_axes_of_the_body_is_checked(quantity: str) -> None:
     robot = urdfkin.load("go2", root_joint="floating")
     convention = replace(find_convention("urdfkin"), name="centre", point="centre of mass")
-    right = computed(robot.with_convention(convention), quantity, "FL_foot")
+    right = computed(robot.with_convention(convention), quantity, "FL_foot")  # type: ignore[arg-type]
     how: dict[str, Any] = {"frame": "FL_foot", "samples": 20, "convention": convention}
     assert verify_function(right, robot, quantity, **how).agrees
     assert not verify_function(computed(robot, quantity, "FL_foot"), robot, quantity, **how).agrees
