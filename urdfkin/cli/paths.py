@@ -230,10 +230,10 @@ def _structure_document(found: Structure) -> TextDocument:
             rows.append((f"{pair.first}, {pair.second}", angle, distance))
         parts += ["", Table(("axes", "angle [deg]", "distance [mm]"), rows)]
     parts += ["", *map(_kind_line, found.kinds)] if found.kinds else []
-    start = "measured from the point on the first axis that is nearest to the second axis"
+    point = ", ".join(six_digits(x, 1e-12) for x in found.reach_from)
     bound = "" if math.isinf(found.reach) else f", at most {found.reach:.6g} m"
     parts += [
-        f"reach: {found.reached:.4g} m on samples{bound}, {start}",
+        f"reach: {found.reached:.4g} m on samples{bound}, measured from ({point}) m, {found.reach_point}",
         *(f"closed form: {solver}" for solver in found.solvers),
         "",
     ]
