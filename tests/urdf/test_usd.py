@@ -688,7 +688,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("arc", LOOPS)
-def test_layers_that_refer_to_each_other_in_a_circle_are_a_finding(write: Write, arc: str) -> None:
+def test_layers_that_refer_to_each_other_in_a_cycle_are_a_finding(write: Write, arc: str) -> None:
     arm, files = stage(ARM).partition(")\n")[2], []
     for own, other in ("ab", "bc", "ca"):
         head, x = (part.format(other) for part in LOOPS[arc])
