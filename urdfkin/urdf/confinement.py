@@ -123,8 +123,8 @@ def confine(holds: Callable[[str], bool]) -> None:
             raise RefusedError(
                 f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
                 " xacro file's folder, package and repository, the folders on ROS_PACKAGE_PATH and"
-                " AMENT_PREFIX_PATH, packages beside the folders above the file that $(find) names, and the"
-                " files and folders that an argument names"
+                " AMENT_PREFIX_PATH, packages beside the folders above the file that $(find) names, the"
+                " package.xml of each folder above the file, and the files and folders that an argument names"
             )
 
     sys.addaudithook(watch)
