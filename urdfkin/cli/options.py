@@ -339,6 +339,13 @@ def locked_joints(robot: Robot) -> dict[str, Any]:
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
 
 
+def locked_line(robot: Robot) -> str:
+    """Return one line with the value of each locked joint, or "" if no joint is locked."""
+    units = {name: "rad" if robot.joints[name].unlocked.kind.turns else "m" for name, _ in robot.origin.lock}
+    values = ", ".join(f"{name} at {value:.6g} {units[name]}" for name, value in robot.origin.lock)
+    return f"locked: {values}" if values else ""
+
+
 @dataclass(frozen=True, slots=True)
 class Inputs:
     """A robot, a frame and the values to compute with.

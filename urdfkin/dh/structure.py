@@ -82,8 +82,16 @@ class StructureKind:
 class Structure:
     """The geometric structure of a path.
 
-    `reach` is an upper bound (m) of the tip's distance from the point of axis 1 that is nearest to axis 2.
-    `reached` is the largest such distance in sampled configurations.
+    `reach` is an upper bound (m) of the tip's distance from the point `reach_from`, within the joint limits.
+    `reached` is the largest such distance in sampled configurations. `reach_from` is a point in the base
+    frame (m), and does not depend on the configuration. `reach_point` describes the point in words:
+
+    - The first two joints are revolute, and their axes are not nearly parallel (more than 0.02 rad): the
+      point of the first axis that is nearest to the second axis.
+    - The first two axes are nearly parallel, the second joint is prismatic, or only one joint moves: the
+      point of the first axis that is nearest to the base's origin.
+    - The first joint is prismatic, or no joint moves: the base's origin.
+
     A prismatic joint without limits makes `reach` infinite; its samples are within `WIDEST` of zero.
     """
 
@@ -96,6 +104,8 @@ class Structure:
     kinds: tuple[StructureKind, ...]
     reach: float
     reached: float
+    reach_from: tuple[float, ...]
+    reach_point: str
     solvers: tuple[str, ...]
 
 
@@ -105,7 +115,7 @@ def structure(screws: ProductOfExponentials) -> Structure:
     kinds = [*_triples(screws, letters, pairs), *_arm_kinds(screws, letters, pairs)]
     kinds = sorted(kinds, key=lambda kind: (not kind.is_exact, kind.radians + kind.metres))
     tips, jacobian = _sample_tips(screws)
-    origin = _origin(screws)
+    origin, reach_point = _origin(screws)
     return Structure(
         screws.robot,
         screws.base_frame,
@@ -116,6 +126,8 @@ def structure(screws: ProductOfExponentials) -> Structure:
         tuple(kinds),
         _reach_bound(screws, origin),
         float(np.linalg.norm(tips - origin, axis=-1).max()),
+        tuple(origin.tolist()),
+        reach_point,
         tuple(_solvers(letters, kinds, pairs)),
     )
 
@@ -222,25 +234,23 @@ def _solvers(letters: str, kinds: list[StructureKind], pairs: tuple[AxisPair, ..
 # -- reach ---------------------------------------------------------------------------------------------
 
 
-def _origin(screws: ProductOfExponentials) -> FloatArray:
-    """Return the point of the first axis that is nearest to the second axis.
-
-    If one joint is prismatic, or if the axes are nearly parallel, return `screws.points[0]`.
-    """
-    if not screws.joints:
-        return np.zeros(3)
-    if len(screws.joints) > 1 and screws.joints[0].kind.turns and screws.joints[1].kind.turns:
+def _origin(screws: ProductOfExponentials) -> tuple[FloatArray, str]:
+    """Return the point from which the reach is measured, in the base frame (m), and its description."""
+    if not screws.joints or not screws.joints[0].kind.turns:
+        return np.zeros(3), "the base's origin"
+    if len(screws.joints) > 1 and screws.joints[1].kind.turns:
         z, y = _axis(screws, 0), _axis(screws, 1)
         cross = np.cross(z, y)
         if np.linalg.norm(cross) > NEAR_ANGLE:
             between = screws.points[1] - screws.points[0]
             along = float(np.linalg.det([between, y, cross]) / (cross @ cross))
-            return np.asarray(screws.points[0] + along * z)
-    return np.asarray(screws.points[0])
+            nearest = np.asarray(screws.points[0] + along * z)
+            return nearest, "the point of the first axis that is nearest to the second axis"
+    return np.asarray(screws.points[0]), "the point of the first axis that is nearest to the base's origin"
 
 
 def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
-    """Bound the tip's distance (m) from `origin`, a point of the first axis, within the joint limits.
+    """Bound the tip's distance (m) from the point `origin`, within the joint limits.
 
     The bound is the length of a polygonal chain from `origin` to the tip. Each vertex is the point of the
     next axis that is nearest to the previous vertex. Travel of prismatic joints is added. The bound is

@@ -160,6 +160,11 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
     )
 
 
+def as_robot(source: Robot | Source | DHTable) -> Robot:
+    """Return a robot unchanged; load any other source."""
+    return source if isinstance(source, Robot) else load(source)
+
+
 def _load_table(
     source: DHTable | ProductOfExponentials | str | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,

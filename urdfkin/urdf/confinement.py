@@ -125,8 +125,9 @@ def confine(holds: Callable[[str], bool]) -> None:
         if not isinstance(path, str | bytes | os.PathLike) or not holds(os.fsdecode(path)):
             raise RefusedError(
                 f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
-                " xacro file's folder, package and repository, and the packages on ROS_PACKAGE_PATH and"
-                " AMENT_PREFIX_PATH"
+                " xacro file's folder, package and repository, the folders on ROS_PACKAGE_PATH and"
+                " AMENT_PREFIX_PATH, packages beside the folders above the file that $(find) names, the"
+                " package.xml of each folder above the file, and the files and folders that an argument names"
             )
 
     sys.addaudithook(watch)

@@ -499,7 +499,7 @@ class _Run:
         if not conversion.is_constant and name != "jacobian":
             raise InputError(
                 f"urdfkin has no bound for the {name}: in this convention, the velocity of a floating or"
-                " planar joint has other axes or another reference point",
+                " planar joint has other axes",
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )

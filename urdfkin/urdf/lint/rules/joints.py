@@ -372,7 +372,7 @@ class _MimicChecker:
             self.unknown(mimic)
         elif joint.name in self.in_loops:
             itself = leader is joint
-            message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
+            message = "the joint mimics itself" if itself else "the joints mimic each other in a cycle"
             self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that is not a mimic joint")
         elif leader.kind is not None and leader.kind not in AXIAL:
             count = "no coordinate" if leader.kind == "fixed" else "several coordinates"
@@ -436,7 +436,7 @@ class _MimicChecker:
         )
 
     def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a circle)."""
+        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a cycle)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)
