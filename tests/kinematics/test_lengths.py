@@ -17,7 +17,7 @@ from urdfkin.kinematics.arithmetic import VECTORS
 from urdfkin.kinematics.number_kinds import array_equations as on_vectors
 from urdfkin.kinematics.number_kinds import counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as on_lengths
-from urdfkin.kinematics.roundings import EPS, SMALLEST
+from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import draw
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -89,7 +89,7 @@ def test_a_product_of_lengths_is_at_least_the_smallest_normal_number_unless_a_fa
 ) -> None:
     with np.errstate(over="ignore", under="ignore"):
         xy = float(product(x, y))
-        assert xy == max(x * y, SMALLEST) if x and y else xy == 0.0
+        assert xy == max(x * y, SMALLEST_NORMAL) if x and y else xy == 0.0
 
 
 @pytest.mark.slow

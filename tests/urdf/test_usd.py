@@ -27,7 +27,7 @@ from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Sameness, SameQuestion
 from urdfkin.errors import InputError, OracleError, SourceError
 from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
-from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.conventions.convention import transcoded
 from urdfkin.model.tree import LARGEST_ANGLE, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
@@ -1418,7 +1418,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         ):
             angle = _angle_between(placed(op, exact, "Double", k), placed(op, rounded, "Float", k))
             kind = op.rstrip("XYZ")
-            worst[kind] = max(worst[kind], angle / SINGLE)
+            worst[kind] = max(worst[kind], angle / SINGLE_ROUNDOFF)
     # The error of an angle above 256 degrees is at most 2^-16 degrees; the errors of several angles add.
     assert 5.0 < worst["Rotate"] <= usd_check._TRANSFORM
     assert 1.0 < worst["Orient"] <= 4.0

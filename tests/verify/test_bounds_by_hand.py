@@ -11,7 +11,7 @@ from tests.laws.subjects import NAMES, robot_of, state
 from tests.urdfs import joint, limit, mimic
 from urdfkin.compiled.evaluate import accelerations, placements, velocities
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.kinematics.roundings import EPS, ROUNDINGS, of_joints
+from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS, joint_roundings
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -40,7 +40,7 @@ LOCAL, WORLD, ALIGNED = Reference.LOCAL, Reference.WORLD, Reference.LOCAL_WORLD_
 
 
 def sizes(tilt: float = 0.0) -> Magnitudes:
-    return Magnitudes(*(np.array([[x]]) for x in (P, W, VEL, ALPHA, ACC, of_joints(JOINTS, tilt))))
+    return Magnitudes(*(np.array([[x]]) for x in (P, W, VEL, ALPHA, ACC, joint_roundings(JOINTS, tilt))))
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +239,7 @@ def test_magnitudes_are_reached_if_all_terms_have_the_same_direction() -> None:
     assert size.vel == 2.0 * 2.0 + 5.0 * 1.75
     assert size.alpha == 2.0 * 2.0 + 3.0 * (2.0 + 3.0)  # Pinocchio's term v w x z, which cancels later
     assert size.acc == (4.0 + 4.0) * 2.0 + (size.alpha + 25.0) * 1.75
-    assert size.roundings == 5 * ROUNDINGS
+    assert size.roundings == 5 * PINOCCHIO_ROUNDINGS
 
 
 def test_magnitudes_include_prismatic_joints_and_joint_accelerations_as_in_7_130() -> None:

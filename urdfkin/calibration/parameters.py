@@ -33,7 +33,7 @@ from urdfkin.compiled.plan import turned
 from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.roundings import EPS, ROUNDINGS
+from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
 from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.mimic import Coupling
 from urdfkin.model.path import ElementaryMotion, Path, elementary
@@ -144,7 +144,7 @@ class ParametricChain:
         """
         slides = [drive.joint for drive in self._drives if drive.joint is not None and not drive.turns]
         slid = max((float(np.abs(values[:, j]).max(initial=0.0)) for j in slides), default=0.0)
-        return 2.0 * ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
+        return 2.0 * PINOCCHIO_ROUNDINGS * (len(self.path.steps) + 1) * EPS * (self.size + slid * len(slides))
 
 
 #: Largest angle (rad) between two axes of a table that are treated as parallel.

@@ -25,7 +25,7 @@ import numpy as np
 
 from urdfkin.compiled.evaluate import jacobians, placements
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT, NOT_ZERO
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT_ROUNDINGS, MIN_DIVISOR
 from urdfkin.model.configuration import WIDEST, neutral, sample, with_unit_quaternions
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
@@ -131,9 +131,9 @@ class DistanceSearch:
             tree, q = (self.robots[0].tree, q_a) if name.startswith("a:") else (self.robots[1].tree, q_b)
             z[0, k] = q[0, tree.q_index[tree.joint_index(name[2:])]]
         low, high = self.ends.T
-        rounding = EPS * MIMIC_LIMIT * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+        rounding = EPS * MIMIC_LIMIT_ROUNDINGS * (1.0 + np.maximum(np.abs(low), np.abs(high)))
         alike = all(
-            (np.abs(expected - q) <= EPS * MIMIC_LIMIT * (1.0 + np.abs(expected))).all()
+            (np.abs(expected - q) <= EPS * MIMIC_LIMIT_ROUNDINGS * (1.0 + np.abs(expected))).all()
             for expected, q in zip(self.configurations(z), (q_a, q_b), strict=True)
         )
         return alike and bool((low - rounding <= z).all() and (z <= high + rounding).all())
@@ -309,7 +309,7 @@ class Boxes:
         """
         D, G = self.at_middles(c)
         size = np.sqrt((D * D).sum(axis=1))
-        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, NOT_ZERO)[:, np.newaxis]
+        along = (D[:, :, np.newaxis] * G).sum(axis=1) / np.maximum(size, MIN_DIVISOR)[:, np.newaxis]
         across = np.sqrt(np.maximum((G * G).sum(axis=1) - along * along, 0.0))
         return np.asarray(np.hypot(size + np.abs(along) @ h, across @ h))
 

@@ -32,7 +32,7 @@ from urdfkin.comparison.result import (
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
-from urdfkin.kinematics.roundings import EPS, SINGLE
+from urdfkin.kinematics.roundings import EPS, SINGLE_ROUNDOFF
 from urdfkin.model.configuration import WIDEST, narrowed_ranges
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.matcher import align
@@ -224,7 +224,7 @@ class Comparator:
                 alignment,
                 variables,
                 self.tolerance,
-                SINGLE if single else 0.0,
+                SINGLE_ROUNDOFF if single else 0.0,
                 as_written=verdict is Verdict.UP_TO_SINGLE,
             ),
             joints=tuple(

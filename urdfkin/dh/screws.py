@@ -26,7 +26,7 @@ from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDoc
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import ROUNDED, axis_aligning, polar_factor
-from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
@@ -171,7 +171,7 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").roundings < 1000
         True
         """
-        return 2.0 * of_rows(len(self.joints))
+        return 2.0 * table_roundings(len(self.joints))
 
     def rounding(self, q: Given) -> FloatArray:
         """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres.

@@ -32,7 +32,7 @@ from urdfkin.dh.table import (
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation import coordinate_rotation
-from urdfkin.kinematics.roundings import ANGLE, EPS, TURN
+from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
 from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
@@ -141,7 +141,7 @@ def _snap_origins(tree: KinematicTree, tolerance: float) -> tuple[KinematicTree,
         angle = float(rotation_angle(T[:3, :3], joint.T_parent_joint[:3, :3]))
         if angle > 0.0:
             joints[i] = replace(joint, T_parent_joint=T)
-        if angle > TURN * EPS:
+        if angle > ROTATION_ROUNDINGS * EPS:
             rotations[joint.name] = angle
     return replace(tree, joints=tuple(joints)), rotations
 
@@ -167,7 +167,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     R = A[:3, :3]
     sine = math.hypot(R[0, 2], R[1, 2])
     tilt = math.atan2(sine, R[2, 2])
-    if sine <= max(math.sin(tolerance), TURN * EPS):
+    if sine <= max(math.sin(tolerance), ROTATION_ROUNDINGS * EPS):
         phi = 0.0
         psi = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
         if R[2, 2] < 0.0:
@@ -177,7 +177,7 @@ def _snap_pose(A: FloatArray, tolerance: float) -> tuple[FloatArray, float]:
     pose = np.array(A)
     pose[:3, :3] = _product(((2, phi), (0, tilt), (2, psi)), tolerance)
     angle = float(rotation_angle(pose[:3, :3], R))
-    return pose, (angle if angle > TURN * EPS else 0.0)
+    return pose, (angle if angle > ROTATION_ROUNDINGS * EPS else 0.0)
 
 
 def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray:
@@ -185,7 +185,7 @@ def _product(turns: Sequence[tuple[int, float]], tolerance: float) -> FloatArray
     R = np.eye(3)
     for axis, angle in turns:
         twelfth = nearest_twelfth(angle)
-        is_round = abs(angle - twelfth) <= max(tolerance, TURN * EPS)
+        is_round = abs(angle - twelfth) <= max(tolerance, ROTATION_ROUNDINGS * EPS)
         turn = coordinate_rotation(axis, np.asarray(twelfth if is_round else angle))
         if is_round:
             turn[np.abs(turn) < EPS] = 0.0  # In doubles, cos(pi/2) is not 0.
@@ -247,7 +247,7 @@ def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:
     for row in table.rows:
         for name, angle in (("alpha", row.alpha), ("theta", row.theta), ("beta", row.beta)):
             deviation = abs(angle - nearest_twelfth(angle))
-            if ANGLE * EPS < deviation <= _LARGEST_NOISE:
+            if ANGLE_ROUNDINGS * EPS < deviation <= _LARGEST_NOISE:
                 noisy.append((row.joint, name, deviation))
         for name, length in (("a", row.a), ("d", row.d)):
             if 0.0 < abs(length) <= _LARGEST_NOISE * table.span:

@@ -30,7 +30,7 @@ from urdfkin.dh.units import Units, units_of
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
+from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import ElementaryMotion, Path
@@ -190,7 +190,7 @@ def as_a_and_alpha(T: FloatArray) -> tuple[float, float] | None:
     (0.5, 3.141592653589793)
     """
     tilt_of_x = max(abs(T[0, 1]), abs(T[0, 2]))
-    if tilt_of_x > ANGLE * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
+    if tilt_of_x > ANGLE_ROUNDINGS * EPS or T[0, 0] < 0.0 or T[1, 3] or T[2, 3]:
         return None
     return float(T[0, 3]), cleaned_angle(math.atan2(T[2, 1], T[2, 2]))
 
@@ -218,7 +218,7 @@ def cleaned_angle(angle: float) -> float:
     """Wrap an angle into (-pi, pi]; a multiple of pi/12 with a rounding error becomes exact."""
     angle = wrapped(angle)
     twelfth = nearest_twelfth(angle)
-    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE * EPS else angle
+    return wrapped(twelfth) + 0.0 if abs(angle - twelfth) <= ANGLE_ROUNDINGS * EPS else angle
 
 
 def looks_round(angle: float, twelfth: float = math.pi / 12.0) -> bool:
@@ -476,7 +476,7 @@ class DHTable(Displayable):
         turns = np.array([row.kind.turns for row in self.rows], dtype=bool)
         angle = values[..., turns].sum(axis=-1)
         lever = self.span + values[..., ~turns].sum(axis=-1) + float(np.linalg.norm(self.base[:3, 3]))
-        return np.asarray(EPS * (of_rows(len(self.rows)) + angle) * lever)
+        return np.asarray(EPS * (table_roundings(len(self.rows)) + angle) * lever)
 
     def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
         """Return bounds (...,), in m and rad, of the difference between the table's and the URDF's tip pose.
@@ -490,7 +490,7 @@ class DHTable(Displayable):
         (True, True)
         """
         metres = self.rounding(q)
-        radians = EPS * of_rows(len(self.rows)) + np.zeros_like(metres)
+        radians = EPS * table_roundings(len(self.rows)) + np.zeros_like(metres)
         if self.snap is None:
             return metres, radians
         values = self.coupling.values(q)

@@ -38,7 +38,7 @@ from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
-from urdfkin.kinematics.roundings import EPS, of_rows
+from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
 
@@ -105,7 +105,7 @@ class TreeParameters:
         The estimate does not include Pinocchio's rounding errors.
         """
         longest = max((len(self._path(j)) for j in range(len(self.rows))), default=0)
-        return of_rows(1 + longest) + self.left_out / EPS
+        return table_roundings(1 + longest) + self.left_out / EPS
 
     def reach(self, q: FloatArray) -> FloatArray:
         """Return the (..., joints) path length (metres) from the root to each link at `q`.

@@ -20,7 +20,7 @@ from urdfkin.compiled.plan import CompiledTree
 from urdfkin.export.function import Function
 from urdfkin.export.naming import comment_name, comment_text
 from urdfkin.export.single import single_bounds
-from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST
+from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST_NORMAL
 from urdfkin.model.configuration import draw
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
@@ -209,7 +209,7 @@ def _within(function: Function, part: Part, errors: DecimalErrors) -> tuple[Floa
     v, a = (*part.rates, None, None)[:2]
     size = true_value_magnitudes(part.plan, part.q, v, a, errors)
     bound, n = function.quantity.bound(part.plan, size, part.reference), len(part.q)
-    scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST), 0.0)
+    scale = np.where(bound.scale > 0.0, np.maximum(bound.scale, SMALLEST_NORMAL), 0.0)
     shape = (n, 1, *function.shape)
     within, scale = (np.broadcast_to(x, shape).reshape(n, -1) for x in (scale * bound.k, scale))
     return within, scale

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, QuestionsSection, warn_caller
 from urdfkin.kinematics.inputs import floats
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, unit_quaternions
-from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT
+from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT_ROUNDINGS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
 from urdfkin.model.tree import (
@@ -153,9 +153,11 @@ def allowed_range(rule: Mimic, limit: Limit, lower: float, upper: float) -> tupl
     ends = sorted((end - rule.offset) / rule.multiplier for end in (limit.lower, limit.upper))
     # The rounding error of the mimic joint's value narrows the range at each end.
     size = max(map(abs, (limit.lower, limit.upper))) + abs(rule.offset)
-    error = MIMIC_LIMIT * EPS * size / abs(rule.multiplier)
+    error = MIMIC_LIMIT_ROUNDINGS * EPS * size / abs(rule.multiplier)
     if not math.isfinite(error):  # The error is infinite if the mimic joint has only one limit.
-        error = MIMIC_LIMIT * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
+        error = (
+            MIMIC_LIMIT_ROUNDINGS * EPS * max((abs(end) for end in ends if math.isfinite(end)), default=0.0)
+        )
     return (
         lower if is_allowed(lower) else max(lower, ends[0] + error),
         upper if is_allowed(upper) else min(upper, ends[1] - error),

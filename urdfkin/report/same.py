@@ -14,7 +14,7 @@ from urdfkin.comparison.result import BOUNDED, Interval, Sameness, SameQuestion,
 from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
-from urdfkin.kinematics.roundings import NOT_ZERO
+from urdfkin.kinematics.roundings import MIN_DIVISOR
 from urdfkin.model.configuration import WIDEST
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
@@ -419,7 +419,7 @@ def _draw(
     flat = [x @ seen.T for x in (*lines, np.zeros((0, 2, 3)) if gap is None else gap)]
     points = np.concatenate([x.reshape(-1, 2) for x in flat])
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
-    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), NOT_ZERO)
+    scale = 2.0 * HALF * FILLED / max(float((high - low).max()), MIN_DIVISOR)
     placed = [np.round((x - (low + high) / 2.0) * scale, 1).reshape(-1, 4).tolist() for x in flat]
     ruler = round_length(2.0 * HALF * SCALE / scale)
     bar = {"x": -HALF * FILLED, "y": HALF - FOOT, "width": round(ruler * scale, 1), "words": length(ruler)}

@@ -199,7 +199,7 @@ class Mjcf:
 
         Let s(x) = |x| for an independent joint x. For a joint y with the rule y = y0 + c0 + c1 (x - x0), let
         s(y) = |y0| + |c0| + |c1| (s(x) + |x0|). The returned number is s(y) (k + 1), where k is the number of
-        rules from y to an independent joint. The bound is this number times `MJCF_RULE` and `EPS`.
+        rules from y to an independent joint. The bound is this number times `MJCF_RULE_ROUNDINGS` and `EPS`.
         """
         m, qpos = self.model, np.abs(self.qpos(q))
         by_joint = {int(m.eq_obj1id[i]): i for i in self.rules}

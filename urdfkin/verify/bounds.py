@@ -2,7 +2,7 @@
 
 Each number of a result is compared with the oracle's number. The result is accepted if no difference exceeds
 
-    k * eps * scale,      eps = 2^-52,      k = factors * ROUNDINGS * joints.
+    k * eps * scale,      eps = 2^-52,      k = factors * PINOCCHIO_ROUNDINGS * joints.
 
 *Scale.* Each number is a sum of terms. The scale is an upper bound on the sum of the absolute values of these
 terms (`magnitudes`), in the unit of the number. Two computations may add the terms in different orders. Large
@@ -57,7 +57,7 @@ from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.lengths import State
 from urdfkin.kinematics.number_kinds import Length, counted, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
-from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS, of_joints
+from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS, joint_roundings
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -116,7 +116,7 @@ def magnitudes(
     else:
         _by_kernel(kernel, lengths, inputs, out)
     is_rotated = (base[:, :9] != _NO_ROTATION).any(axis=1)
-    out[5] = of_joints(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
+    out[5] = joint_roundings(plan.depth + 1 + is_rotated[:, np.newaxis], plan.tilts)
     return Magnitudes(*out)
 
 
@@ -312,7 +312,7 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     the frame's origin. The distance of a joint or the frame from the centre of mass is at most the length p
     of the path. Lever arms are therefore at most 2 p long. A conversion to or from the centre of mass adds a
     cross product with a lever arm. This cross product at most doubles the number of factors in a term. For
-    each joint, the bound allows `MUJOCO` = 30 instead of `ROUNDINGS` = 24 rounding errors.
+    each joint, the bound allows `MUJOCO_ROUNDINGS` = 30 instead of `PINOCCHIO_ROUNDINGS` = 24 rounding errors.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -322,7 +322,7 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
         vel=eq.point_velocity(size.vel, size.w, p),
         alpha=size.alpha,
         acc=eq.point_acceleration(size.acc + shared, size.alpha, size.w, p),
-        roundings=2.0 * (MUJOCO / ROUNDINGS) * size.roundings,
+        roundings=2.0 * (MUJOCO_ROUNDINGS / PINOCCHIO_ROUNDINGS) * size.roundings,
     )
 
 
@@ -349,7 +349,7 @@ def true_value_magnitudes(
     """Return the upper bounds on terms (`Magnitudes`) for a comparison of one program with the true values.
 
     The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
-    values are rounded to 17 digits. The bound allows `ROUNDINGS` = 24 rounding errors for each joint. One
+    values are rounded to 17 digits. The bound allows `PINOCCHIO_ROUNDINGS` = 24 rounding errors for each joint. One
     program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The difference
     of 7.2 rounding errors is available for the conversion of decimals to doubles. The offset, the axis and
     the true value have an error of half an eps each. The error of the axis counts twice, because two
@@ -583,7 +583,7 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. `Magnitudes.roundings` counts one joint more than the path
-    contains. For this additional joint, the bound allows at least `ROUNDINGS` = 24 eps, so the bound covers
+    contains. For this additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` = 24 eps, so the bound covers
     the 13 eps.
 
     `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
@@ -625,7 +625,7 @@ def nearest_singularity(plan: CompiledTree) -> float:
 
     At a smaller distance from a singularity of Euler angles, no digit of the analytical Jacobian is reliable.
     """
-    return 4.0 * EPS * float(np.max(of_joints(plan.depth + 1, plan.tilts), initial=0.0))
+    return 4.0 * EPS * float(np.max(joint_roundings(plan.depth + 1, plan.tilts), initial=0.0))
 
 
 def column_weights(plan: CompiledTree) -> tuple[FloatArray, FloatArray]:

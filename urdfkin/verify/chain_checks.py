@@ -16,7 +16,7 @@ import numpy as np
 from urdfkin.dh.common_normals import left_out
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import Opw
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, of_joints
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, joint_roundings
 from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray, JointFrame
@@ -55,7 +55,7 @@ def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | No
     metres = float(off[..., 3].max(initial=0.0))
     turned = max(float(off[..., 2].max(initial=0.0)), float(off[:, -1, :, :3].max(initial=0.0)))
     ends = [i for end in (path.base, path.tip) for i in tree.path(tree.frame_link(end))]
-    unit = EPS * float(of_joints(len(ends) + 2, sum(tree.joints[i].tilt for i in ends)))
+    unit = EPS * float(joint_roundings(len(ends) + 2, sum(tree.joints[i].tilt for i in ends)))
     length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
     slides = values[:, [not joint.kind.turns for joint in path.joints]]
     length += np.abs(slides).sum(axis=-1).max(initial=0.0)
@@ -96,7 +96,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     # The product of exponentials is the placement of the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
     joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
-    unit = EPS * (of_joints(joints) + size) + left_out(path)
+    unit = EPS * (joint_roundings(joints) + size) + left_out(path)
     allowed = screws.rounding(coordinates) + unit * (lever + size)
     share = float((off[..., 3].max(axis=-1) / (allowed + LEAST_UNIT)).max(initial=0.0))
     turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())

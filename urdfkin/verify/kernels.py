@@ -28,7 +28,7 @@ from urdfkin.compiled.machine.memory import fetch, numbers_at
 from urdfkin.compiled.plan import JointMotion
 from urdfkin.kinematics import lengths as steps
 from urdfkin.kinematics.arithmetic import bound, rebound
-from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
 
 _INFINITE = 0x7FF0000000000000
 _WITHOUT_SIGN = 0x7FFFFFFFFFFFFFFF
@@ -171,7 +171,7 @@ def _sum(x, y):
 @helper()
 def _product(x, y):
     """Return the product of two lengths, as `urdfkin.kinematics.number_kinds.product` does."""
-    return SMALLEST if x * y < SMALLEST and x != 0.0 and y != 0.0 else x * y
+    return SMALLEST_NORMAL if x * y < SMALLEST_NORMAL and x != 0.0 and y != 0.0 else x * y
 
 
 @helper()

@@ -19,7 +19,7 @@ from urdfkin.compiled.plan import compile_tree
 from urdfkin.dh.convert import link_names
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
-from urdfkin.kinematics.roundings import EPS, ROW, of_rows, of_rows_read_back
+from urdfkin.kinematics.roundings import EPS, ROW_ROUNDINGS, table_roundings, read_back_roundings
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
@@ -104,8 +104,8 @@ def check_table_source(verifier: Verifier, table: DHTable) -> None:
     off = np.abs(theirs - table.placement(own))[:, :3]
     # Base and tool of the table may be rounded to six digits; the rotations in the URDF are exact.
     rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
-    turn = EPS * of_rows_read_back(rows) + defect
-    allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
+    turn = EPS * read_back_roundings(rows) + defect
+    allowed = metres * (read_back_roundings(rows) / table_roundings(rows) + defect / (EPS * ROW_ROUNDINGS))
     if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
         raise TableError(
             "the URDF made from a table differs from the table",

@@ -27,7 +27,7 @@ import numpy as np
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
 from urdfkin.kinematics.rotation import rotation_of
-from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import WIDEST
 from urdfkin.model.tree import (
@@ -49,11 +49,11 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 PATIENCE = 60.0
-#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE` (derived in `_check_joint`).
+#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF` (derived in `_check_joint`).
 _ROTATION = 18.0
 #: Number of rounding errors in a joint's origin (derived in `_check_joint`).
 _ORIGIN = 3.0
-#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE`.
+#: Bound on the angle error (rad) of one operation of a prim's transform, divided by `SINGLE_ROUNDOFF`.
 #: `_compare_prims` derives this bound.
 _TRANSFORM = 6.0 * np.pi
 
@@ -125,7 +125,7 @@ def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[R
 def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None) -> float:
     """Compare urdfkin's and OpenUSD's data of a joint; return the largest ratio of a difference to its bound.
 
-    Let u = `SINGLE` be the relative error of one rounding to single precision.
+    Let u = `SINGLE_ROUNDOFF` be the relative error of one rounding to single precision.
 
     - Rotation: rounding the four numbers of a quaternion changes the angle by at most 2 u. The product of two
       quaternions adds 4 u to each number. The vector of the four errors has the length 8 u. The angle error
@@ -141,13 +141,13 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
     for p, quaternion in ((3, 4), (5, 6)):
         off = float(np.linalg.norm(np.subtract(ours[p], theirs[p])))
         if off > 0.0:
-            shares.append(off / (_ORIGIN * SINGLE * size) if size else np.inf)
+            shares.append(off / (_ORIGIN * SINGLE_ROUNDOFF * size) if size else np.inf)
         R = rotation_of(ours[quaternion]).T @ rotation_of(theirs[quaternion])
-        shares.append(_angle(R) / (_ROTATION * SINGLE))
+        shares.append(_angle(R) / (_ROTATION * SINGLE_ROUNDOFF))
     for a, b in zip(ours[7], theirs[7], strict=True):
         finite = abs(a) < np.inf
         if finite and a != b:
-            shares.append(abs(a - b) / (SINGLE * abs(a)) if a else np.inf)
+            shares.append(abs(a - b) / (SINGLE_ROUNDOFF * abs(a)) if a else np.inf)
     if not max(shares) <= 1.0:
         raise _error(f"{name}, joint {path}", f"{max(shares):.3g} times the bound of single precision")
     return max(shares)
@@ -243,7 +243,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     """Compare the placements of links with the transforms of their prims, in the stage's configuration.
 
     The bound assumes that a prim's transform consists of several operations: one operation for each joint on
-    the path from the root, and one more. With u = `SINGLE`, the angle error of one operation is at most
+    the path from the root, and one more. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at most
     `_TRANSFORM` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
@@ -274,8 +274,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
         depth = len(tree.path(link)) + 1
         off = float(np.linalg.norm(ours[k, :3, 3] - rest[k, :3, 3]))
         angle = _angle(ours[k, :3, :3].T @ rest[k, :3, :3])
-        turn = of_links[link, 1] + depth * _TRANSFORM * SINGLE
-        length = of_links[link, 0] + depth * SINGLE * (1.0 + _TRANSFORM) * 2.0 * far
+        turn = of_links[link, 1] + depth * _TRANSFORM * SINGLE_ROUNDOFF
+        length = of_links[link, 0] + depth * SINGLE_ROUNDOFF * (1.0 + _TRANSFORM) * 2.0 * far
         share = max(off / length if off else 0.0, angle / turn if angle else 0.0)
         shares.append(share)
         worst = max(worst[0], off), max(worst[1], angle)

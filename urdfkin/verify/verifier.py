@@ -17,7 +17,7 @@ from urdfkin.compiled import preload
 from urdfkin.compiled.plan import CompiledTree, IntArray
 from urdfkin.errors import InputError, OracleError, RangeError, warn_caller
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.roundings import EPS, NOT_ZERO, of_joints
+from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings
 from urdfkin.model.base_motion import STILL_STATE, BaseMotion
 from urdfkin.model.configuration import draw, warn_of_degrees
 from urdfkin.model.reference import Reference
@@ -335,7 +335,7 @@ class Verifier:
         error = np.abs(ours - theirs)[..., :3, :]
         reach = parameters.reach(q)
         units = max(
-            float((error[..., 3].max(axis=-1) / np.maximum(EPS * reach, NOT_ZERO)).max(initial=0.0)),
+            float((error[..., 3].max(axis=-1) / np.maximum(EPS * reach, MIN_DIVISOR)).max(initial=0.0)),
             float(error[..., :3].max(initial=0.0)) / EPS,
         )
         line = (
@@ -343,7 +343,7 @@ class Verifier:
             f" {error[..., 3].max(initial=0.0):.2e} m, {units:.2g} eps*scale"
         )
         tilt = max(sum(tree.joints[i].tilt for i in tree.path(leaf)) for leaf in tree.leaves())
-        if units > parameters.roundings + of_joints(0, tilt):
+        if units > parameters.roundings + joint_roundings(0, tilt):
             raise TableError(
                 f"the tree parameters of {tree.name} disagree with Pinocchio",
                 where=f"Pinocchio {version()}",

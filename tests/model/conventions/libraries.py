@@ -6,12 +6,12 @@ eps = 2^-52 or, for single precision, 2^-23:
 
 | Library | How it computes a joint | Roundings of both together |
 |---|---|---|
-| Pinocchio | a rotation matrix; constants by a quaternion | ROUNDINGS |
+| Pinocchio | a rotation matrix; constants by a quaternion | PINOCCHIO_ROUNDINGS |
 | Drake, iDynTree | a rotation matrix; constants from roll, pitch, yaw, 3.1; rotation about any axis by
-  Rodrigues' formula, 4.0; two products, 3.6 | 5.7 + 10.7, at most ROUNDINGS |
+  Rodrigues' formula, 4.0; two products, 3.6 | 5.7 + 10.7, at most PINOCCHIO_ROUNDINGS |
 | Robotics Toolbox | a product of 4 x 4 matrices: three elementary rotations for roll, pitch, yaw, and that of
-  the joint: 1.8 each, with the sine and cosine 0.5 each | 5.7 + 9.2, at most ROUNDINGS |
-| MuJoCo | a unit quaternion | MUJOCO |
+  the joint: 1.8 each, with the sine and cosine 0.5 each | 5.7 + 9.2, at most PINOCCHIO_ROUNDINGS |
+| MuJoCo | a unit quaternion | MUJOCO_ROUNDINGS |
 | Newton | a unit quaternion of single precision, 21.5; rounding q up to 2 pi, 3.2, the origin, 0.5, and roll,
   pitch and yaw up to pi, 4.8, to single precision | SINGLE |
 
@@ -32,7 +32,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from urdfkin.kinematics.roundings import EPS, MUJOCO, ROUNDINGS
+from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS
 from urdfkin.model.conventions.convention import transcoded
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
@@ -52,7 +52,7 @@ class Library:
     names: list[str]
     evaluate: Evaluate
     #: Roundings for each joint and factor, of urdfkin and the library together, and their unit.
-    roundings: float = ROUNDINGS
+    roundings: float = PINOCCHIO_ROUNDINGS
     eps: float = EPS
     #: Factors of a velocity and a Jacobian beyond those of the comparison with Pinocchio.
     more: int = 1
@@ -125,7 +125,7 @@ def mujoco(robot: Robot, folder: Path) -> Library:
         return T, J @ v, J
 
     names = [model.joint(i).name for i in range(model.njnt)]
-    return Library(names, evaluate, roundings=MUJOCO, more=2, at_mass=True)
+    return Library(names, evaluate, roundings=MUJOCO_ROUNDINGS, more=2, at_mass=True)
 
 
 def drake(robot: Robot, folder: Path) -> Library:

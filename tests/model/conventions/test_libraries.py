@@ -21,7 +21,7 @@ import urdfkin
 from tests import urdfs
 from tests.model.conventions.libraries import LIBRARIES, Library
 from tests.urdfs import joint
-from urdfkin.kinematics.roundings import ROUNDINGS
+from urdfkin.kinematics.roundings import PINOCCHIO_ROUNDINGS
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, find_convention
 from urdfkin.model.reference import Reference
@@ -58,7 +58,7 @@ def _differences(
         plan = robot.plan([robot.tree.link_index(link)])
         size = magnitudes(plan, q[None], v[None], None, STILL_STATE)
         reach = _farthest_mass(robot, q) if library.at_mass else 0.0
-        roundings = size.roundings * library.roundings / ROUNDINGS
+        roundings = size.roundings * library.roundings / PINOCCHIO_ROUNDINGS
         size = replace(size, p=size.p + reach, vel=size.vel + size.w * reach, roundings=roundings)
         for quantity, theirs, ours in (
             (PLACEMENT, T, robot.placement(q, frame)),

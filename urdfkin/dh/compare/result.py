@@ -15,7 +15,7 @@ from urdfkin.dh.table import DHRow, DHTable, nearest_twelfth
 from urdfkin.dh.units import Units
 from urdfkin.errors import QuestionsSection
 from urdfkin.errors.display import Matrix, Table, TextDocument
-from urdfkin.kinematics.roundings import EPS, of_a_fit
+from urdfkin.kinematics.roundings import EPS, fit_roundings
 from urdfkin.model.tree import Limit, is_bounded
 
 Parts = list[str | Table | Matrix]
@@ -170,7 +170,7 @@ class TableComparison:
     @property
     def rounding(self) -> float:
         """Largest tip error that rounding can cause, in radians, or in metres per metre of reach."""
-        return EPS * of_a_fit(len(self.reference.rows))
+        return EPS * fit_roundings(len(self.reference.rows))
 
     @property
     def resolution(self) -> float:

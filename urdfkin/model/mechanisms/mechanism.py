@@ -57,7 +57,7 @@ from urdfkin.kinematics.rotation import (
     rotation_about,
     rotation_of,
 )
-from urdfkin.kinematics.roundings import AXES, CONSTANT, EPS, WRITTEN
+from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS, EPS, FILE_ROUNDINGS
 from urdfkin.model.chain import LEAST_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
@@ -367,7 +367,9 @@ class Mechanism:
         the small tilts of Pinocchio's axes (URDF514).
         """
         joints = max(self.depths) + 1
-        return EPS * ((CONSTANT + WRITTEN + AXES) * joints) + 2.0 * sum(j.tilt for j in self.tree.joints)
+        return EPS * ((CONSTANT_POSE_ROUNDINGS + FILE_ROUNDINGS + AXIS_ROUNDINGS) * joints) + 2.0 * sum(
+            j.tilt for j in self.tree.joints
+        )
 
 
 @dataclass(frozen=True, slots=True)
