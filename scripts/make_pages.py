@@ -24,7 +24,7 @@ from scripts.benchmarking import tables
 from scripts.benchmarking.picture import draw
 from scripts.pages import DOCS, inserted, table
 from urdfkin.compiled.preload import only
-from urdfkin.kinematics.registry import table as equations
+from urdfkin.kinematics.registry import equations_page
 from urdfkin.model.configuration import draw_base
 from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
@@ -288,7 +288,7 @@ def path_of(name: str) -> Path:
 
 def page(name: str) -> str:
     if name == "equations":
-        return equations()
+        return equations_page()
     text = path_of(name).read_text("utf-8")
     if name == "performance":
         return tables.page(text, json.loads(FIGURES.read_text("utf-8")))

@@ -41,10 +41,10 @@ CHANGES = [
     ("model.configuration_like.CoordinateLayout._of_a_joint", "x[..., k]", "x[..., -1 - k]"),
     ("model.configuration_like.CoordinateLayout._by_name", "out[..., i] = x", "out[..., i - 1] = x"),
     # configurations, coordinates, mimic joints
-    ("model.configuration.with_unit_quaternions",
-     "quaternion[...] = unit_quaternions(quaternion, f'the quaternion of joint {tree.joints[i].name}')",
-     "_ = unit_quaternions(quaternion, f'the quaternion of joint {tree.joints[i].name}')"),
-    ("kinematics.rotation.unit_quaternions", "quat / norms", "quat * norms"),
+    ("model.configuration.with_normalise_quaternions",
+     "quaternion[...] = normalise_quaternions(quaternion, f'the quaternion of joint {tree.joints[i].name}')",
+     "_ = normalise_quaternions(quaternion, f'the quaternion of joint {tree.joints[i].name}')"),
+    ("kinematics.rotation.normalise_quaternions", "quat / norms", "quat * norms"),
     ("model.tree.KinematicTree._offsets",
      "(int(own[i]) for i in leaders)", "(int(own[i]) for i in range(len(self.joints)))"),
     ("model.tree._last_name_first", "reverse=True", ""),
@@ -74,7 +74,7 @@ CHANGES = [
     ("compiled.plan._steps", "rule.offset", "-rule.offset"),
     ("compiled.plan._steps", "tree.v_index[i]", "tree.v_index[i] - 1"),
     ("compiled.plan.compile_tree", "anchors[links[place]].step", "-anchors[links[place]].step"),
-    ("kinematics.rotation.axis_aligning",
+    ("kinematics.rotation.rotation_with_z_axis",
      "np.stack([*columns, axis], axis=-1)", "-np.stack([*columns, axis], axis=-1)"),
     # a table's URDF
     ("model.path._moved", "motion.turns", "not motion.turns"),

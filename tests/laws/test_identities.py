@@ -332,7 +332,7 @@ def test_relative_placement_accepts_frames_batches_and_out_as_placement_does() -
 def test_an_error_in_a_relative_placement_is_found_and_reproducible(
     mistake: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    right: Any = bodies.seen_from
+    right: Any = bodies.relative_pose
 
     def wrong(T_a: FloatArray, T_b: FloatArray, out: FloatArray | None) -> FloatArray:
         T: FloatArray = right(T_a, T_b, out)
@@ -346,7 +346,7 @@ def test_an_error_in_a_relative_placement_is_found_and_reproducible(
 
     robot = urdfkin.load("ur5")
     q = robot.sample(1, seed=4)[0]
-    monkeypatch.setattr(bodies, "seen_from", wrong)
+    monkeypatch.setattr(bodies, "relative_pose", wrong)
     with pytest.raises(VerificationError, match="relative placement of tool0") as caught:
         robot.relative_placement(q, "tool0", "forearm_link")
     monkeypatch.undo()

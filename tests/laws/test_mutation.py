@@ -14,7 +14,7 @@ from tests.laws.subjects import robot_of
 from tests.reading import present, tree_of
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import VECTORS
+from urdfkin.kinematics.arithmetic import VECTOR_OPERATIONS
 from urdfkin.robot import Robot
 from urdfkin.urdf.sources import Origin
 from urdfkin.validation.accuracy import accuracy_study
@@ -31,7 +31,7 @@ WIDEST = 24.0 * 4 * 12
 def terms() -> Iterator[tuple[str, str]]:
     """Yield (equation, term) for each vector in the last line of an equation."""
     for name, function in vars(equations).items():
-        if not inspect.isfunction(function) or name in VECTORS or name not in USED:
+        if not inspect.isfunction(function) or name in VECTOR_OPERATIONS or name not in USED:
             continue
         for node in ast.walk(ast.parse(inspect.getsource(function)).body[0]):
             if isinstance(node, ast.Call):

@@ -19,7 +19,7 @@ from urdfkin.compiled.plan import CompiledTree, compile_tree
 from urdfkin.export.function import function_of
 from urdfkin.export.recursion import QUANTITIES as EXPORTED
 from urdfkin.kinematics.bodies import QUATERNION
-from urdfkin.kinematics.rotation import SEQUENCES
+from urdfkin.kinematics.rotation import EULER_SEQUENCES
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.mechanisms.mechanism import coordinates_of, pose_of
 from urdfkin.model.recursion import IDENTITY, ZERO
@@ -132,7 +132,7 @@ def test_the_oracles_refuse_a_new_reference_frame(
 def test_kernels_and_command_line_support_every_reference_frame() -> None:
     assert dict(IN_KERNELS) == {reference: reference.value for reference in Reference}
     assert tuple(reference.name.lower() for reference in Reference) == REFERENCES
-    assert set(REPRESENTATIONS) == {"rpy", QUATERNION, *SEQUENCES}
+    assert set(REPRESENTATIONS) == {"rpy", QUATERNION, *EULER_SEQUENCES}
 
 
 # -- joint kinds -----------------------------------------------------------------------------------------

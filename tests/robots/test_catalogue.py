@@ -14,7 +14,7 @@ import urdfkin
 from tests.robots.against_pinocchio import assert_agrees, model_of
 from urdfkin.compiled import evaluate
 from urdfkin.kinematics.bodies import orientation_of
-from urdfkin.kinematics.rotation import SEQUENCES
+from urdfkin.kinematics.rotation import EULER_SEQUENCES
 from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
@@ -282,7 +282,7 @@ def test_an_error_of_the_jacobian_rate_is_detected(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("representation", [*SEQUENCES, "quaternion"])
+@pytest.mark.parametrize("representation", [*EULER_SEQUENCES, "quaternion"])
 def test_the_manipulator_jacobian_predicts_the_change_of_the_pose(representation: str) -> None:
     robot = urdfkin.load("ur5")
     q, v, step = robot.sample(1, 7)[0], np.random.default_rng(8).normal(size=6), 1e-4

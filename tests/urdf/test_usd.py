@@ -26,7 +26,12 @@ from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
 from urdfkin.comparison.result import Sameness, SameQuestion
 from urdfkin.errors import InputError, OracleError, SourceError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
+from urdfkin.kinematics.rotation import (
+    quaternion_of,
+    rotation_about,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.conventions.convention import transcoded
 from urdfkin.model.tree import LARGEST_ANGLE, KinematicTree, pose
@@ -1256,7 +1261,7 @@ def test_the_newton_simulator_computes_the_same_placements(write: Write, up: str
             T = robot.placement(q, str(label).rpartition("/")[2])
             assert seven[:3] == pytest.approx(T[:3, 3], abs=1e-5)
             x, y, z, w = seven[3:].astype(float) / np.linalg.norm(seven[3:])
-            assert pose(rotation_of([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)
+            assert pose(rotation_from_quaternion([x, y, z, w]))[:3, :3] == pytest.approx(T[:3, :3], abs=1e-5)
 
 
 def turn(name: str, first: str, second: str, place: Sequence[float], rotation: object = (1, 0, 0, 0)) -> str:
@@ -1409,7 +1414,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         xyzw = rng.normal(size=4)
         xyzw /= np.linalg.norm(xyzw)
         w, v = float(xyzw[3]), xyzw[:3].tolist()
-        matrix = pose(rotation_of(xyzw)).T
+        matrix = pose(rotation_from_quaternion(xyzw)).T
         for op, exact, rounded in (
             (f"Rotate{orders[k % 6]}", gf.Vec3d(*degrees), gf.Vec3f(*degrees)),
             (f"Rotate{'XYZ'[k % 3]}", float(degrees[0]), float(np.float32(degrees[0]))),

@@ -17,7 +17,7 @@ from urdfkin import BaseMotion
 from urdfkin.compiled import evaluate
 from urdfkin.errors import InputError
 from urdfkin.kinematics import equations as eq
-from urdfkin.kinematics.rotation import SEQUENCES, quaternion_of
+from urdfkin.kinematics.rotation import EULER_SEQUENCES, quaternion_of
 from urdfkin.model import base_motion as recursion_base
 from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
@@ -256,7 +256,7 @@ def test_the_exact_analytical_jacobian_is_the_difference_quotient_of_the_pose(na
             assert abs(J[row, column] - (late - early) / (2 * step)) < 1e-28  # type: ignore[operator]
 
 
-@pytest.mark.parametrize("name", [name for name in SEQUENCES if name.islower()])
+@pytest.mark.parametrize("name", [name for name in EULER_SEQUENCES if name.islower()])
 def test_angles_about_fixed_axes_have_the_rows_of_euler_angles_in_reverse_order(name: str) -> None:
     robot = urdfkin.load("panda", verify=False)
     q = robot.sample(5, 0)

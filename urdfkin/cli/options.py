@@ -586,9 +586,9 @@ def _read_rows(text: str, option: str, layouts: Sequence[Sequence[str]]) -> tupl
 def _placements(rows: FloatArray, names: Sequence[str]) -> FloatArray:
     import numpy as np
 
-    from urdfkin.kinematics.rotation import rotation_from_rpy, rotation_of
+    from urdfkin.kinematics.rotation import rotation_from_quaternion, rotation_from_rpy
 
     T: FloatArray = np.tile(np.eye(4), (len(rows), 1, 1))
-    rotation = rotation_of if names is _QUATERNION else rotation_from_rpy
+    rotation = rotation_from_quaternion if names is _QUATERNION else rotation_from_rpy
     T[:, :3, :3], T[:, :3, 3] = rotation(rows[:, 3:]), rows[:, :3]
     return T

@@ -405,7 +405,7 @@ def _replay_command(x: Inputs, k: int, written: str) -> str:
     return f"{line} --as {written}"
 
 
-#: Copy of `urdfkin.kinematics.rotation.SEQUENCES`; the import of that module would slow --help down
+#: Copy of `urdfkin.kinematics.rotation.EULER_SEQUENCES`; the import of that module would slow --help down
 _TRIPLES = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
 REPRESENTATIONS = ("rpy", "quaternion", *(triple.upper() for triple in _TRIPLES), *_TRIPLES)
 

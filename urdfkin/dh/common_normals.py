@@ -32,8 +32,8 @@ from urdfkin.kinematics.roundings import (
     CONSTANT_POSE_ROUNDINGS,
     DECIMAL_ROUNDINGS,
     EPS,
-    LENGTH_ROUNDINGS,
     FILE_ROUNDINGS,
+    LENGTH_ROUNDINGS,
 )
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.tree import FloatArray, Joint

@@ -25,7 +25,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Displayable, Matrix, Table, TextDocument, six_digits
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.inputs import rotation_defect
-from urdfkin.kinematics.rotation import ROUNDED, axis_aligning, polar_factor
+from urdfkin.kinematics.rotation import ROUNDED, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration_like import Given
@@ -38,7 +38,7 @@ from urdfkin.model.tree import (
     KinematicTree,
     Limit,
     Mimic,
-    frozen,
+    freeze,
     pose,
 )
 
@@ -99,7 +99,7 @@ class ProductOfExponentials(Displayable):
         """
         R, p = self.M[:3, :3], self.M[:3, 3]
         w, v = self.space[:, :3], self.space[:, 3:]
-        return frozen(np.hstack([w @ R, (v - np.cross(p, w)) @ R]))
+        return freeze(np.hstack([w @ R, (v - np.cross(p, w)) @ R]))
 
     @cached_property
     def coupling(self) -> Coupling:
@@ -155,7 +155,7 @@ class ProductOfExponentials(Displayable):
         """
         steps, R, p = list[FloatArray | ElementaryMotion](), np.eye(3), np.zeros(3)
         for joint, screw, point in zip(self.joints, self.space, self.points, strict=True):
-            along = axis_aligning(screw[:3] if joint.kind.turns else screw[3:])
+            along = rotation_with_z_axis(screw[:3] if joint.kind.turns else screw[3:])
             steps += [pose(R.T @ along, R.T @ (point - p)), ElementaryMotion(2, joint.kind.turns)]
             R, p = along, point
         return Path((*steps, pose(R.T @ self.M[:3, :3], R.T @ (self.M[:3, 3] - p))))
@@ -248,7 +248,7 @@ def screws_of(path: FrameChain) -> ProductOfExponentials:
         rows.append(np.concatenate([z, np.cross(p, z)] if joint.kind.turns else [np.zeros(3), z]) + 0.0)
     joints = tuple(ScrewJoint(one.name, one.kind, one.mimic, one.limit) for one in path.joints)
     ends = path.robot, path.base, path.tip
-    return ProductOfExponentials(joints, frozen(frames[-1]), frozen(np.array(rows).reshape(-1, 6)), *ends)
+    return ProductOfExponentials(joints, freeze(frames[-1]), freeze(np.array(rows).reshape(-1, 6)), *ends)
 
 
 def _rigid(M: FloatArray) -> FloatArray:
@@ -323,7 +323,7 @@ def screws_from(
             )
         S[i, 3:] -= pitch * S[i, :3]
         named.append(ScrewJoint(name, JointKind.CONTINUOUS if turns else JointKind.PRISMATIC))
-    return ProductOfExponentials(tuple(named), frozen(T), frozen(S), robot, base_frame, tip_frame)
+    return ProductOfExponentials(tuple(named), freeze(T), freeze(S), robot, base_frame, tip_frame)
 
 
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:

@@ -35,7 +35,7 @@ from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
 from urdfkin.model.chain import FrameChain, chain, steps_between
 from urdfkin.model.configuration import axis_range, values_within
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, freeze
 
 #: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
@@ -71,10 +71,10 @@ def snap_chain(
         if angle:
             changes.append((k, _change(exact, k + 1, f"direction of {names[k]}", angle)))
     joints = [
-        replace(joint, T_previous_joint=frozen(A))
+        replace(joint, T_previous_joint=freeze(A))
         for joint, A in zip(path.joints, constants[:-1], strict=True)
     ]
-    return replace(path, joints=tuple(joints), T_last_tip=frozen(constants[-1])), changes
+    return replace(path, joints=tuple(joints), T_last_tip=freeze(constants[-1])), changes
 
 
 def snap_thetas(table: DHTable, exact: FrameChain, tolerance: float) -> tuple[DHTable, list[SnapChange]]:

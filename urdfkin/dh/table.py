@@ -34,7 +34,7 @@ from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import ElementaryMotion, Path
-from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen, is_rigid
+from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, freeze, is_rigid
 from urdfkin.system.lazy_import import hook
 
 
@@ -550,7 +550,7 @@ class DHTable(Displayable):
 
 
 def _rigid(T: ArrayLike, where: str) -> FloatArray:
-    pose = frozen(T)
+    pose = freeze(T)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise InputError(
             "a pose must be a (4, 4) array of finite numbers", where=where, found=f"shape {pose.shape}"

@@ -40,7 +40,7 @@ from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.path import elementary
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, frozen
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, freeze
 
 _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1, JointKind.FIXED: 2}
 
@@ -180,9 +180,9 @@ def tree_parameters(tree: KinematicTree) -> TreeParameters:
         np.linalg.inv(along_axis(*offsets.get(j, (0.0, 0.0)))) @ link.T_link_axis.T
         for j, link in enumerate(links)
     ]
-    T_frame_link = frozen(np.reshape(poses, (-1, 4, 4)))
+    T_frame_link = freeze(np.reshape(poses, (-1, 4, 4)))
     left_out = max((link.left_out for link in links), default=0.0)
-    return TreeParameters(tree.name, tree.links[0], rows, frozen(lengths), T_frame_link, left_out)
+    return TreeParameters(tree.name, tree.links[0], rows, freeze(lengths), T_frame_link, left_out)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from urdfkin.kinematics import equations
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 
 #: The textbook's LaTeX symbol for a parameter of a function in `equations`, by the parameter's name.
 #: A parameter without an entry is its own symbol.
@@ -86,7 +86,7 @@ def _rotate(R: LatexTerm, x: LatexTerm) -> LatexTerm:
     return LatexTerm(f"{R.inside(_CROSS)} \\, {x.inside(_CROSS)}")
 
 
-_latex_equations = bound(
+_latex_equations = bind_equations(
     plus=lambda x, y: x + y,
     minus=lambda x, y: x - y,
     times=_times,

@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.kinematics.arithmetic import bound
+from urdfkin.kinematics.arithmetic import bind_equations
 from urdfkin.kinematics.inputs import FloatArray
 from urdfkin.kinematics.roundings import SMALLEST_NORMAL
 
-array_equations = bound(
+array_equations = bind_equations(
     plus=np.add,
     minus=np.subtract,
     times=lambda c, x: np.asarray(c)[..., np.newaxis] * x,
@@ -57,10 +57,10 @@ def product(x: Length, y: Length) -> Length:
     )
 
 
-def counted(x: FloatArray) -> FloatArray:
+def magnitude(x: FloatArray) -> FloatArray:
     """Return the absolute values |x|; every value that is not zero is raised to at least `SMALLEST_NORMAL`.
 
-    >>> counted(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST_NORMAL, 2.0]
+    >>> magnitude(np.array([0.0, -5e-324, -2.0])).tolist() == [0.0, SMALLEST_NORMAL, 2.0]
     True
     """
     return np.where(x == 0.0, 0.0, np.maximum(np.abs(x), SMALLEST_NORMAL))
@@ -68,12 +68,14 @@ def counted(x: FloatArray) -> FloatArray:
 
 def norm(x: FloatArray) -> FloatArray:
     """Return the lengths (...) of vectors (..., n); a length is 0 or at least `SMALLEST_NORMAL`."""
-    return counted(np.hypot.reduce(x, axis=-1))  # Squares could underflow or overflow, but np.hypot does not.
+    return magnitude(
+        np.hypot.reduce(x, axis=-1)
+    )  # Squares could underflow or overflow, but np.hypot does not.
 
 
 #: The textbook's equations for scales: the arguments are lengths of vectors and absolute values of numbers.
 #: Arguments that are arrays follow NumPy's broadcasting rules.
-length_equations = bound(
+length_equations = bind_equations(
     plus=add,
     minus=add,
     times=product,

@@ -17,7 +17,7 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
-from urdfkin.kinematics.rotation import axis_aligning
+from urdfkin.kinematics.rotation import rotation_with_z_axis
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import ElementaryMotion, Path
@@ -28,7 +28,7 @@ from urdfkin.model.tree import (
     KinematicTree,
     Limit,
     Mimic,
-    frozen,
+    freeze,
     inverse,
     pose,
 )
@@ -249,14 +249,14 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
         length += 0.0 if backwards else joint.length
         count += 1
         if joint.kind.has_axis:
-            joints.append(ChainJoint(joint.name, joint.kind, backwards, frozen(A), joint.limit, joint.mimic))
+            joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
             folded.append(count)
             # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0
-    ends = frozen(A), frozen([*lengths, length]), (*folded, count)
+    ends = freeze(A), freeze([*lengths, length]), (*folded, count)
     return FrameChain(tree.name, base_name, tip, tuple(joints), *ends)
 
 
@@ -277,7 +277,7 @@ def _poses_around(joint: Joint, backwards: bool) -> tuple[FloatArray, FloatArray
     """
     if not joint.kind.has_axis:
         return (inverse(joint.T_parent_joint) if backwards else joint.T_parent_joint), np.eye(4)
-    align = pose(axis_aligning(-joint.axis if backwards else joint.axis))
+    align = pose(rotation_with_z_axis(-joint.axis if backwards else joint.axis))
     if backwards:
         return align, align.T @ inverse(joint.T_parent_joint)
     return joint.T_parent_joint @ align, align.T

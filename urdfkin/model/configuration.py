@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urdfkin.errors import DegreesWarning, InputError, NotFiniteError, QuestionsSection, warn_caller
-from urdfkin.kinematics.inputs import floats
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, unit_quaternions
+from urdfkin.kinematics.inputs import as_floats
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, normalise_quaternions, rotation_from_quaternion
 from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT_ROUNDINGS
 from urdfkin.model.base_motion import BaseMotion
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name, listed
@@ -36,7 +36,7 @@ from urdfkin.model.tree import (
     Limit,
     Mimic,
     far_outside,
-    frozen,
+    freeze,
     is_bounded,
 )
 
@@ -377,7 +377,7 @@ def limits(tree: KinematicTree) -> FloatArray:
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1 and joint.limit is not None and joint.kind is not JointKind.CONTINUOUS:
             found[:, at] = joint.limit.lower, joint.limit.upper
-    return frozen(found)
+    return freeze(found)
 
 
 def velocity_limits(tree: KinematicTree) -> FloatArray:
@@ -385,7 +385,7 @@ def velocity_limits(tree: KinematicTree) -> FloatArray:
     for joint, at in zip(tree.joints, tree.v_index, strict=True):
         if joint.nv == 1 and joint.limit is not None:
             found[at] = joint.limit.velocity
-    return frozen(found)
+    return freeze(found)
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
@@ -395,14 +395,14 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
     q = q.copy()
     for i in tree.floating_joints:
         quaternion = q[..., tree.q_index[i] + 3 : tree.q_index[i] + 7]
-        quaternion[...] = unit_quaternions(quaternion, f"the quaternion of joint {tree.joints[i].name}")
+        quaternion[...] = normalise_quaternions(quaternion, f"the quaternion of joint {tree.joints[i].name}")
     return q
 
 
 def numbers(tree: KinematicTree, value: Given, what: str) -> FloatArray:
     if (named := by_name(value, what)) is not None:
         return coordinate_layout(tree, what).read(named)
-    array, width = floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
+    array, width = as_floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
         names = ", ".join(_names(tree, what)) or "none, no joint moves"
         instead = _other_lengths(tree, what).get(array.shape[-1]) if array.ndim else None
@@ -650,7 +650,7 @@ def draw_base(n: int, rng: np.random.Generator) -> BaseMotion:
     """Return random motions of the root link, with velocities and accelerations as in `draw`."""
     placed = _sample_floating(n, rng)
     placement = np.tile(np.eye(4), (n, 1, 1))
-    placement[:, :3, :3], placement[:, :3, 3] = rotation_of(placed[:, 3:]), placed[:, :3]
+    placement[:, :3, :3], placement[:, :3, 3] = rotation_from_quaternion(placed[:, 3:]), placed[:, :3]
     velocity, acceleration = rng.standard_normal((2, n, 6))
     velocity[::8] *= 100.0
     acceleration[::8] *= 100.0

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.errors.numbers import parse_float, parse_quantity, remedy
 from urdfkin.errors.validators import safe_repr
-from urdfkin.kinematics.inputs import FloatArray, floats
+from urdfkin.kinematics.inputs import FloatArray, as_floats
 
 #: Types that q, v and a may have. Text is included, because `ArrayLike` contains `str`.
 Given = ArrayLike | Mapping[str, ArrayLike]
@@ -145,7 +145,7 @@ with 'neutral, elbow=...'
                 i = index[name]
                 place = f"{where}, {name}"
                 number = self._number(value, place, self.units[i]) if isinstance(value, str) else value
-                found[i] = floats(number, place)
+                found[i] = as_floats(number, place)
             else:
                 found |= self._of_a_joint(name, value, where)
         missing = [name for i, name in enumerate(self.names) if i not in found]
@@ -173,7 +173,7 @@ with 'neutral, elbow=...'
         if not isinstance(name, str) or name not in self.spans:
             raise self._not_a_coordinate(name, where)
         at, size = self.spans[name]
-        x = floats(value, f"{where}, {name}")
+        x = as_floats(value, f"{where}, {name}")
         if x.shape[-1:] != (size,):
             names, count = self.names[at : at + size], (x.shape or (1,))[-1]
             raise wrong_count(names, count, f"{where}, {name}", question=QuestionsSection.FLOATING_BASES)

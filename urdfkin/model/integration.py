@@ -14,7 +14,13 @@ import math
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import exp_rotation, log_rotation, quaternion_of, rotation_of, skew
+from urdfkin.kinematics.rotation import (
+    exp_rotation,
+    log_rotation,
+    quaternion_of,
+    rotation_from_quaternion,
+    skew,
+)
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 
 #: Largest squared angle (rad^2) for which a series replaces (|w| - sin|w|)/|w|^3, to avoid cancellation.
@@ -83,7 +89,7 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
 def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
     p, orientation = _screw(joint, own)
-    return p, (rotation_of if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
+    return p, (rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
 
 
 def _screw(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:

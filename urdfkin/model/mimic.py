@@ -16,7 +16,7 @@ import numpy as np
 from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.model.configuration import numbers
 from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, frozen
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Coupling:
     def matrix(self) -> FloatArray:
         G = np.zeros((len(self.joints), len(self.names)))
         G[np.arange(len(self.joints)), self._leader_index] = self._multiplier
-        return frozen(G)
+        return freeze(G)
 
     @cached_property
     def offset(self) -> FloatArray:
         """The vector g (joints,): the joint values if every coordinate is zero."""
-        return frozen([mimic.offset if mimic else 0.0 for mimic in self.mimics])
+        return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
     def layout(self, what: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
@@ -92,7 +92,7 @@ class Coupling:
 
     @cached_property
     def _multiplier(self) -> FloatArray:
-        return frozen([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
+        return freeze([mimic.multiplier if mimic else 1.0 for mimic in self.mimics])
 
     def q_index(self, tree: KinematicTree) -> tuple[int, ...]:
         return tuple(tree.q_index[tree.joint_index(name)] for name in self.names)

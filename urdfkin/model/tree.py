@@ -59,10 +59,10 @@ class JointFrame(FrameName):
     prefix = "joint:"
 
 
-def frozen(array: ArrayLike) -> FloatArray:
+def freeze(array: ArrayLike) -> FloatArray:
     """Return a read-only, C-contiguous float64 copy of `array`; raises InputError if it is not numeric."""
     numeric = type(array) is np.ndarray and array.dtype == np.float64
-    copy = np.array(array if numeric else inputs.floats(array, "an array"), dtype=np.float64, order="C")
+    copy = np.array(array if numeric else inputs.as_floats(array, "an array"), dtype=np.float64, order="C")
     copy.setflags(write=False)
     return copy
 
@@ -160,8 +160,8 @@ class Joint:
     lock: Lock | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_parent_joint", frozen(self.T_parent_joint))
-        object.__setattr__(self, "axis", frozen(self.axis))
+        object.__setattr__(self, "T_parent_joint", freeze(self.T_parent_joint))
+        object.__setattr__(self, "axis", freeze(self.axis))
         if self.T_parent_joint.shape != (4, 4) or self.axis.shape != (3,):
             raise InputError(
                 "a joint needs a (4, 4) pose and a (3,) axis",
@@ -318,7 +318,7 @@ class KinematicTree:
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
                 lower, upper = far_outside(joint.limit.lower, joint.limit.upper)
                 ends[:, at] = min(lower, -LARGEST_ANGLE), max(upper, LARGEST_ANGLE)
-        return frozen(ends)
+        return freeze(ends)
 
     @cached_property
     def least_implausible(self) -> float:

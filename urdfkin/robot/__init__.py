@@ -34,7 +34,7 @@ from urdfkin.errors.validators import (
     whole_number,
 )
 from urdfkin.export import QUANTITIES as EXPORTED
-from urdfkin.kinematics.inputs import scalars, vectors
+from urdfkin.kinematics.inputs import as_finite, as_vectors
 from urdfkin.kinematics.rotation import NEAREST
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
@@ -646,7 +646,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").from_pinocchio([0.5, -1.0]).tolist()
         [0.5, -1.0]
         """
-        return configuration.from_pinocchio(self.tree, scalars(q, "q"), mimic=as_bool(mimic, "mimic"))
+        return configuration.from_pinocchio(self.tree, as_finite(q, "q"), mimic=as_bool(mimic, "mimic"))
 
     def convention(self, name: str | Path | Convention, joints: Sequence[str] | None = None) -> Conversion:
         """Return the conversion of q, v, a, Jacobians and six-vectors to a program's convention, and back.
@@ -815,7 +815,7 @@ class Robot(Displayable):
         [0.4, 0.0, 0.0]
         """
         with importing:
-            from urdfkin.kinematics.bodies import seen_from
+            from urdfkin.kinematics.bodies import relative_pose
 
         name = as_str(relative_to, "relative_to")
         # A plain str replaces a subclass of str, whose `__repr__` may change the name in error messages.
@@ -824,7 +824,7 @@ class Robot(Displayable):
         to = call.flat(out, (4, 4))
         self.verifier.require_pinocchio(verify)
         T_world = call.compute(PLACEMENT.ours, call.plan, (call.q,), None, threads=threads)
-        T = seen_from(T_world[:, -1:], T_world[:, :-1], to)
+        T = relative_pose(T_world[:, -1:], T_world[:, :-1], to)
         result = call.in_shape(T) if out is None else out
         self.verifier.check(RELATIVE_PLACEMENT, call, result, verify)
         return result
@@ -1014,7 +1014,7 @@ class Robot(Displayable):
         >>> arm.imu([0.0, 0.0], [0.0, 0.0], [0.0, 0.0], "tip").tolist()  # at rest
         [0.0, 0.0, 9.81, 0.0, 0.0, 0.0]
         """
-        g = vectors(gravity, "gravity")
+        g = as_vectors(gravity, "gravity")
         if g.shape != (3,):
             raise InputError("gravity must be one vector (3,)", found=f"shape {g.shape}")
         return self._computed(

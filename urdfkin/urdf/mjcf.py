@@ -28,7 +28,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from urdfkin.errors import InputError
-from urdfkin.kinematics.rotation import rotation_about, rotation_of
+from urdfkin.kinematics.rotation import rotation_about, rotation_from_quaternion
 from urdfkin.model.tree import (
     LARGEST_ANGLE,
     FloatArray,
@@ -560,4 +560,4 @@ def resolve(rules: Mapping[str, Mimic], joint: str) -> Mimic:
 
 
 def _pose(p: FloatArray, quaternion: FloatArray) -> FloatArray:
-    return pose(rotation_of(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)
+    return pose(rotation_from_quaternion(np.roll(quaternion, -1) / np.linalg.norm(quaternion)), p)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from urdfkin.errors import InputError, UnknownNameError
-from urdfkin.kinematics.rotation import coordinate_rotation, rotation_of, rpy_of
+from urdfkin.kinematics.rotation import coordinate_rotation, rotation_from_quaternion, rpy_of
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -71,7 +71,7 @@ def _joint(joint: JointRecord, rule: Mimic | None) -> Joint:
 def rpy_of_quaternion(quaternion: Sequence[float]) -> FloatArray:
     """Return roll, pitch and yaw (rad) of a quaternion (x, y, z, w) of any length."""
     scaled = np.asarray(quaternion) / np.abs(quaternion).max()
-    return rpy_of(rotation_of(scaled / np.linalg.norm(scaled)))
+    return rpy_of(rotation_from_quaternion(scaled / np.linalg.norm(scaled)))
 
 
 def _unit(axis: FloatArray, joint: str) -> FloatArray:

@@ -31,7 +31,7 @@ from typing import Any, Literal
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_of
+from urdfkin.kinematics.rotation import quaternion_of, rotation_from_quaternion
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.tree import (
     LARGEST_ANGLE,
@@ -621,7 +621,7 @@ class _StageReader:
             found = f"{p.tolist()}, {quaternion}"
             raise InputError(message, where=f"{self.source}: joint {prim.GetPath()}", found=found)
         off = float(np.linalg.norm(_rounding(p))) * self._unit, _turned(xyzw)
-        R, p = rotation_of(xyzw / size), p * self._unit
+        R, p = rotation_from_quaternion(xyzw / size), p * self._unit
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)

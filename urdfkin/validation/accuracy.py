@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from urdfkin.errors import InputError
 from urdfkin.kinematics.bodies import QUATERNION, analytical_jacobian
 from urdfkin.kinematics.rotation import (
+    EULER_SEQUENCES,
     NEAREST,
-    SEQUENCES,
     euler_of,
     quaternion_of,
     singularity_distance,
@@ -50,7 +50,7 @@ _INTERVALS = np.vectorize(exact, otypes=[object])
 #: Groups of representations of the orientation. The study has one `AccuracyLine` for each group.
 #: Angles about fixed axes are in no group: the Jacobian of Euler angles has the same rows in reverse order.
 _REPRESENTATIONS = {
-    "euler angles": tuple(name for name in SEQUENCES if name.isupper()),
+    "euler angles": tuple(name for name in EULER_SEQUENCES if name.isupper()),
     QUATERNION: (QUATERNION,),
 }
 

@@ -54,8 +54,8 @@ from numpy.typing import NDArray
 from urdfkin.compiled import preload
 from urdfkin.compiled.plan import ColumnField, CompiledTree, Geometry, JointMotion, StepField
 from urdfkin.kinematics import lengths as steps
-from urdfkin.kinematics.lengths import State
-from urdfkin.kinematics.number_kinds import Length, counted, norm, product
+from urdfkin.kinematics.lengths import LinkBounds
+from urdfkin.kinematics.number_kinds import Length, magnitude, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
 from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS, joint_roundings
 from urdfkin.model.base_motion import STILL_STATE
@@ -126,8 +126,8 @@ def _by_steps(lengths: _Lengths, inputs: Sequence[FloatArray], out: FloatArray) 
     for link in lengths.links:
         states.append((_step if rates else _place)(link, states[link.parent + 1], q, *rates))
     for end in lengths.ends:
-        carried = (steps.carried if rates else _carried_place)(states[end.step + 1], end.length)
-        for row, values in zip(out, carried, strict=False):
+        bounds = (steps.translate_point if rates else _carried_place)(states[end.step + 1], end.length)
+        for row, values in zip(out, bounds, strict=False):
             row[:, end.frame] = values
 
 
@@ -191,11 +191,11 @@ class _Lengths(NamedTuple):
 def _lengths(plan: CompiledTree) -> _Lengths:
     found: _Lengths | None = plan.cache.get("lengths")
     if found is None:
-        lengths, count = counted(plan.lengths).tolist(), len(plan.steps)
+        lengths, count = magnitude(plan.lengths).tolist(), len(plan.steps)
         rules = np.abs(plan.geometry[:, Geometry.MULTIPLIER :]).tolist()
         steps = zip(plan.steps.tolist(), plan.parents.tolist(), lengths[:count], rules, strict=True)
         links = [
-            _MovingJoint(kind, q, v, parent, length, multiplier, float(counted(offset)))
+            _MovingJoint(kind, q, v, parent, length, multiplier, float(magnitude(offset)))
             for (kind, q, v), parent, length, (multiplier, offset) in steps
         ]
         frames = zip(plan.frames.tolist(), lengths[count:], strict=True)
@@ -219,7 +219,7 @@ def _norm(x: Any) -> Length:
     return norm(x.T) if isinstance(x, np.ndarray) else float(norm(np.array(x))) if any(x) else 0.0
 
 
-def _carried_place(state: State, d: Length) -> State:
+def _carried_place(state: LinkBounds, d: Length) -> LinkBounds:
     return eq.point_position(state[0], None, d), *state[1:]
 
 
@@ -234,7 +234,7 @@ def _displacement(link: _MovingJoint, q: Any) -> Length:
     return product(link.multiplier, abs(q[link.q])) + link.offset
 
 
-def _place(link: _MovingJoint, state: State, q: Any) -> State:
+def _place(link: _MovingJoint, state: LinkBounds, q: Any) -> LinkBounds:
     turns = link.kind == JointMotion.TURN
     return _carried_place(state, link.length if turns else link.length + _displacement(link, q))
 
@@ -248,15 +248,15 @@ def _free_lengths(link: _MovingJoint, q: Any, v: Any, a: Any) -> tuple[Length, .
     return _displacement(link, q), o, u, o_rate, u_rate
 
 
-def _step(link: _MovingJoint, state: State, q: Any, v: Any, a: Any) -> State:
+def _step(link: _MovingJoint, state: LinkBounds, q: Any, v: Any, a: Any) -> LinkBounds:
     kind, d, at = link.kind, link.length, link.v
     if kind >= JointMotion.PLANAR:
-        slid, *rates = _free_lengths(link, q, v, a)
-        return steps.freed(state, d + slid, *rates)
+        displacement, *rates = _free_lengths(link, q, v, a)
+        return steps.after_free_joint(state, d + displacement, *rates)
     rate, rate_2 = product(link.multiplier, abs(v[at])), product(link.multiplier, abs(a[at]))
     if kind == JointMotion.SLIDE:
-        return steps.slid(state, d + _displacement(link, q), rate, rate_2)
-    return steps.turned(state, d, rate, rate_2)
+        return steps.after_prismatic(state, d + _displacement(link, q), rate, rate_2)
+    return steps.after_revolute(state, d, rate, rate_2)
 
 
 _ALIGNED = Reference.LOCAL_WORLD_ALIGNED

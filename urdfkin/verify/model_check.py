@@ -19,7 +19,7 @@ from urdfkin.compiled.plan import compile_tree
 from urdfkin.dh.convert import link_names
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
-from urdfkin.kinematics.roundings import EPS, ROW_ROUNDINGS, table_roundings, read_back_roundings
+from urdfkin.kinematics.roundings import EPS, ROW_ROUNDINGS, read_back_roundings, table_roundings
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame

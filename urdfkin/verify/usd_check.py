@@ -26,7 +26,7 @@ import numpy as np
 
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
-from urdfkin.kinematics.rotation import rotation_of
+from urdfkin.kinematics.rotation import rotation_from_quaternion
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import WIDEST
@@ -142,7 +142,7 @@ def _check_joint(name: str, path: str, ours: list[Any], theirs: list[Any] | None
         off = float(np.linalg.norm(np.subtract(ours[p], theirs[p])))
         if off > 0.0:
             shares.append(off / (_ORIGIN * SINGLE_ROUNDOFF * size) if size else np.inf)
-        R = rotation_of(ours[quaternion]).T @ rotation_of(theirs[quaternion])
+        R = rotation_from_quaternion(ours[quaternion]).T @ rotation_from_quaternion(theirs[quaternion])
         shares.append(_angle(R) / (_ROTATION * SINGLE_ROUNDOFF))
     for a, b in zip(ours[7], theirs[7], strict=True):
         finite = abs(a) < np.inf

@@ -364,7 +364,7 @@ def _least_squares_fit(
         residuals,
         derivatives,
         lambda model, free: with_changes(model, free, targets.scale),
-        longest=_LONGEST_STEP * targets.scale,
+        max_step=_LONGEST_STEP * targets.scale,
         patience=_PATIENCE,
     )
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
-from urdfkin.kinematics.inputs import scalars
-from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_of, skew
+from urdfkin.kinematics.inputs import as_finite
+from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
 from urdfkin.model.configuration_like import CoordinateLayout, Given
 from urdfkin.model.conventions.convention import Convention, JointRule, demand_unique, spelled
@@ -420,7 +420,7 @@ class Conversion:
         return [configuration.checked(self.tree, x, letter) for letter, x in letters if x is not None]
 
     def _theirs(self, value: ArrayLike, what: str) -> FloatArray:
-        array, width = scalars(value, what), self.nq if what == "q" else self.nv
+        array, width = as_finite(value, what), self.nq if what == "q" else self.nv
         if array.shape[-1:] != (width,):
             names = self.coordinate_names if what == "q" else self.rate_names
             raise InputError(
@@ -569,7 +569,7 @@ class Conversion:
             B[..., 1, 0], B[..., 0, 1], B[..., 2, 2] = sine, -sine, unit
             return B
         assert block.joint.kind is JointKind.FLOATING
-        R, own_axes = rotation_of(q[..., block.q + 3 : block.q + 7]), np.eye(3)
+        R, own_axes = rotation_from_quaternion(q[..., block.q + 3 : block.q + 7]), np.eye(3)
         if v is not None:
             R, own_axes = R @ skew(v[..., 3:]), np.zeros((3, 3))
         own_axes = np.broadcast_to(own_axes, R.shape)

@@ -51,11 +51,11 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from urdfkin.kinematics.rotation import (
-    axis_aligning,
     exp_rotation,
     quaternion_of,
     rotation_about,
-    rotation_of,
+    rotation_from_quaternion,
+    rotation_with_z_axis,
 )
 from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS, EPS, FILE_ROUNDINGS
 from urdfkin.model.chain import LEAST_SIZE
@@ -93,7 +93,7 @@ def smallest_rotation(u: FloatArray, v: FloatArray) -> tuple[FloatArray, float]:
     sine, cosine = float(np.linalg.norm(cross)), float(u @ v)
     angle = math.atan2(sine, cosine)
     if sine == 0.0:  # for opposite vectors, any perpendicular axis is correct
-        axis = np.zeros(3) if cosine > 0.0 else axis_aligning(u)[:, 0] * math.pi
+        axis = np.zeros(3) if cosine > 0.0 else rotation_with_z_axis(u)[:, 0] * math.pi
         return exp_rotation(axis), angle
     return exp_rotation(cross * (angle / sine)), angle
 
@@ -162,7 +162,7 @@ def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
     elif kind is not JointKind.FLOATING:
         raise NotImplementedError(f"the pose of a {kind} joint")
     else:
-        P[..., :3, 3], P[..., :3, :3] = own[..., :3], rotation_of(own[..., 3:])
+        P[..., :3, 3], P[..., :3, :3] = own[..., :3], rotation_from_quaternion(own[..., 3:])
     return P
 
 

@@ -47,7 +47,7 @@ from functools import cache
 
 import numpy as np
 
-from urdfkin.kinematics.rotation import axis_aligning, rotation_about
+from urdfkin.kinematics.rotation import rotation_about, rotation_with_z_axis
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
@@ -168,7 +168,7 @@ class Support:
 
     def radius(self, screw: Screw) -> float:
         """Return an upper bound (m) on the distance of any point of the set from a screw's line."""
-        x, y, _ = axis_aligning(screw.direction).T
+        x, y, _ = rotation_with_z_axis(screw.direction).T
         corners = _corners(0.0, _FULL_TURN, _CORNERS)
         u = np.array([factor * (math.cos(t) * x + math.sin(t) * y) for t, factor in corners])
         return float(max((self.at(u) - u @ screw.point).max(), 0.0))
