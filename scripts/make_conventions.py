@@ -27,7 +27,7 @@ import pinocchio as pin
 import urdfkin
 from scripts.pages import DOCS, inserted, table
 from urdfkin.model.conventions import Convention, find_convention
-from urdfkin.model.conventions.convention import _built_in, spelled
+from urdfkin.model.conventions.convention import _built_in, spell_name
 from urdfkin.model.tree import FloatArray
 from urdfkin.urdf.catalogue import catalogue
 
@@ -366,7 +366,7 @@ def _cells(how: Convention) -> dict[str, str]:
     return {
         "order of joints": order,
         "names of joints": {"urdf": "those of the URDF", "usd": "USD, `1` is `tn__1_`"}.get(
-            how.names, f"identifiers, `1` is `{spelled('1', how.names)}`"
+            how.names, f"identifiers, `1` is `{spell_name('1', how.names)}`"
         ),
         "q of a continuous joint": "the angle" if how.continuous == 1 else "its cosine and sine",
         "unit of angles": how.angle,

@@ -21,7 +21,7 @@ from urdfkin.compiled.python_numbers import LARGE
 from urdfkin.errors import NotFiniteError, RangeError
 from urdfkin.kinematics.number_kinds import product
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, SMALLEST_NORMAL
-from urdfkin.model.base_motion import STILL_STATE, BaseMotion
+from urdfkin.model.base_motion import FIXED_BASE_STATE, BaseMotion
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.validation.accuracy import accuracy_study
@@ -115,7 +115,7 @@ def test_velocities_whose_squares_underflow_are_verified_with_a_small_bound(size
     robot.velocity(q[0], v[0], "b")
     assert robot.certificate().verified
     plan = robot.plan([1])
-    sizes = magnitudes(plan, q, v, None, STILL_STATE)
+    sizes = magnitudes(plan, q, v, None, FIXED_BASE_STATE)
     bound = VELOCITY.bound(plan, sizes, urdfkin.Reference.LOCAL_WORLD_ALIGNED)
     allowed = float((bound.k * np.maximum(EPS * bound.scale, LEAST_UNIT)).max())
     assert allowed <= 100.0 * max(EPS * math.hypot(size, 2.0 * size), LEAST_UNIT)

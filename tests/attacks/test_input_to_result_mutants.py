@@ -38,10 +38,10 @@ CHANGES = [
     ("verify.call.Call.in_shape", "1 if self.several else 2", "1"),
     ("verify.call._frames", "False, (frame,)", "True, (frame,)"),
     # numbers by name
-    ("model.configuration_like.CoordinateLayout._of_a_joint", "x[..., k]", "x[..., -1 - k]"),
-    ("model.configuration_like.CoordinateLayout._by_name", "out[..., i] = x", "out[..., i - 1] = x"),
+    ("model.configuration_like.CoordinateLayout._parse_joint", "x[..., k]", "x[..., -1 - k]"),
+    ("model.configuration_like.CoordinateLayout._combine_values", "out[..., i] = x", "out[..., i - 1] = x"),
     # configurations, coordinates, mimic joints
-    ("model.configuration.with_normalise_quaternions",
+    ("model.configuration.with_unit_quaternions",
      "quaternion[...] = normalise_quaternions(quaternion, f'the quaternion of joint {tree.joints[i].name}')",
      "_ = normalise_quaternions(quaternion, f'the quaternion of joint {tree.joints[i].name}')"),
     ("kinematics.rotation.normalise_quaternions", "quat / norms", "quat * norms"),

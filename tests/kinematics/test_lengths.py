@@ -18,8 +18,8 @@ from urdfkin.kinematics.number_kinds import array_equations as on_vectors
 from urdfkin.kinematics.number_kinds import length_equations as on_lengths
 from urdfkin.kinematics.number_kinds import magnitude, norm, product
 from urdfkin.kinematics.roundings import EPS, SMALLEST_NORMAL
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import draw
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.verify.bounds import magnitudes
 
@@ -101,9 +101,9 @@ def test_the_motion_of_any_link_of_any_tree_is_within_the_computed_magnitude(
     tree: KinematicTree, seed: int, speed: float
 ) -> None:
     plan = compile_tree(tree, range(len(tree.links)))
-    samples = draw(tree, 5, np.random.default_rng(seed), with_special=True)
+    samples = draw_samples(tree, 5, np.random.default_rng(seed), with_special=True)
     q, v, a = samples.q, speed * samples.v, speed * samples.a
-    size = magnitudes(plan, q, v, a, STILL_STATE)
+    size = magnitudes(plan, q, v, a, FIXED_BASE_STATE)
     vel, acc = velocities(plan, q, v), accelerations(plan, q, v, a)
 
     def exceeds(found: FloatArray, size: FloatArray) -> bool:

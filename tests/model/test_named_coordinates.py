@@ -38,7 +38,7 @@ def arm() -> Robot:
 
 
 def q_of(robot: Robot, text: Any) -> list[float]:
-    return coordinate_layout(robot.tree, "q").read(text).tolist()  # type: ignore[no-any-return]
+    return coordinate_layout(robot.tree, "q").parse(text).tolist()  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,9 @@ def test_several_coordinates_of_a_joint_are_given_by_name_or_together() -> None:
     q = robot.neutral()
     q[:7], q[-1] = place, 1.0
     expected = robot.placement(q, "e")
-    by_name = "neutral,root_joint.x=100mm,root_joint.y=.2,root_joint.z=.3,root_joint.qz=1,root_joint.qw=0"
+    by_name = (
+        "neutral,root_joint.x=100mm,root_joint.y=.2,root_joint.z=.3,root_joint.qz=1,root_joint.qw=0"
+    )
     np.testing.assert_array_equal(robot.placement(by_name + ",elbow=1", "e"), expected)
     together: dict[str, Any] = {"root_joint": place, "elbow": 1.0, "shoulder": 0.0, "lift": 0.0}
     np.testing.assert_array_equal(robot.placement(together, "e"), expected)
@@ -190,7 +192,7 @@ def test_any_text_gives_finite_numbers_or_a_urdfkin_error(text: str) -> None:
     assert found is None or math.isfinite(found.value)
     robot = urdfkin.load("one_link", verify=False)
     with contextlib.suppress(UrdfkinError):
-        assert np.isfinite(coordinate_layout(robot.tree, "q").read(text)).all()
+        assert np.isfinite(coordinate_layout(robot.tree, "q").parse(text)).all()
 
 
 def test_an_invalid_text_of_any_length_is_refused_without_delay(arm: Robot) -> None:

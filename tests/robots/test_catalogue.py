@@ -15,7 +15,7 @@ from tests.robots.against_pinocchio import assert_agrees, model_of
 from urdfkin.compiled import evaluate
 from urdfkin.kinematics.bodies import orientation_of
 from urdfkin.kinematics.rotation import EULER_SEQUENCES
-from urdfkin.model.configuration import draw_base
+from urdfkin.model.configuration import draw_base_motion
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
@@ -259,7 +259,7 @@ def test_all_results_agree_with_pinocchio_even_on_a_moving_base(name: str, movin
     robot = urdfkin.load(name)
     q = robot.sample(4, 2)
     v, a = np.random.default_rng(3).normal(size=(2, 4, robot.nv))
-    base = draw_base(4, np.random.default_rng(1)) if moving else None
+    base = draw_base_motion(4, np.random.default_rng(1)) if moving else None
     robot.placement(q, robot.link_frames, base=base)
     for reference in Reference:
         robot.velocity(q, v, robot.link_frames, reference, base=base)

@@ -33,7 +33,7 @@ from urdfkin.kinematics.rotation import (
     rotation_from_rpy,
 )
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
-from urdfkin.model.conventions.convention import transcoded
+from urdfkin.model.conventions.convention import transcode
 from urdfkin.model.tree import LARGEST_ANGLE, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
 from urdfkin.urdf import usd
@@ -885,7 +885,7 @@ def as_usd(robot: urdfkin.Robot, mistake: str = "", where: str = "") -> str:
     placements, prims = robot.placement(np.zeros(robot.nq), list(tree.links)), list[str]()
     for link, T in zip(tree.links, placements, strict=True):
         placed = moved(("double3", "translate", _point(T)), ("quatd", "orient", _quaternion(T)))
-        prims.append(body(transcoded(link), "", placed, ROOT * (link == tree.links[0])))
+        prims.append(body(transcode(link), "", placed, ROOT * (link == tree.links[0])))
     joints = (_joint_in_usd(tree, k, mistake * (one.name == where)) for k, one in enumerate(tree.joints))
     return stage("".join([*prims, 'def Scope "joints" {\n', *joints, "}\n"]))
 
@@ -908,20 +908,20 @@ def _joint_in_usd(tree: KinematicTree, k: int, mistake: str) -> str:
     B = B @ _MOVED[mistake] if mistake == "other frames on the axis" else B
     frames: dict[str, Any] = {f"localPos{i}": _point(T) for i, T in enumerate((A, B))}
     frames |= {f"localRot{i}": _quaternion(T) for i, T in enumerate((A, B))}
-    ends = [transcoded(tree.links[one.parent]), transcoded(tree.links[k + 1])]
+    ends = [transcode(tree.links[one.parent]), transcode(tree.links[k + 1])]
     degrees = 180.0 / math.pi if one.kind.turns else 1.0
     rule = one.mimic if mistake != "mimic dropped" else None
     words, limits = "", list[float]()
     if rule is not None:
         multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
-        words = FOLLOWS.format(f"joints/{transcoded(rule.leader)}")
+        words = FOLLOWS.format(f"joints/{transcode(rule.leader)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
     if one.limit is not None and one.kind.bounded:
         limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
     name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
     first, second = ends[::-1] if mistake == "exchanged bodies" else ends
     schema = NEWTON if rule else ""
-    return joint(transcoded(one.name), name, first, second, words, schema, limits=limits, **frames)
+    return joint(transcode(one.name), name, first, second, words, schema, limits=limits, **frames)
 
 
 _X = np.array([1.0, 0.0, 0.0])

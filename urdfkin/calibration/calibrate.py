@@ -46,7 +46,7 @@ from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import as_bool, as_choice, as_names, as_str, real_number, safe_repr
 from urdfkin.kinematics.inputs import as_finite, rotation_defect
 from urdfkin.kinematics.rotation import polar_factor, rotation_from_quaternion
-from urdfkin.model.configuration import checked
+from urdfkin.model.configuration import parse_finite
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
@@ -336,9 +336,11 @@ def _check_measured(
     """Check the arguments; return the path's coordinates (samples, n) and the measured poses."""
     T = checked_poses(poses)
     if isinstance(model.source, DHTable):
-        path_q = model.coupling.checked(q, "q")
+        path_q = model.coupling.parse(q, "q")
     else:
-        path_q = model.coupling.select(robot.tree, np.atleast_2d(checked(robot.tree, q, "q", look=False)))
+        path_q = model.coupling.select(
+            robot.tree, np.atleast_2d(parse_finite(robot.tree, q, "q", warn=False))
+        )
     values = model.coupling.values(path_q)
     if len(values) != len(T) or values.ndim != 2:
         raise InputError(

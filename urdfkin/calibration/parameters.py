@@ -34,7 +34,7 @@ from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
-from urdfkin.model.chain import FrameChain, chain, steps_between
+from urdfkin.model.chain import FrameChain, chain, joints_between
 from urdfkin.model.mimic import Coupling
 from urdfkin.model.path import ElementaryMotion, Path, elementary
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, inverse
@@ -120,7 +120,7 @@ class ParametricChain:
         is None, this method computes the poses.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
-        T, twists = self.path.columns_at(self.path.frames(amounts) if frames is None else frames)
+        T, twists = self.path.jacobian_from_frames(self.path.frames(amounts) if frames is None else frames)
         columns = np.zeros((len(values), 6, len(self.parameters)))
         for k, drive in enumerate(self._drives):
             if drive.parameter is not None:
@@ -289,7 +289,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     path: FrameChain = chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
     builder.end("base")
-    steps = steps_between(tree, tip, base)
+    steps = joints_between(tree, tip, base)
     for i, (joint, backwards) in enumerate(steps):
         A = turned(joint)
         only = _parameters_to_fit(fit, joint, is_last=i == len(steps) - 1)

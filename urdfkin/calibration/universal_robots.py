@@ -30,7 +30,7 @@ from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.numbers import parse_float
 from urdfkin.kinematics.rotation import rotation_from_euler
 from urdfkin.model.chain import FrameChain, chain
-from urdfkin.model.configuration import values_within
+from urdfkin.model.configuration import sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree, pose
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
@@ -190,7 +190,7 @@ def distance(one: Mapping[str, FloatArray], other: Mapping[str, FloatArray]) -> 
     The angle is computed as 2 sin(angle / 2), which is accurate only for small angles.
     """
     paths = [chain(calibrated_tree(origins), "tool0", "base") for origins in (one, other)]
-    q = values_within([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
+    q = sample_uniform([(-np.pi, np.pi)] * len(LINKS), _COMPARED)
     T, S = (path.placement(q) for path in paths)
     turn = T[:, :3, :3].swapaxes(-1, -2) @ S[:, :3, :3]
     angle = np.linalg.norm(turn - np.eye(3), axis=(-2, -1)) / np.sqrt(2.0)

@@ -475,7 +475,7 @@ def _read_values(
     if text.startswith("@"):
         return read_batch(Path(text[1:]), where, (names,), column_units(robot, letter, conversion))[0]
     layout = conversion.layout(letter) if conversion else coordinate_layout(robot.tree, letter)
-    return layout.read(text, where)[None]
+    return layout.parse(text, where)[None]
 
 
 def _read_count(where: str, text: str) -> int:

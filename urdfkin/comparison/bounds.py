@@ -26,7 +26,7 @@ import numpy as np
 from urdfkin.compiled.evaluate import jacobians, placements
 from urdfkin.compiled.plan import CompiledTree
 from urdfkin.kinematics.roundings import EPS, MIMIC_LIMIT_ROUNDINGS, MIN_DIVISOR
-from urdfkin.model.configuration import WIDEST, neutral, sample, with_unit_quaternions
+from urdfkin.model.configuration import MAX_SAMPLED_VALUE, neutral, sample, with_unit_quaternions
 from urdfkin.model.mechanisms.mechanism import (
     Alignment,
     FramePair,
@@ -90,7 +90,7 @@ class DistanceSearch:
     def _ends(self, name: str) -> tuple[float, float]:
         low, high = self.variables.ranges[name]
         tree = self.robots[name.startswith("b:")].tree
-        widest = math.pi if tree.joints[tree.joint_index(name[2:])].kind.turns else WIDEST
+        widest = math.pi if tree.joints[tree.joint_index(name[2:])].kind.turns else MAX_SAMPLED_VALUE
         if math.isinf(low) and math.isinf(high):
             return -widest, widest
         return (high - 2.0 * widest if math.isinf(low) else low), (

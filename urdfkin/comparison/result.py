@@ -17,7 +17,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation import rpy_of
-from urdfkin.model.configuration import checked, neutral
+from urdfkin.model.configuration import neutral, parse_finite
 from urdfkin.model.mechanisms.mechanism import (
     IDENTITY,
     Alignment,
@@ -497,7 +497,7 @@ class Sameness(Displayable):
         [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
         """
         (tree_a, tree_b), joints = self.trees, {one.a: one for one in self.joints}
-        q = checked(tree_a, q, "q")
+        q = parse_finite(tree_a, q, "q")
         out = np.broadcast_to(neutral(tree_b), (*q.shape[:-1], tree_b.nq)).copy()
         for i, joint in enumerate(tree_a.joints):
             if (one := joints.get(joint.name)) is None:

@@ -33,7 +33,7 @@ from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.validators import real_number, whole_number
 from urdfkin.kinematics.roundings import EPS, SINGLE_ROUNDOFF
-from urdfkin.model.configuration import WIDEST, narrowed_ranges
+from urdfkin.model.configuration import MAX_SAMPLED_VALUE, range_reductions
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import (
@@ -250,7 +250,7 @@ class Comparator:
             narrowed=tuple(
                 f"{which}: {words}"
                 for which, tree in zip("AB", self.trees, strict=True)
-                for words in narrowed_ranges(tree)
+                for words in range_reductions(tree)
             ),
             checked=Confirmation("not asked", reason="the bounds are not computed yet"),
             trees=self.trees,
@@ -325,14 +325,17 @@ class Comparator:
         `same` ignores a small rounding difference at each joint. These differences add up along the path. If
         an axis is tilted, the displacement of a frame grows with the travel of the joints between the axis
         and the frame. The bound of the distance therefore holds only while each joint of `unlimited` travels
-        at most `WIDEST`.
+        at most `MAX_SAMPLED_VALUE`.
         """
         pairs = [
             (step.kind, pair)
             for step, pair in zip(alignment.steps, variables.pairs, strict=True)
             if pair is not None
         ]
-        travels = [WIDEST if math.isinf(travel) else travel for _, travel in _travels(alignment, variables)]
+        travels = [
+            MAX_SAMPLED_VALUE if math.isinf(travel) else travel
+            for _, travel in _travels(alignment, variables)
+        ]
         reach = max(self.mechanisms[0].size, self.mechanisms[1].size) + sum(travels)
         slides = sum(pair.rounding for kind, pair in pairs if kind == "prismatic")
         turns = sum(pair.rounding for kind, pair in pairs if kind != "prismatic")

@@ -28,8 +28,8 @@ from urdfkin.kinematics.inputs import rotation_defect
 from urdfkin.kinematics.rotation import ROUNDED, polar_factor, rotation_with_z_axis
 from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration_like import Given
-from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.configuration_like import ConfigurationLike
+from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import (
     FloatArray,
@@ -109,7 +109,7 @@ class ProductOfExponentials(Displayable):
         >>> urdfkin.load("planar_two_link").screws("tip", "base").coupling.names
         ('joint_1', 'joint_2')
         """
-        return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
+        return make_coupling([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def points(self) -> FloatArray:
@@ -127,7 +127,7 @@ class ProductOfExponentials(Displayable):
             found.append(here)
         return np.array(found).reshape(-1, 3)
 
-    def placement(self, q: Given) -> FloatArray:
+    def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the (..., 4, 4) pose of the tip in the base for `q` (..., coordinates).
 
         The coordinates are in the order of `coupling.names`.
@@ -173,7 +173,7 @@ class ProductOfExponentials(Displayable):
         """
         return 2.0 * table_roundings(len(self.joints))
 
-    def rounding(self, q: Given) -> FloatArray:
+    def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return the (...,) bound of the rounding error in the position of `placement(q)`, in metres.
 
         >>> import urdfkin

@@ -33,8 +33,8 @@ from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
-from urdfkin.model.chain import FrameChain, chain, steps_between
-from urdfkin.model.configuration import axis_range, values_within
+from urdfkin.model.chain import FrameChain, chain, joints_between
+from urdfkin.model.configuration import axis_range, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, freeze
 
 #: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
@@ -63,7 +63,7 @@ def snap_chain(
     exact = chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
     path = chain(snapped_tree, tip, base)
-    changes = _changes_of_origins(steps_between(tree, tip, exact.base), rotations)
+    changes = _changes_of_origins(joints_between(tree, tip, exact.base), rotations)
     constants = list(path.constants)
     names = [*(joint.name for joint in path.joints), path.tip]
     for k, A in enumerate(constants):
@@ -120,7 +120,7 @@ def snap_report(
 
 def samples_within_limits(table: DHTable) -> FloatArray:
     ranges = {row.joint: axis_range(row.kind, row.limit) for row in table.rows if row.mimic is None}
-    return values_within([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SAMPLES)
+    return sample_uniform([ranges.get(name, _UNKNOWN_RANGE) for name in table.joint_names], SAMPLES)
 
 
 def rotation_angle(R: FloatArray, S: FloatArray) -> FloatArray:

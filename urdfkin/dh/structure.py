@@ -32,7 +32,7 @@ from urdfkin.dh.snapping import travel
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
-from urdfkin.model.configuration import axis_range, values_within
+from urdfkin.model.configuration import axis_range, sample_uniform
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray, JointKind
 
@@ -259,8 +259,8 @@ def _reach_bound(screws: ProductOfExponentials, origin: FloatArray) -> float:
 
 def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]:
     """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
-    ranges = [axis_range(joint.kind, joint.limit, slide=math.pi) for joint in screws.joints]
-    values = values_within(ranges, _SAMPLES)
+    ranges = [axis_range(joint.kind, joint.limit, max_length=math.pi) for joint in screws.joints]
+    values = sample_uniform(ranges, _SAMPLES)
     return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
 
 
@@ -319,7 +319,7 @@ def opw_of(path: FrameChain, tolerance: float = TOLERANCE) -> Opw:
     if [joint.kind.turns for joint in path.joints] != [True] * 6:
         raise InputError("an OPW arm must have six revolute joints", where=where, found=str(len(path.joints)))
     free = replace(path, joints=tuple(replace(joint, mimic=None) for joint in path.joints))
-    q = values_within([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
+    q = sample_uniform([(-np.pi, np.pi)] * len(path.joints), SAMPLES)
     expected, best, reason = free.placement(q), None, ""
     for reference in _candidate_tables(path):
         try:

@@ -31,8 +31,8 @@ from urdfkin.errors import InputError, QuestionsSection
 from urdfkin.errors.display import Displayable
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, table_roundings
-from urdfkin.model.configuration_like import Given
-from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.configuration_like import ConfigurationLike
+from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, freeze, is_rigid
 from urdfkin.system.lazy_import import hook
@@ -426,7 +426,7 @@ class DHTable(Displayable):
         >>> urdfkin.load("planar_two_link").dh("tip", "base").coupling.names
         ('joint_1', 'joint_2')
         """
-        return coupling_of([(row.joint, row.mimic, row.kind) for row in self.rows])
+        return make_coupling([(row.joint, row.mimic, row.kind) for row in self.rows])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -461,7 +461,7 @@ class DHTable(Displayable):
         lengths = sum(abs(row.a) + abs(row.d) for row in self.rows)
         return lengths + math.hypot(*self.tool[:3, 3])
 
-    def rounding(self, q: Given) -> FloatArray:
+    def rounding(self, q: ConfigurationLike) -> FloatArray:
         """Return a bound (...,) in metres for the position error that rounding causes in `placement(q)`.
 
         The bound is the length of the chain times the sum of all rounding errors of rows and angles
@@ -478,7 +478,7 @@ class DHTable(Displayable):
         lever = self.span + values[..., ~turns].sum(axis=-1) + float(np.linalg.norm(self.base[:3, 3]))
         return np.asarray(EPS * (table_roundings(len(self.rows)) + angle) * lever)
 
-    def tolerance(self, q: Given) -> tuple[FloatArray, FloatArray]:
+    def tolerance(self, q: ConfigurationLike) -> tuple[FloatArray, FloatArray]:
         """Return bounds (...,), in m and rad, of the difference between the table's and the URDF's tip pose.
 
         The bounds cover rounding errors, and the effect of rounded angles if `snap` is not None.
@@ -499,7 +499,7 @@ class DHTable(Displayable):
 
     # -- placement -----------------------------------------------------------------------------------
 
-    def frames(self, q: Given | None = None) -> FloatArray:
+    def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the (..., n + 1, 4, 4) poses of the frames 0 to n in the base frame.
 
         Args:
@@ -530,7 +530,7 @@ class DHTable(Displayable):
             steps += [motion, constant @ row.X] if standard else [row.X @ constant, motion]
         return Path(tuple(steps))
 
-    def placement(self, q: Given) -> FloatArray:
+    def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return the (..., 4, 4) pose T_base_tip: the product of base, rows and tool.
 
         Args:

@@ -21,7 +21,7 @@ from urdfkin.export.function import Function
 from urdfkin.export.naming import comment_name, comment_text
 from urdfkin.export.single import single_bounds
 from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST_NORMAL
-from urdfkin.model.configuration import draw
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -155,7 +155,7 @@ def compare(
     Raise VerificationError if a difference exceeds the error bound.
     """
     checker = copy(verifier)  # The copy keeps these checks out of the user's certificate.
-    drawn = draw(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
+    drawn = draw_samples(verifier.tree, CHECKED, np.random.default_rng(0), with_special=True)
     for function in functions:
         inputs = (drawn.q, drawn.v, drawn.a)[: len(function.inputs)]
         call = Call(verifier.tree, plan_of, frame, reference, None, inputs)
@@ -174,7 +174,7 @@ def _vectors(
     """Return the test vectors, and the largest bound of each quantity in single precision."""
     tree = verifier.tree
     link = tree.frame_link(frame)
-    drawn = draw(tree, VECTORS, np.random.default_rng(1), with_special=False)
+    drawn = draw_samples(tree, VECTORS, np.random.default_rng(1), with_special=False)
     inputs = tuple(x.astype(np.float32).astype(np.float64) for x in (drawn.q, drawn.v, drawn.a))
     part = Call(tree, plan_of, frame, reference, None, inputs).part(slice(0, VECTORS))
     within, single, largest = dict[str, FloatArray](), dict[str, FloatArray](), dict[str, float]()

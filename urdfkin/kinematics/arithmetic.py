@@ -26,10 +26,10 @@ def bind_equations(
     >>> lengths.point_velocity(1.0, 2.0, 3.0)
     7.0
     """
-    return SimpleNamespace(**rebound(equations, decorate=decorate, replacements=vectors))
+    return SimpleNamespace(**rebind_functions(equations, decorate=decorate, replacements=vectors))
 
 
-def rebound(
+def rebind_functions(
     *modules: ModuleType, decorate: Callable[[Callable[..., Any]], Any], replacements: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.

@@ -96,11 +96,11 @@ class BaseMotion:
 
 
 #: A fixed base at the world's origin.
-STILL = BaseMotion()
-STILL_STATE = freeze(STILL.state(()))
+FIXED_BASE = BaseMotion()
+FIXED_BASE_STATE = freeze(FIXED_BASE.state(()))
 
 
-def against_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
+def subtract_gravity(state: FloatArray, gravity: FloatArray) -> FloatArray:
     """Subtract gravity (3,), m/s^2, from the linear acceleration of base states (1 or n, 24).
 
     The readings of an accelerometer do not change if gravity is replaced by an acceleration of the base.

@@ -18,8 +18,8 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.rotation import rotation_with_z_axis
-from urdfkin.model.configuration_like import Given
-from urdfkin.model.mimic import Coupling, coupling_of
+from urdfkin.model.configuration_like import ConfigurationLike
+from urdfkin.model.mimic import Coupling, make_coupling
 from urdfkin.model.path import ElementaryMotion, Path
 from urdfkin.model.tree import (
     FloatArray,
@@ -34,7 +34,7 @@ from urdfkin.model.tree import (
 )
 
 #: Smallest size (m) that a comparison assumes for a robot, even if all its frames coincide.
-LEAST_SIZE = 1e-9
+MIN_ROBOT_SIZE = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,7 +130,7 @@ class FrameChain(Displayable):
         >>> path.coupling.names
         ('joint_1', 'joint_2')
         """
-        return coupling_of([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
+        return make_coupling([(joint.name, joint.mimic, joint.kind) for joint in self.joints])
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -177,7 +177,7 @@ class FrameChain(Displayable):
         """
         return float(self.lengths[1:].sum())
 
-    def frames(self, q: Given | None = None) -> FloatArray:
+    def frames(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the poses (..., n + 1, 4, 4) of all joint frames and of the tip in the base frame.
 
         Each joint frame is the frame before the joint's motion.
@@ -196,7 +196,7 @@ class FrameChain(Displayable):
         values = self.coupling.values(np.zeros(len(self.joint_names)) if q is None else q)
         return self.path.frames(values)[..., ::2, :, :]
 
-    def placement(self, q: Given) -> FloatArray:
+    def placement(self, q: ConfigurationLike) -> FloatArray:
         """Return T_base_tip (..., 4, 4) for `q` (..., coordinates); raises InputError for a wrong length.
 
         >>> import urdfkin
@@ -206,7 +206,7 @@ class FrameChain(Displayable):
         """
         return np.ascontiguousarray(self.frames(q)[..., -1, :, :])
 
-    def axes(self, q: Given | None = None) -> FloatArray:
+    def axes(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the unit axes z_{i-1} (..., n, 3) in the base; None for `q` is the zero configuration.
 
         >>> import urdfkin
@@ -216,7 +216,7 @@ class FrameChain(Displayable):
         """
         return np.ascontiguousarray(self.frames(q)[..., :-1, :3, 2])
 
-    def origins(self, q: Given | None = None) -> FloatArray:
+    def origins(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the joint origins O_{i-1} (..., n + 1, 3) in the base, m; the last is the tip's origin.
 
         >>> import urdfkin
@@ -226,7 +226,7 @@ class FrameChain(Displayable):
         """
         return np.ascontiguousarray(self.frames(q)[..., :3, 3])
 
-    def interorigin(self, q: Given | None = None) -> FloatArray:
+    def interorigin(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the interorigin vectors d_{i-1,i} (..., n, 3) in the base, m; the last leads to the tip.
 
         >>> import urdfkin
@@ -242,7 +242,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
     lengths, folded, count = list[float](), list[int](), 0
-    for joint, backwards in steps_between(tree, tip, base_name):
+    for joint, backwards in joints_between(tree, tip, base_name):
         _check_single_axis(tree, joint, base_name, tip)
         to_joint, from_joint = _poses_around(joint, backwards)
         A = A @ to_joint
@@ -260,7 +260,7 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     return FrameChain(tree.name, base_name, tip, tuple(joints), *ends)
 
 
-def steps_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
+def joints_between(tree: KinematicTree, tip: str, base: str) -> list[tuple[Joint, bool]]:
     """Return all joints from `base` to `tip`; True marks a joint that is passed from child to parent."""
     up, down = tree.path(tree.frame_link(base)), tree.path(tree.frame_link(tip))
     common = 0

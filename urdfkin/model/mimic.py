@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from urdfkin.errors import InputError, QuestionsSection
-from urdfkin.model.configuration import numbers
-from urdfkin.model.configuration_like import CoordinateLayout, Given, Hint, by_name
+from urdfkin.model.configuration import parse_numbers
+from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout, Hint, as_text_or_mapping
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, freeze
 
 
@@ -65,17 +65,17 @@ class Coupling:
             if mimic
         }
         neutral = {"neutral": np.zeros(len(self.names))}
-        return CoordinateLayout(what, self.names, own, poses=lambda: neutral, otherwise=lambda: hints)
+        return CoordinateLayout(what, self.names, own, poses=lambda: neutral, hints_by_name=lambda: hints)
 
-    def values(self, q: Given) -> FloatArray:
+    def values(self, q: ConfigurationLike) -> FloatArray:
         """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates)."""
-        coordinates = self.checked(q, "q")
+        coordinates = self.parse(q, "q")
         # Each row of G contains only one number that is not zero, so no matrix product is needed.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
-    def checked(self, array: Given, what: str) -> FloatArray:
-        if (named := by_name(array, what)) is not None:
-            return self.layout(what).read(named)
+    def parse(self, array: ConfigurationLike, what: str) -> FloatArray:
+        if (named := as_text_or_mapping(array, what)) is not None:
+            return self.layout(what).parse(named)
         values = np.asarray(array, dtype=np.float64)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
             raise InputError(
@@ -100,10 +100,10 @@ class Coupling:
     def v_index(self, tree: KinematicTree) -> tuple[int, ...]:
         return tuple(tree.v_index[tree.joint_index(name)] for name in self.names)
 
-    def select(self, tree: KinematicTree, q: Given) -> FloatArray:
-        return numbers(tree, q, "q")[..., list(self.q_index(tree))]
+    def select(self, tree: KinematicTree, q: ConfigurationLike) -> FloatArray:
+        return parse_numbers(tree, q, "q")[..., list(self.q_index(tree))]
 
 
-def coupling_of(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
+def make_coupling(joints: Sequence[tuple[str, Mimic | None, JointKind]]) -> Coupling:
     names, mimics, kinds = zip(*joints, strict=True) if joints else ((), (), ())
     return Coupling(names, mimics, kinds)

@@ -85,9 +85,9 @@ class Path:
 
     def columns(self, amounts: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return the pose at the path's end, and its Jacobian (..., 6, motions), [linear; angular]."""
-        return self.columns_at(self.frames(amounts))
+        return self.jacobian_from_frames(self.frames(amounts))
 
-    def columns_at(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def jacobian_from_frames(self, frames: FloatArray) -> tuple[FloatArray, FloatArray]:
         T = frames[..., -1, :, :]
         motions = [(i, step) for i, step in enumerate(self.steps) if isinstance(step, ElementaryMotion)]
         # A motion does not move its own axis, so the axis is also fixed in the frame after the motion.

@@ -108,10 +108,10 @@ LARGEST_ANGLE = 2.5 * math.pi
 _OUTSIDE, _OF_RANGE = 0.5, 0.25
 
 
-def far_outside(lower: float, upper: float) -> tuple[float, float]:
+def far_limits(lower: float, upper: float) -> tuple[float, float]:
     """Return the two values beyond which a joint value is far outside its limits.
 
-    >>> far_outside(-2.0, 2.0), far_outside(-float("inf"), 2.0)
+    >>> far_limits(-2.0, 2.0), far_limits(-float("inf"), 2.0)
     ((-3.0, 3.0), (-inf, 2.0))
     """
     far = max(_OUTSIDE, _OF_RANGE * (upper - lower)) if math.isfinite(upper - lower) else 0.0
@@ -316,12 +316,12 @@ class KinematicTree:
         ends = np.tile([[-np.inf], [np.inf]], self.nq)
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
-                lower, upper = far_outside(joint.limit.lower, joint.limit.upper)
+                lower, upper = far_limits(joint.limit.lower, joint.limit.upper)
                 ends[:, at] = min(lower, -LARGEST_ANGLE), max(upper, LARGEST_ANGLE)
         return freeze(ends)
 
     @cached_property
-    def least_implausible(self) -> float:
+    def min_implausible_angle(self) -> float:
         """Smallest absolute value in `plausible_angles`; infinite if no revolute joint has limits."""
         return float(np.abs(self.plausible_angles).min(initial=np.inf))
 

@@ -15,7 +15,7 @@ from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import MIN_DIVISOR
-from urdfkin.model.configuration import WIDEST
+from urdfkin.model.configuration import MAX_SAMPLED_VALUE
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
@@ -43,7 +43,7 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     limits = sum(one.what == "limits" for one in found.remarks)
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if found.unlimited:
-        besides += f"; this result holds if joints without limits travel at most {WIDEST:g} m"
+        besides += f"; this result holds if joints without limits travel at most {MAX_SAMPLED_VALUE:g} m"
     if question.within is not None:
         return _within(found, question.within) + besides
     off = "the distance of the frames has no bound"

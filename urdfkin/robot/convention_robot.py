@@ -131,7 +131,7 @@ class ConventionRobot:
     ) -> tuple[tuple[FloatArray, ...], FloatArray]:
         """Call a method of `Robot`; return the inputs in urdfkin's convention, and the result."""
         read: list[ArrayLike] = [
-            self.conversion.layout(letter).read(x) if isinstance(x, str | dict) else x
+            self.conversion.layout(letter).parse(x) if isinstance(x, str | dict) else x
             for letter, x in zip("qva", given, strict=False)
         ]
         found = self.conversion.from_(*read)

@@ -25,7 +25,7 @@ from urdfkin.kinematics.rotation import (
 )
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import Samples, draw
+from urdfkin.model.configuration import Samples, draw_samples
 from urdfkin.model.recursion import Number
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -99,7 +99,7 @@ def accuracy_study(
     Pinocchio computes no analytical Jacobians. Therefore, the study computes the analytical Jacobians
     from the rotation and the Jacobian of each library (eq. 7.122).
     """
-    drawn = draw(robot.tree, samples, np.random.default_rng(seed), with_special=False)
+    drawn = draw_samples(robot.tree, samples, np.random.default_rng(seed), with_special=False)
     longest = max(len(robot.tree.path(link)) for link in range(len(robot.tree.links)))
     with precision(max(DIGITS, enough_digits(longest))):
         lines = tuple(_AccuracyBatch(robot, drawn, base).lines())

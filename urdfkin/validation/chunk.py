@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from urdfkin.model.configuration import Samples, draw
+from urdfkin.model.configuration import Samples, draw_samples
 from urdfkin.model.tree import KinematicTree
 from urdfkin.robot import Robot
 from urdfkin.validation import memory
@@ -69,7 +69,7 @@ class Chunk:
     def _draw(self, tree: KinematicTree, i: int) -> Samples:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first + i,)))
         samples = min(DRAWN, self.samples - i * DRAWN)
-        return draw(tree, samples, rng, with_special=self.first + i == 0)
+        return draw_samples(tree, samples, rng, with_special=self.first + i == 0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ from urdfkin.errors import DegreesWarning, InputError
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.validators import as_bool, real_number, safe_repr, whole_number
 from urdfkin.kinematics.roundings import EPS
-from urdfkin.model.configuration import draw
+from urdfkin.model.configuration import draw_samples
 from urdfkin.model.conventions import Convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -369,7 +369,7 @@ class _Run:
 
     def check(self) -> FunctionCheck:
         robot = self.robot
-        drawn = draw(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
+        drawn = draw_samples(robot.tree, self.samples, np.random.default_rng(self.seed), with_special=True)
         total = _Total(self._row_names(), self._column_names())
         checked = robot.verifier.cannot(None, robot.verifier.library) is None
         for first in range(0, len(drawn.q), _BATCH):

@@ -58,7 +58,7 @@ from urdfkin.kinematics.lengths import LinkBounds
 from urdfkin.kinematics.number_kinds import Length, magnitude, norm, product
 from urdfkin.kinematics.number_kinds import length_equations as eq
 from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS, joint_roundings
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
 
@@ -380,7 +380,7 @@ def true_value_magnitudes(
     `plan` is the compiled tree of one frame. `errors` contains the conversion errors of the joints on the
     path to this frame, for q (n, nq).
     """
-    size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, STILL_STATE)
+    size = magnitudes(replace(plan, lengths=plan.lengths + errors.lengths), q, v, a, FIXED_BASE_STATE)
     more = errors.angles[:, np.newaxis] + 1.5 * errors.rules
     return replace(size, roundings=size.roundings + more)
 

@@ -20,7 +20,7 @@ from urdfkin.dh.convert import link_names
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import OracleError
 from urdfkin.kinematics.roundings import EPS, ROW_ROUNDINGS, read_back_roundings, table_roundings
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
 from urdfkin.urdf.foreign import Modelled
@@ -47,10 +47,10 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
     names = [*made.joints, *made.frames]
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)
     theirs = _placements(model, _configurations(model, tree, q), made)
     # The factor 2 in the bound allows for the rounded angles in the URDF text.
-    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
+    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, FIXED_BASE_STATE), None)
     found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
     if not found.agrees:
         raise OracleError(

@@ -28,8 +28,8 @@ from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import InputError, OracleError
 from urdfkin.kinematics.rotation import rotation_from_quaternion
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
-from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import WIDEST
+from urdfkin.model.base_motion import FIXED_BASE_STATE
+from urdfkin.model.configuration import MAX_SAMPLED_VALUE
 from urdfkin.model.tree import (
     FloatArray,
     Joint,
@@ -236,7 +236,9 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
 
 
 def _largest(joint: Joint) -> float:
-    return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
+    return (
+        max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else MAX_SAMPLED_VALUE
+    )
 
 
 def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
@@ -260,7 +262,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     rest = np.array([pose(row[:, :3], row[:, 3]) for row in rows])
     q = np.array([answer["rest_q"]], dtype=np.float64)
     plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in prims])
-    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)[0]
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=FIXED_BASE_STATE)[0]
     # The root's pose in the stage is arbitrary, so all poses become relative to the root.
     if tree.links[0] in prims:
         at = list(prims).index(tree.links[0])

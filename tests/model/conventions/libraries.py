@@ -33,7 +33,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from urdfkin.kinematics.roundings import EPS, MUJOCO_ROUNDINGS, PINOCCHIO_ROUNDINGS
-from urdfkin.model.conventions.convention import transcoded
+from urdfkin.model.conventions.convention import transcode
 from urdfkin.model.tree import FloatArray, pose
 from urdfkin.robot import Robot
 from urdfkin.system.plain_xml import plain_xml
@@ -218,10 +218,10 @@ def newton_usd(robot: Robot, folder: Path) -> Library:
     sim = pytest.importorskip("newton")
     builder = sim.ModelBuilder()
     builder.add_usd(_stage(robot, folder))
-    return _of_newton(robot, builder, transcoded)
+    return _of_newton(robot, builder, transcode)
 
 
-def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) -> Library:
+def _of_newton(robot: Robot, builder: Any, spell_name: Callable[[str], str] = str) -> Library:
     import newton as sim
 
     model = builder.finalize(device="cpu")
@@ -235,7 +235,7 @@ def _of_newton(robot: Robot, builder: Any, spelled: Callable[[str], str] = str) 
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         state = model.state()
         state.joint_q.assign(q.astype(np.float32))
-        body = next(k for k, label in enumerate(labels) if label.endswith(f"/{spelled(link)}"))
+        body = next(k for k, label in enumerate(labels) if label.endswith(f"/{spell_name(link)}"))
 
         def twist(v: FloatArray) -> FloatArray:
             state.joint_qd.assign(v.astype(np.float32))
@@ -323,7 +323,7 @@ def usd(robot: Robot, folder: Path) -> Library:
         return T @ prim.behind, path
 
     def evaluate(q: FloatArray, v: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-        T, path = walk(q, bodies.get(transcoded(link), ""))  # a root without joints has none
+        T, path = walk(q, bodies.get(transcode(link), ""))  # a root without joints has none
         if free:
             path += [(3 + k, z, q[:3]) for k, z in enumerate(np.eye(3))]
         J = np.zeros((6, len(v)))

@@ -22,7 +22,7 @@ from tests import urdfs
 from tests.model.conventions.libraries import LIBRARIES, Library
 from tests.urdfs import joint
 from urdfkin.kinematics.roundings import PINOCCHIO_ROUNDINGS
-from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.conventions import BUILT_IN, Convention, Conversion, find_convention
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -56,7 +56,7 @@ def _differences(
         T, twist, J = library.evaluate(their_q, their_v, link)
         frame = f"link:{link}"
         plan = robot.plan([robot.tree.link_index(link)])
-        size = magnitudes(plan, q[None], v[None], None, STILL_STATE)
+        size = magnitudes(plan, q[None], v[None], None, FIXED_BASE_STATE)
         reach = _farthest_mass(robot, q) if library.at_mass else 0.0
         roundings = size.roundings * library.roundings / PINOCCHIO_ROUNDINGS
         size = replace(size, p=size.p + reach, vel=size.vel + size.w * reach, roundings=roundings)

@@ -31,8 +31,8 @@ from urdfkin.dh.convert import free_tree, link_names, serial_tree, to_convention
 from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference
 from urdfkin.errors import InputError
-from urdfkin.model.chain import LEAST_SIZE, FrameChain
-from urdfkin.model.configuration import values_within
+from urdfkin.model.chain import MIN_ROBOT_SIZE, FrameChain
+from urdfkin.model.configuration import sample_uniform
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
@@ -137,7 +137,7 @@ def _reach(chain: FrameChain, poses: FloatArray) -> float:
     """
     tips = poses[:, :3, 3]
     spread = 2.0 * float(np.linalg.norm(tips - tips.mean(axis=0), axis=-1).max())
-    return max(min(chain.reach, spread) if spread > _FIXED_TIP * chain.reach else chain.reach, LEAST_SIZE)
+    return max(min(chain.reach, spread) if spread > _FIXED_TIP * chain.reach else chain.reach, MIN_ROBOT_SIZE)
 
 
 def check_joints(chain: FrameChain, reference: DHTable) -> None:
@@ -166,7 +166,7 @@ def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, Floa
     """Return random joint values (count, n) and the tip's poses, without mimic rules."""
     travels = _travels(chain)
     ranges = [travels.get(joint.name, (-math.pi, math.pi)) for joint in chain.joints]
-    values = values_within(ranges, count, seed)
+    values = sample_uniform(ranges, count, seed)
     free = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints))
     return values, free.placement(values)
 

@@ -145,14 +145,14 @@ def find_convention(name: str | Path | Convention) -> Convention:
         return known
     path = Path(name)
     if path.suffix == ".toml" or exists(path):
-        return read_convention(read_text(path), shortened(path), path.stem)
+        return parse_convention(read_text(path), shortened(path), path.stem)
     error = UnknownNameError("convention", str(name), BUILT_IN)
     names = "`urdfkin order ROBOT` lists all conventions; the name of a convention file ends with .toml"
     error.remedy = f"{error.remedy} {names}"
     raise error
 
 
-def read_convention(text: str, where: str, name: str) -> Convention:
+def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse the TOML text of a convention; `name` replaces a missing name."""
     try:
         found = tomllib.loads(text)
@@ -171,14 +171,14 @@ def read_convention(text: str, where: str, name: str) -> Convention:
         if not isinstance(joints, list) or not all(isinstance(joint, str) for joint in joints):
             raise InputError("`joints` must be a list of names", where=where, found=safe_repr(joints))
         changes |= {"order": "given", "joints": tuple(joints)}
-        demand_unique(joints, where)
+        check_unique(joints, where)
     rules = found.pop("joint", {})
     if not isinstance(rules, dict) or not all(isinstance(rule, dict) for rule in rules.values()):
         raise InputError(
             "`joint` must contain tables, such as [joint.elbow]", where=where, found=safe_repr(rules)
         )
     changes["rules"] = {joint: _rule(rule, f"{where}: joint {joint}") for joint, rule in rules.items()}
-    demand_unique([rule.name for rule in changes["rules"].values() if rule.name is not None], where)
+    check_unique([rule.name for rule in changes["rules"].values() if rule.name is not None], where)
     for key, value in found.items():
         if key not in _CHOICES:
             raise UnknownNameError("key", key, (*_CHOICES, "like", "joints", "joint", "title"), where=where)
@@ -189,7 +189,7 @@ def read_convention(text: str, where: str, name: str) -> Convention:
     return replace(base, **changes)
 
 
-def demand_unique(names: Sequence[str], where: str) -> None:
+def check_unique(names: Sequence[str], where: str) -> None:
     if len(set(names)) != len(names):
         double = next(name for i, name in enumerate(names) if name in names[:i])
         raise InputError("two joints have the same name in the convention", where=where, found=repr(double))
@@ -265,15 +265,15 @@ _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
 _CONTINUES = 31
 
 
-def spelled(name: str, how: str) -> str:
+def spell_name(name: str, how: str) -> str:
     """Return a name as another program writes it; `how` is a value of `Convention.names`.
 
-    >>> [spelled("1", how) for how in ("urdf", "usd", "identifier", "isaacsim")]
+    >>> [spell_name("1", how) for how in ("urdf", "usd", "identifier", "isaacsim")]
     ['1', 'tn__1_', '_', 'a_1']
     """
     match how:
         case "usd":
-            return transcoded(name)
+            return transcode(name)
         case "identifier":
             return identifier(name)
         case "isaacsim":
@@ -288,7 +288,7 @@ def spellings(name: str) -> frozenset[str]:
     >>> sorted(spellings("arm-2"))
     ['arm-2', 'arm_2', 'tn__arm2_g6']
     """
-    return frozenset(spelled(name, how) for how in ("urdf", "usd", "identifier", "isaacsim"))
+    return frozenset(spell_name(name, how) for how in ("urdf", "usd", "identifier", "isaacsim"))
 
 
 def identifier(name: str) -> str:
@@ -301,7 +301,7 @@ def identifier(name: str) -> str:
     return re.sub(r"^[^A-Za-z_]|[^A-Za-z0-9_]", "_", octets) or "_"
 
 
-def transcoded(name: str) -> str:
+def transcode(name: str) -> str:
     """Return a name as the function `usdex.core.getValidPrimName` of OpenUSD Exchange does.
 
     The result begins with "tn__" and the allowed characters of the name. If there are allowed characters, "_"
@@ -312,7 +312,7 @@ def transcoded(name: str) -> str:
     is the number of possible positions. Source: github.com/PixarAnimationStudios/OpenUSD-proposals,
     proposals/transcoding_invalid_identifiers.
 
-    >>> transcoded("1"), transcoded("arm-2"), transcoded("arm_2")
+    >>> transcode("1"), transcode("arm-2"), transcode("arm_2")
     ('tn__1_', 'tn__arm2_g6', 'arm_2')
     """
     if _IDENTIFIER.fullmatch(name):

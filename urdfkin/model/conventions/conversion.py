@@ -20,8 +20,8 @@ from urdfkin.errors import InputError, QuestionsSection, UnknownNameError
 from urdfkin.kinematics.inputs import as_finite
 from urdfkin.kinematics.rotation import NORM_TOLERANCE, rotation_from_quaternion, skew
 from urdfkin.model import configuration
-from urdfkin.model.configuration_like import CoordinateLayout, Given
-from urdfkin.model.conventions.convention import Convention, JointRule, demand_unique, spelled
+from urdfkin.model.configuration_like import ConfigurationLike, CoordinateLayout
+from urdfkin.model.conventions.convention import Convention, JointRule, check_unique, spell_name
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree
 from urdfkin.system.plain_xml import plain_xml
 
@@ -95,7 +95,7 @@ class Conversion:
         self._columns, self._rates = list[_TargetNumber](), list[_TargetNumber]()
         self._blocks = list[_FreeJoint]()
         self.joint_names = tuple(self._add(i) for i in self._order)
-        demand_unique(self.joint_names, convention.name)
+        check_unique(self.joint_names, convention.name)
         self._prepare()
 
     def __repr__(self) -> str:
@@ -128,7 +128,7 @@ class Conversion:
         for name, i in named:
             if i not in moving:
                 raise InputError("the order of joints contains a fixed joint", where=how.name, found=name)
-        demand_unique([self.tree.joints[i].name for i in order], how.name)
+        check_unique([self.tree.joints[i].name for i in order], how.name)
         joints, covered = self.tree.joints, {self.tree.q_index[i] for i in order if self._follows(i)}
         missing = [joints[i].name for i in sorted(moving - set(order)) if self.tree.q_index[i] not in covered]
         if missing:
@@ -205,7 +205,7 @@ class Conversion:
     def _add(self, i: int) -> str:
         how, joint = self.convention, self.tree.joints[i]
         rule = how.rules.get(joint.name, JointRule())
-        name = rule.name or spelled(joint.name, how.names)
+        name = rule.name or spell_name(joint.name, how.names)
         q, v = self.tree.q_index[i], self.tree.v_index[i]
         if joint.kind is JointKind.FLOATING:
             self._refuse_rule(joint)
@@ -361,11 +361,13 @@ class Conversion:
     # -- vectors -------------------------------------------------------------------------------------
 
     @overload
-    def to(self, q: Given) -> FloatArray: ...
+    def to(self, q: ConfigurationLike) -> FloatArray: ...
     @overload
-    def to(self, q: Given, v: Given, a: Given | None = None) -> tuple[FloatArray, ...]: ...
     def to(
-        self, q: Given, v: Given | None = None, a: Given | None = None
+        self, q: ConfigurationLike, v: ConfigurationLike, a: ConfigurationLike | None = None
+    ) -> tuple[FloatArray, ...]: ...
+    def to(
+        self, q: ConfigurationLike, v: ConfigurationLike | None = None, a: ConfigurationLike | None = None
     ) -> FloatArray | tuple[FloatArray, ...]:
         """Convert q, (q, v) or (q, v, a) from urdfkin's convention to the target program's.
 
@@ -413,11 +415,11 @@ class Conversion:
             ours.append(self._from_rates(ours[0], self._theirs(a, "a"), ours[1]))
         return ours[0] if len(ours) == 1 else tuple(ours)
 
-    def _ours(self, *values: Given | None) -> list[FloatArray]:
+    def _ours(self, *values: ConfigurationLike | None) -> list[FloatArray]:
         if values[1] is None and values[2] is not None:
             raise InputError("`a` can only be converted together with `v`")
         letters = zip("qva", values, strict=True)
-        return [configuration.checked(self.tree, x, letter) for letter, x in letters if x is not None]
+        return [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
 
     def _theirs(self, value: ArrayLike, what: str) -> FloatArray:
         array, width = as_finite(value, what), self.nq if what == "q" else self.nv
@@ -512,7 +514,7 @@ class Conversion:
 
     # -- matrices ------------------------------------------------------------------------------------
 
-    def matrix(self, q: Given | None = None) -> FloatArray:
+    def matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return the matrix M (..., program's nv, nv) with v_tool = M v.
 
         If M depends on q, a call without q raises InputError.
@@ -525,13 +527,13 @@ class Conversion:
             raise InputError(
                 "the matrix of a floating or planar joint depends on q", where=self.convention.name
             )
-        ours = configuration.checked(self.tree, q, "q")
+        ours = configuration.parse_finite(self.tree, q, "q")
         M = np.tile(M, (*ours.shape[:-1], 1, 1))
         for block in self._blocks:
             M[..., block.rows, block.v : block.v + block.joint.kind.nv] = self._block(block, ours)
         return M
 
-    def matrix_rate(self, q: Given, v: Given) -> FloatArray:
+    def matrix_rate(self, q: ConfigurationLike, v: ConfigurationLike) -> FloatArray:
         """Return M' (..., program's nv, nv), the time derivative of `matrix`."""
         ours, rates = self._ours(q, v, None)
         shape = np.broadcast_shapes(ours.shape[:-1], rates.shape[:-1])
@@ -541,7 +543,7 @@ class Conversion:
             found[..., block.rows, own] = self._block(block, ours, rates[..., own])
         return found
 
-    def inverse_matrix(self, q: Given | None = None) -> FloatArray:
+    def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
 
         Several numbers of v_tool may depend on the same number of v. Then M^-1 uses one number of v_tool, and
@@ -598,11 +600,11 @@ class Conversion:
             raise InputError("a six-vector must have six numbers", found=f"shape {array.shape}")
         return np.take(array, _SWAPPED, axis) if self.angular_first else array
 
-    def jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
+    def jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert a Jacobian J (..., 6, nv) to the target program's rows and columns: S J M^-1."""
         return self.columns(q, self.six(J, -2))
 
-    def columns(self, q: Given, J: ArrayLike) -> FloatArray:
+    def columns(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert only the columns of a matrix J (..., rows, nv) to the target program's: J M^-1.
 
         The rows must have the same meaning in both conventions, such as derivatives of Euler angles. If
@@ -614,7 +616,7 @@ class Conversion:
             return array if self._same_v else array[..., self._v_index]
         return array @ _for_frames(self.inverse_matrix(q), array.ndim)
 
-    def from_jacobian(self, q: Given, J: ArrayLike) -> FloatArray:
+    def from_jacobian(self, q: ConfigurationLike, J: ArrayLike) -> FloatArray:
         """Convert the target program's Jacobian J (..., 6, program's nv) to urdfkin's (..., 6, nv): S J M.
 
         The column of a mimic joint is added to the mimicked joint's column.
@@ -622,7 +624,9 @@ class Conversion:
         array = self.six(J, -2)
         return array @ _for_frames(self.matrix(q), array.ndim)
 
-    def jacobian_rate(self, q: Given, v: Given, J: ArrayLike, rate: ArrayLike) -> FloatArray:
+    def jacobian_rate(
+        self, q: ConfigurationLike, v: ConfigurationLike, J: ArrayLike, rate: ArrayLike
+    ) -> FloatArray:
         """Convert the time derivative J' of a Jacobian J: S (J' M^-1 + J (M^-1)')."""
         found = self.jacobian(q, rate)
         if not self._blocks:
@@ -632,7 +636,7 @@ class Conversion:
         array = self.six(J, -2)
         return found + array @ _for_frames(change, array.ndim)
 
-    def hessian(self, q: Given, J: ArrayLike, H: ArrayLike) -> FloatArray:
+    def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
         """Convert a Jacobian's derivatives H (..., 6, nv, nv) with respect to the joint coordinates."""
         self._demand_own_columns()
         inverse, tensor, columns = self.inverse_matrix(q), self.six(H, -3), self.six(J, -2)

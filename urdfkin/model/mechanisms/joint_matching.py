@@ -22,7 +22,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from urdfkin.model.chain import LEAST_SIZE
+from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.mechanisms.mechanism import (
     ALONG,
     IDENTITY,
@@ -169,7 +169,9 @@ class Pairing:
 
     def _unlikeness(self, one: _JointGeometry, other: _JointGeometry) -> tuple[bool, float, float]:
         angle, shift = one.mismatch(other)
-        axes = 0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, LEAST_SIZE) + shift
+        axes = (
+            0.0 if self._tolerance.holds(angle, shift) else angle * max(self.a.size, MIN_ROBOT_SIZE) + shift
+        )
         origins = math.dist(one.origin, other.origin)
         is_opposite = bool(one.screw.direction @ other.screw.direction < 0.0)
         return one.shape != other.shape, axes, origins + self.a.size * is_opposite

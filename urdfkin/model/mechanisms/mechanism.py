@@ -58,7 +58,7 @@ from urdfkin.kinematics.rotation import (
     rotation_with_z_axis,
 )
 from urdfkin.kinematics.roundings import AXIS_ROUNDINGS, CONSTANT_POSE_ROUNDINGS, EPS, FILE_ROUNDINGS
-from urdfkin.model.chain import LEAST_SIZE
+from urdfkin.model.chain import MIN_ROBOT_SIZE
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, inverse, is_rigid, pose
 
 #: A unit vector counts as parallel to an axis if its perpendicular component is smaller than this.
@@ -391,7 +391,7 @@ def tolerance_of(a: Mechanism, b: Mechanism) -> Tolerance:
 
 def size_of(a: Mechanism, b: Mechanism) -> float:
     """Return the length (m) by which comparisons multiply an angle to obtain a distance."""
-    return max(a.size, b.size, LEAST_SIZE)
+    return max(a.size, b.size, MIN_ROBOT_SIZE)
 
 
 def between_lines(s: Screw, t: Screw, *, placed: bool) -> tuple[float, float]:

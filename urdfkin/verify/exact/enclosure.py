@@ -19,8 +19,8 @@ from urdfkin.errors.escape import log_line
 from urdfkin.errors.validators import as_str, whole_number
 from urdfkin.kinematics.inputs import as_floats
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.configuration import checked
-from urdfkin.model.configuration_like import Given
+from urdfkin.model.configuration import parse_finite
+from urdfkin.model.configuration_like import ConfigurationLike
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, freeze
 from urdfkin.verify.call import Call
@@ -125,7 +125,7 @@ class Enclosures:
 def enclose(
     verifier: Verifier,
     plan_of: Callable[[Sequence[int]], CompiledTree],
-    inputs: tuple[Given, Given, Given],
+    inputs: tuple[ConfigurationLike, ConfigurationLike, ConfigurationLike],
     frame: str,
     reference: Reference | str,
     base: BaseMotion | None,
@@ -145,7 +145,7 @@ def enclose(
             remedy="give q (nq,), v and a (nv,), and the base of one sample",
         )
     for x, name in zip(inputs, "qva", strict=True):
-        checked(tree, x, name)
+        parse_finite(tree, x, name)
     link, part = call.links[0], call.part(slice(0, 1))
     path = tree.path(link)
     digits = digits or enough_digits(len(path))
