@@ -27,7 +27,7 @@ from urdfkin.dh.rows import table_from_rows
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import euler_of, quaternion_of, rotation_from_rpy
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.path import elementary
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot.loading import load
@@ -197,7 +197,7 @@ def test_the_driver_and_a_urdf_apply_roll_pitch_yaw_in_different_orders(file: Pa
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 6))
     true = controller().placement(q)
     driver, urdf = (
-        chain(calibrated_tree(read_calibration(file, order)), "tool0", "base").placement(q)
+        make_chain(calibrated_tree(read_calibration(file, order)), "tool0", "base").placement(q)
         for order in ("driver", "urdf")
     )
     assert np.abs(driver - true).max() < ROUNDING

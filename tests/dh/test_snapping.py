@@ -15,7 +15,7 @@ from tests.reading import present
 from urdfkin.dh import DHTable, dh_table
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.table import SnapChange, SnapReport
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, build_tree
 
 
@@ -34,7 +34,7 @@ def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) 
 
 def worst(table: DHTable, tree: KinematicTree, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the largest position error and orientation error of the tip."""
-    exact, found = chain(tree, "tip").placement(q), table.placement(q)
+    exact, found = make_chain(tree, "tip").placement(q), table.placement(q)
     metres = np.linalg.norm(found[..., :3, 3] - exact[..., :3, 3], axis=-1)
     return metres, rotation_angle(found[..., :3, :3], exact[..., :3, :3])
 
@@ -61,11 +61,11 @@ def test_snapping_a_random_chain_moves_the_tip_within_the_declared_bound(
 ) -> None:
     table = dh_table(tree, "tip", snap=tolerance)
     q = configurations(tree.nq, 20)
-    own = chain(tree, "tip").coupling.select(tree, q)
+    own = make_chain(tree, "tip").coupling.select(tree, q)
     metres, radians = worst(table, tree, own)
     allowed_metres, allowed_radians = table.tolerance(own)
     # Offsets that cancel are in no cell, but their sum has rounding errors.
-    rounding = 20 * EPS * (1 + len(tree.joints)) * chain(tree, "tip").lengths.sum()
+    rounding = 20 * EPS * (1 + len(tree.joints)) * make_chain(tree, "tip").lengths.sum()
     assert (metres <= allowed_metres + rounding).all()
     assert (radians <= allowed_radians).all()
 
@@ -190,7 +190,7 @@ def test_the_row_of_a_constant_depends_on_the_convention(convention: str, row: i
 
 @pytest.mark.parametrize(("pivot", "sliders"), [(0, "j1 j3"), (1, "j1 j3"), (2, "j3"), (3, "j3"), (4, "")])
 def test_prismatic_joints_behind_the_pivot_lengthen_the_lever(pivot: int, sliders: str) -> None:
-    path = chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
+    path = make_chain(arm(np.eye(4), shift(1, 0, 0), shift(0, 2, 0), kinds="PRP", tip=shift(0, 0, 4)), "tip")
     found = _change(path, pivot, "something", OFF)
     assert found.sliders == tuple(sliders.split())
     assert found.lever == pytest.approx({0: 7.0, 1: 7.0, 2: 6.0, 3: 4.0, 4: 0.0}[pivot])

@@ -128,9 +128,7 @@ def test_several_coordinates_of_a_joint_are_given_by_name_or_together() -> None:
     q = robot.neutral()
     q[:7], q[-1] = place, 1.0
     expected = robot.placement(q, "e")
-    by_name = (
-        "neutral,root_joint.x=100mm,root_joint.y=.2,root_joint.z=.3,root_joint.qz=1,root_joint.qw=0"
-    )
+    by_name = "neutral,root_joint.x=100mm,root_joint.y=.2,root_joint.z=.3,root_joint.qz=1,root_joint.qw=0"
     np.testing.assert_array_equal(robot.placement(by_name + ",elbow=1", "e"), expected)
     together: dict[str, Any] = {"root_joint": place, "elbow": 1.0, "shoulder": 0.0, "lift": 0.0}
     np.testing.assert_array_equal(robot.placement(together, "e"), expected)
@@ -279,7 +277,7 @@ ALIKE = urdfs.robot(
 def test_coordinate_names_are_unique() -> None:
     robot = urdfkin.load(ALIKE)
     assert robot.coordinate_names == ("a:x", "a:y", "a:angle", "a.x")
-    assert robot.rate_names == ("a.vx", "a.vy", "a.wz", "a.x")
+    assert robot.velocity_names == ("a.vx", "a.vy", "a.wz", "a.x")
     moved = robot.placement("neutral, a.x=0.5", "s")
     np.testing.assert_array_equal(moved, robot.placement([0.0, 0.0, 0.0, 0.5], "s"))
     all_named = {"a:x": 0.1, "a:y": 0.2, "a:angle": 0.3, "a.x": 0.4}
@@ -298,10 +296,10 @@ def test_a_third_separator_avoids_a_third_equal_name() -> None:
 def test_equal_names_never_set_a_coordinate_to_zero() -> None:
     twice = CoordinateLayout("q", ("a", "a"), ("rad", "rad"))
     with pytest.raises(InputError, match="no value for a"):
-        twice.read({"a": 0.5})
+        twice.parse({"a": 0.5})
 
 
-def swapped(*asked: Any, right: Any = CoordinateLayout._by_name) -> Any:
+def swapped(*asked: Any, right: Any = CoordinateLayout._combine_values) -> Any:
     found = right(*asked)
     found[..., [0, 1]] = found[..., [1, 0]]
     return found
@@ -326,7 +324,7 @@ def test_values_assigned_to_the_wrong_coordinate_name_are_detected(
     robot = urdfkin.load(ARM)
     robot.placement(NAMED[given], "e")
     assert robot.certificate().verified
-    monkeypatch.setattr(CoordinateLayout, "_by_name", swapped)
+    monkeypatch.setattr(CoordinateLayout, "_combine_values", swapped)
     with pytest.raises(urdfkin.VerificationError):
         robot.placement(NAMED[given], "e")
 
@@ -344,7 +342,7 @@ def test_an_exchanged_number_of_a_joint_with_several_disagrees(
     v = "neutral, root_joint.vx=0.1, root_joint.wz=3deg/s"
     robot.velocity("neutral", v, "e")
     assert robot.certificate().verified
-    monkeypatch.setattr(CoordinateLayout, "_by_name", swapped)
+    monkeypatch.setattr(CoordinateLayout, "_combine_values", swapped)
     for q in written:
         with pytest.raises(urdfkin.VerificationError):
             robot.placement(q, "e")

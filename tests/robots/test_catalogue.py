@@ -162,7 +162,7 @@ def test_the_coordinates_of_a_root_joint_are_those_of_pinocchio(name: str, root_
     assert np.abs(robot.from_pinocchio(full) - q).max() < 1e-14
     kind = JointKind.FLOATING if root_joint == "floating" else JointKind.PLANAR
     assert robot.tree.joints[0].kind is kind
-    assert robot.rate_names[0] == "root_joint.vx"
+    assert robot.velocity_names[0] == "root_joint.vx"
     assert urdfkin.validate(robot, samples=2).passed
 
 

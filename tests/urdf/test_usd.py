@@ -34,7 +34,7 @@ from urdfkin.kinematics.rotation import (
 )
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.conventions.convention import transcode
-from urdfkin.model.tree import LARGEST_ANGLE, KinematicTree, pose
+from urdfkin.model.tree import MAX_PLAUSIBLE_ANGLE, KinematicTree, pose
 from urdfkin.report.diff import as_data, headline
 from urdfkin.urdf import usd
 from urdfkin.verify import usd_check
@@ -916,7 +916,7 @@ def _joint_in_usd(tree: KinematicTree, k: int, mistake: str) -> str:
         multiplier = rule.multiplier * (1.000001 if mistake == "a millionth" else 1.0)
         words = FOLLOWS.format(f"joints/{transcode(rule.leader)}")
         words += f"float newton:mimicCoef0 = {rule.offset * degrees}\nfloat newton:mimicCoef1 = {multiplier}"
-    if one.limit is not None and one.kind.bounded:
+    if one.limit is not None and one.kind.has_limits:
         limits = [x * (1.0 if mistake == "radians" else degrees) for x in (one.limit.lower, one.limit.upper)]
     name = {"fixed": "Fixed", "prismatic": "Prismatic"}.get(one.kind.value, "Revolute")
     first, second = ends[::-1] if mistake == "exchanged bodies" else ends
@@ -1122,7 +1122,7 @@ def test_each_mistake_of_a_converter_is_detected_and_described(converted: Read, 
         said = [*found.up_to, *codes(wrong)]
         said += [one.words for one in (*found.differences, *found.remarks)]
         # If the limits are too large for radians, only `same` reports the mistake.
-        wide = kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > LARGEST_ANGLE
+        wide = kind == "radians" and spoilt.limit is not None and spoilt.limit.upper > MAX_PLAUSIBLE_ANGLE
         assert not found.up_to_single or kind == "radians", (kind, name)
         assert any((": limits " if wide else word) in one for one in said), (kind, name, said)
         if kind == "radians":

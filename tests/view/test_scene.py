@@ -101,7 +101,7 @@ def test_a_flat_ellipsoid_is_visible_and_the_text_contains_the_results(x: FrameM
 
 
 def test_arrows_show_jacobian_columns_and_acceleration_parts_at_one_scale(x: FrameMotion) -> None:
-    rates = urdfkin.load("panda").rate_names
+    rates = urdfkin.load("panda").velocity_names
     arrows = jacobian_arrows(x, rates, 1.0, angular=False)
     vectors = arrows.points[:, 1] - arrows.points[:, 0]
     columns = x.jacobian[0, :3].T[[rates.index(name) for name in arrows.names]]

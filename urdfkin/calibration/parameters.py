@@ -34,7 +34,7 @@ from urdfkin.dh.table import DHConvention, DHRow, DHTable
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
-from urdfkin.model.chain import FrameChain, chain, joints_between
+from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.mimic import Coupling
 from urdfkin.model.path import ElementaryMotion, Path, elementary
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, inverse
@@ -286,7 +286,7 @@ def urdf_model(tree: KinematicTree, tip: str, base: str, fit: Collection[str]) -
     A fixed joint directly before the tip also has parameters. Other fixed joints have none, because
     parameters of the neighbouring moving joints have the same effect.
     """
-    path: FrameChain = chain(tree, tip, base)
+    path: FrameChain = make_chain(tree, tip, base)
     builder, number = _ModelBuilder(fit), 0
     builder.end("base")
     steps = joints_between(tree, tip, base)

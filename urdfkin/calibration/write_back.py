@@ -124,7 +124,7 @@ class Rewritten:
     def moved(self) -> dict[str, tuple[float, float]]:
         """The translation (m) and the rotation (rad) of each joint's origin."""
         tree = self.robot.tree
-        old = {name: tree.joints[tree.joint_index(name)].unlocked.T_parent_joint for name in self.origins}
+        old = {name: tree.joints[tree.joint_index(name)].original.T_parent_joint for name in self.origins}
         return {
             name: (
                 float(np.linalg.norm(T[:3, 3] - old[name][:3, 3])),

@@ -369,8 +369,8 @@ class Inputs:
         return (self.conversion or self.robot).coordinate_names
 
     @property
-    def rate_names(self) -> tuple[str, ...]:
-        return (self.conversion or self.robot).rate_names
+    def velocity_names(self) -> tuple[str, ...]:
+        return (self.conversion or self.robot).velocity_names
 
     def converted(self) -> Inputs:
         if self.conversion is None:
@@ -463,7 +463,7 @@ def _read_values(
     from urdfkin.robot.trajectory import column_units
 
     named = conversion or robot
-    names = named.coordinate_names if letter == "q" else named.rate_names
+    names = named.coordinate_names if letter == "q" else named.velocity_names
     word, _, count = text.partition(":")
     if word == "random":
         n = _read_count(where, count) if count else _RANDOM_SAMPLES

@@ -521,7 +521,7 @@ def _with_idle_joints_fixed(
     moving = {joint.name for joint, moved in zip(other.joints, moves, strict=True) if moved}
     children = {labels[1][i + 1] for i, moved in enumerate(moves) if moved}
     joints = tuple(
-        Lock(joint, 0.0).fixed()
+        Lock(joint, 0.0).make_fixed_joint()
         if _never_moves(joint)
         and not (names.get(joint.name, joint.name) in moving or labels[0][i + 1] in children)
         else joint

@@ -395,7 +395,7 @@ def pose_tolerance(joints: int, length: float, reach: float) -> PoseTolerance:
 def pose_tolerances(chain: FrameChain, reach: float) -> list[PoseTolerance]:
     return [
         pose_tolerance(joints, float(length), reach)
-        for joints, length in zip(chain.folded, chain.lengths, strict=True)
+        for joints, length in zip(chain.pose_counts, chain.lengths, strict=True)
     ]
 
 

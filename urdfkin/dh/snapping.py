@@ -33,7 +33,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE_ROUNDINGS, EPS, ROTATION_ROUNDINGS
-from urdfkin.model.chain import FrameChain, chain, joints_between
+from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.configuration import axis_range, sample_uniform
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, freeze
 
@@ -60,9 +60,9 @@ def snap_chain(
     tree: KinematicTree, tip: str, base: str | None, tolerance: float
 ) -> tuple[FrameChain, list[tuple[int, SnapChange]]]:
     """Return the chain with snapped angles, and each change with the index of the changed constant pose."""
-    exact = chain(tree, tip, base)
+    exact = make_chain(tree, tip, base)
     snapped_tree, rotations = _snap_origins(tree, tolerance)
-    path = chain(snapped_tree, tip, base)
+    path = make_chain(snapped_tree, tip, base)
     changes = _changes_of_origins(joints_between(tree, tip, exact.base), rotations)
     constants = list(path.constants)
     names = [*(joint.name for joint in path.joints), path.tip]

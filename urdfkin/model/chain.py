@@ -73,7 +73,7 @@ class FrameChain(Displayable):
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
         lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
             an upper bound on the length of the translation in A_k, for any rotations of the fixed joints.
-        folded: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed joints.
+        pose_counts: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed joints.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")
@@ -92,7 +92,7 @@ class FrameChain(Displayable):
     joints: tuple[ChainJoint, ...]
     T_last_tip: FloatArray
     lengths: FloatArray
-    folded: tuple[int, ...]
+    pose_counts: tuple[int, ...]
 
     def __repr__(self) -> str:
         return log_line(f"<FrameChain {self.robot}: {self.base} to {self.tip}, {len(self.joints)} joints>")
@@ -237,11 +237,11 @@ class FrameChain(Displayable):
         return np.ascontiguousarray(np.diff(self.origins(q), axis=-2))
 
 
-def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
+def make_chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
     """Return the path from `base` to `tip`; a planar or floating joint on the path raises InputError."""
     base_name = tree.links[0] if base is None else base
     joints, A, length = list[ChainJoint](), np.eye(4), 0.0
-    lengths, folded, count = list[float](), list[int](), 0
+    lengths, pose_counts, count = list[float](), list[int](), 0
     for joint, backwards in joints_between(tree, tip, base_name):
         _check_single_axis(tree, joint, base_name, tip)
         to_joint, from_joint = _poses_around(joint, backwards)
@@ -251,12 +251,12 @@ def chain(tree: KinematicTree, tip: str, base: str | None = None) -> FrameChain:
         if joint.kind.has_axis:
             joints.append(ChainJoint(joint.name, joint.kind, backwards, freeze(A), joint.limit, joint.mimic))
             lengths.append(length)
-            folded.append(count)
+            pose_counts.append(count)
             # If the path leads from child to parent, a joint's constant pose comes after the joint's motion.
             A, length, count = np.eye(4), 0.0, int(backwards)
         A = A @ from_joint
         length += joint.length if backwards else 0.0
-    ends = freeze(A), freeze([*lengths, length]), (*folded, count)
+    ends = freeze(A), freeze([*lengths, length]), (*pose_counts, count)
     return FrameChain(tree.name, base_name, tip, tuple(joints), *ends)
 
 

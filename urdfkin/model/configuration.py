@@ -34,7 +34,7 @@ from urdfkin.model.configuration_like import (
     join_names,
 )
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -198,7 +198,7 @@ def coordinate_names(tree: KinematicTree) -> tuple[str, ...]:
     return tuple(name for name, _ in _names_and_units(tree, _Q_SUFFIXES))
 
 
-def rate_names(tree: KinematicTree) -> tuple[str, ...]:
+def velocity_names(tree: KinematicTree) -> tuple[str, ...]:
     return tuple(name for name, _ in _names_and_units(tree, _VELOCITY_SUFFIXES))
 
 
@@ -455,7 +455,7 @@ def parse_finite(
 
 
 def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
-    return coordinate_names(tree) if what == "q" else rate_names(tree)
+    return coordinate_names(tree) if what == "q" else velocity_names(tree)
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:
@@ -479,7 +479,7 @@ def _violations(tree: KinematicTree, q: FloatArray) -> Iterator[tuple[Joint, str
 
 
 def _degrees_hint(joint: Joint, value: float) -> str:
-    if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > LARGEST_ANGLE):
+    if not (joint.kind.turns and is_bounded(joint.limit) and abs(value) > MAX_PLAUSIBLE_ANGLE):
         return ""
     lower, upper = far_limits(joint.limit.lower, joint.limit.upper)
     if lower <= value <= upper or not joint.limit.lower <= math.radians(value) <= joint.limit.upper:

@@ -11,12 +11,12 @@ from urdfkin.model.tree import Joint, KinematicTree
 
 #: Columns of the table of joints; limits are in rad and rad/s, or in m and m/s for prismatic joints.
 COLUMNS = ("kind", "axis", "q", "v", "lower", "upper", "speed", "mimics")
-#: Indices of the left-aligned columns in the table of `described`. Its first columns are link and joint.
-WORDS = (0, 1, 2, 3, 4, 5, 9)
-_WORDS_OF_JOINTS = (0, 1, 2, *(i + 1 for i in WORDS[2:]))
+#: Indices of the left-aligned columns in the table of `summarize`. Its first columns are link and joint.
+TEXT_COLUMNS = (0, 1, 2, 3, 4, 5, 9)
+_JOINT_TEXT_COLUMNS = (0, 1, 2, *(i + 1 for i in TEXT_COLUMNS[2:]))
 
 
-def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
+def summarize(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocument:
     columns = COLUMNS if any(joint.mimic for joint in tree.joints) else COLUMNS[:-1]
     names = ["", *(joint.name for joint in tree.joints)]
     cells = [("",) * len(columns), *(joint_cells(tree, i)[: len(columns)] for i in range(len(tree.joints)))]
@@ -29,7 +29,7 @@ def described(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
         f"{tree.name}: nq {tree.nq}, nv {tree.nv}, {len(tree.links)} links, {len(tree.joints)} joints",
         (
             f"root {tree.links[0]}, default base {base}, default tip {tip}",
-            Table(("link", "joint", *columns), rows, left=WORDS),
+            Table(("link", "joint", *columns), rows, left=TEXT_COLUMNS),
             *map(str, range_reductions(tree)),
             f"frames: {len(tree.frame_names)}, every link and joint by its name; tips: {tips}",
             order,
@@ -53,7 +53,9 @@ class Joints(dict[str, Joint], Displayable):
             for i, (joint, child) in enumerate(links)
         ]
         heads = ("joint", "parent", "child", *columns)
-        return TextDocument(f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=_WORDS_OF_JOINTS)])
+        return TextDocument(
+            f"{tree.name}: {len(self)} joints", [Table(heads, rows, left=_JOINT_TEXT_COLUMNS)]
+        )
 
 
 def tree_guides(tree: KinematicTree) -> Iterator[str]:
@@ -77,16 +79,16 @@ def joint_cells(tree: KinematicTree, i: int) -> tuple[str, ...]:
     if not joint.kind.nv:
         words = joint.kind.value if joint.lock is None else f"locked at {joint.lock.value:.6g}"
         return (words, *[""] * (len(COLUMNS) - 1))
-    q, v = _place("q", tree.q_index[i], joint.kind.nq), _place("v", tree.v_index[i], joint.kind.nv)
+    q, v = _index_text("q", tree.q_index[i], joint.kind.nq), _index_text("v", tree.v_index[i], joint.kind.nv)
     limit = joint.limit
-    limits = ("", "", "") if limit is None else map(_bound, (limit.lower, limit.upper, limit.velocity))
+    limits = ("", "", "") if limit is None else map(_limit_text, (limit.lower, limit.upper, limit.velocity))
     axis = format_axis(joint.axis.tolist()) if joint.kind.has_axis else ""
     rule = joint.mimic
     mimics = format_mimic_rule(rule.leader, rule.multiplier, rule.offset) if rule else ""
     return (joint.kind.value, axis, q, v, *limits, mimics)
 
 
-def _place(letter: str, at: int, count: int) -> str:
+def _index_text(letter: str, at: int, count: int) -> str:
     return f"{letter}[{at}]" if count == 1 else f"{letter}[{at}:{at + count}]"
 
 
@@ -111,5 +113,5 @@ def format_mimic_rule(leader: str, factor: float, offset: float) -> str:
     return (f"{factor:g} * " if factor != 1.0 else "") + leader + (f" {offset:+g}" if offset else "")
 
 
-def _bound(value: float) -> str:
+def _limit_text(value: float) -> str:
     return "" if math.isinf(value) else f"{value:.6g}"

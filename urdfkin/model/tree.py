@@ -75,12 +75,14 @@ class JointKind(Enum):
     nq_pinocchio: int  #: Number of coordinates in Pinocchio, which stores a free angle as (cos, sin).
     has_axis: bool  #: Whether a joint of this kind rotates about an axis or translates along an axis.
     turns: bool
-    bounded: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
+    has_limits: bool  #: Whether a joint of this kind has a lower and an upper limit in a URDF.
 
     def __new__(cls, word: object, *properties: Any) -> JointKind:
         member = object.__new__(cls)
         member._value_ = word
-        member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.bounded = properties
+        member.nq, member.nv, member.nq_pinocchio, member.has_axis, member.turns, member.has_limits = (
+            properties
+        )
         return member
 
     REVOLUTE = "revolute", 1, 1, 1, True, True, True
@@ -102,10 +104,10 @@ class Limit:
 
 
 #: Largest plausible joint angle (rad): some industrial wrists turn 400 degrees.
-LARGEST_ANGLE = 2.5 * math.pi
-#: A value is far outside the limits if it exceeds a limit by more than `_OUTSIDE` (rad or m),
-#: and by more than `_OF_RANGE` times the joint's range.
-_OUTSIDE, _OF_RANGE = 0.5, 0.25
+MAX_PLAUSIBLE_ANGLE = 2.5 * math.pi
+#: A value is far outside the limits if it exceeds a limit by more than `_FAR_DISTANCE` (rad or m),
+#: and by more than `_FAR_FRACTION` times the joint's range.
+_FAR_DISTANCE, _FAR_FRACTION = 0.5, 0.25
 
 
 def far_limits(lower: float, upper: float) -> tuple[float, float]:
@@ -114,7 +116,7 @@ def far_limits(lower: float, upper: float) -> tuple[float, float]:
     >>> far_limits(-2.0, 2.0), far_limits(-float("inf"), 2.0)
     ((-3.0, 3.0), (-inf, 2.0))
     """
-    far = max(_OUTSIDE, _OF_RANGE * (upper - lower)) if math.isfinite(upper - lower) else 0.0
+    far = max(_FAR_DISTANCE, _FAR_FRACTION * (upper - lower)) if math.isfinite(upper - lower) else 0.0
     return lower - far, upper + far
 
 
@@ -182,14 +184,14 @@ class Joint:
         return 0 if self.mimic else self.kind.nv
 
     @property
-    def unlocked(self) -> Joint:
+    def original(self) -> Joint:
         return self.lock.joint if self.lock else self
 
     @property
     def length(self) -> float:
         """Length (m) of the offset from the parent link, plus a locked prismatic joint's displacement."""
         # A URDF may contain 1e-200 or 1e200, whose squares underflow or overflow; hypot avoids squares.
-        length = math.hypot(*self.unlocked.T_parent_joint[:3, 3].tolist())
+        length = math.hypot(*self.original.T_parent_joint[:3, 3].tolist())
         if self.lock and self.lock.joint.kind is JointKind.PRISMATIC:
             length += abs(self.lock.value)
         return length
@@ -223,7 +225,7 @@ class Lock:
             T[:3, :3] = rotation_about(axis, value)
         return T
 
-    def fixed(self) -> Joint:
+    def make_fixed_joint(self) -> Joint:
         joint = self.joint
         T = joint.T_parent_joint @ self.motion
         return replace(joint, kind=JointKind.FIXED, T_parent_joint=T, limit=None, mimic=None, lock=self)
@@ -317,7 +319,7 @@ class KinematicTree:
         for joint, at in zip(self.joints, self.q_index, strict=True):
             if joint.nq == 1 and joint.kind.turns and is_bounded(joint.limit):
                 lower, upper = far_limits(joint.limit.lower, joint.limit.upper)
-                ends[:, at] = min(lower, -LARGEST_ANGLE), max(upper, LARGEST_ANGLE)
+                ends[:, at] = min(lower, -MAX_PLAUSIBLE_ANGLE), max(upper, MAX_PLAUSIBLE_ANGLE)
         return freeze(ends)
 
     @cached_property
@@ -464,7 +466,7 @@ def with_locks(tree: KinematicTree, values: Mapping[str, float]) -> KinematicTre
     """Fix some joints, and the joints that mimic them, at given values (rad or m)."""
     leaders = [joint.mimic.leader if joint.mimic else joint.name for joint in tree.joints]
     joints = [
-        Lock(joint, values[leader]).fixed() if leader in values else joint
+        Lock(joint, values[leader]).make_fixed_joint() if leader in values else joint
         for joint, leader in zip(tree.joints, leaders, strict=True)
     ]
     return with_poses(KinematicTree(tree.name, tree.links, tuple(joints)), tree.poses)

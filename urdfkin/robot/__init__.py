@@ -39,11 +39,11 @@ from urdfkin.kinematics.rotation import NEAREST
 from urdfkin.kinematics.roundings import EPS
 from urdfkin.model import configuration, integration
 from urdfkin.model.base_motion import BaseMotion
-from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import sample
 from urdfkin.model.configuration_like import ConfigurationLike, join_names
 from urdfkin.model.reference import Reference
-from urdfkin.model.summary import Joints, described
+from urdfkin.model.summary import Joints, summarize
 from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
 from urdfkin.system.lazy_import import hook
 from urdfkin.system.locks import importing
@@ -195,7 +195,7 @@ class Robot(Displayable):
             from urdfkin.system.plain_xml import order_words
 
         order = order_words(self.urdf, self.joint_names)
-        return described(self.tree, self.base_frame, self.tip_frame, order)
+        return summarize(self.tree, self.base_frame, self.tip_frame, order)
 
     def view(self, q: ConfigurationLike = "ready", *, height: int = 480) -> Any:
         """Return a three-dimensional view of the robot for a notebook cell, with a slider for each joint.
@@ -357,14 +357,14 @@ class Robot(Displayable):
         return configuration.coordinate_names(self.tree)
 
     @property
-    def rate_names(self) -> tuple[str, ...]:
+    def velocity_names(self) -> tuple[str, ...]:
         """A name for each number of `v` and `a`, and for each column of a Jacobian.
 
         >>> import urdfkin
-        >>> urdfkin.load("planar_two_link").rate_names
+        >>> urdfkin.load("planar_two_link").velocity_names
         ('joint_1', 'joint_2')
         """
-        return configuration.rate_names(self.tree)
+        return configuration.velocity_names(self.tree)
 
     @property
     def frame_names(self) -> tuple[str, ...]:
@@ -717,7 +717,7 @@ class Robot(Displayable):
         >>> panda.nq, panda.jacobian("ready", "panda_hand_tcp").shape
         (7, (6, 7))
         >>> elbow = urdfkin.load("planar_two_link").locked(joints=["joint_2"])
-        >>> elbow.rate_names, elbow.joints["joint_1"].lock.value
+        >>> elbow.velocity_names, elbow.joints["joint_1"].lock.value
         (('joint_2',), 0.0)
         """
         if not isinstance(lock, str | Mapping):
@@ -868,7 +868,7 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the velocity Jacobian J of a frame (..., 6, nv), with velocity = J v.
 
-        Column i is the frame's velocity [linear; angular] when the joint velocity `rate_names[i]` is 1 and
+        Column i is the frame's velocity [linear; angular] when the joint velocity `velocity_names[i]` is 1 and
         all others are 0. Units: m/s and rad/s per rad/s or m/s.
 
         >>> import urdfkin
@@ -1072,7 +1072,7 @@ class Robot(Displayable):
             J,
             error,
             str(frame),
-            self.rate_names,
+            self.velocity_names,
             axis_kinds(self.tree),
             active,
             partial(self._sampled, frame),
@@ -1424,7 +1424,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").chain("tip", "base")
         <FrameChain planar_two_link: base to tip, 2 joints>
         """
-        return chain(
+        return make_chain(
             self.tree, as_choice(tip, self.tip_frame, "tip"), as_choice(base, self.base_frame, "base")
         )
 

@@ -30,7 +30,7 @@ import numpy as np
 from urdfkin.errors import InputError
 from urdfkin.kinematics.rotation import rotation_about, rotation_from_quaternion
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -364,7 +364,7 @@ def _angle_unit(mujoco: Any, model: Any) -> Iterator[Listed]:
     """Yield a finding if a file declares degrees, but all its hinge limits are probably in radians."""
     hinges = (model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE) & (model.jnt_limited != 0)
     largest = float(np.degrees(np.abs(model.jnt_range[hinges]).max(initial=0.0)))
-    if 0.0 < largest <= LARGEST_ANGLE:
+    if 0.0 < largest <= MAX_PLAUSIBLE_ANGLE:
         what = f"the largest limit of a hinge is {largest:.4g} degrees: the limits are probably radians"
         yield Listed(what, "compiler", remedy='write angle="radian" in <compiler>, or the limits in degrees')
 

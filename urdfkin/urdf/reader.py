@@ -88,8 +88,8 @@ def _limit(limit: LimitRecord | None, kind: JointKind) -> Limit | None:
     # In urdfdom, the default of a position limit is zero.
     # In the URDF specification, position limits of a continuous joint have no effect.
     return Limit(
-        lower=(limit.lower or 0.0) if kind.bounded else -math.inf,
-        upper=(limit.upper or 0.0) if kind.bounded else math.inf,
+        lower=(limit.lower or 0.0) if kind.has_limits else -math.inf,
+        upper=(limit.upper or 0.0) if kind.has_limits else math.inf,
         velocity=math.inf if limit.velocity is None else limit.velocity,
         effort=math.inf if limit.effort is None else limit.effort,
     )

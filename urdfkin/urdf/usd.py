@@ -34,7 +34,7 @@ from urdfkin.errors import InputError, SourceError, UnknownNameError
 from urdfkin.kinematics.rotation import quaternion_of, rotation_from_quaternion
 from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -953,7 +953,7 @@ class _StageReader:
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         turns = edge.kind is JointKind.REVOLUTE
-        if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
+        if turns and _SMALLEST_ANGLE < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")

@@ -481,7 +481,7 @@ class _Run:
         reference = self.reference if reference is None else reference
         reference = Reference.LOCAL_WORLD_ALIGNED if reference is None else reference
         jacobian = partial(self.robot.jacobian, ours[0], frame or self.frame, reference, verify=False)
-        return self.conversion.result(self.row.name, ours, result, jacobian)
+        return self.conversion.convert_result(self.row.name, ours, result, jacobian)
 
     def _converted_scale(self, ours: Sequence[FloatArray], scale: FloatArray) -> FloatArray:
         """Return the scale of the bound for a result after its conversion to the function's convention.
@@ -492,7 +492,7 @@ class _Run:
         assert conversion is not None
         if name == "placement":
             return scale
-        scale = conversion.six(scale, 1)
+        scale = conversion.reorder_six_vector(scale, 1)
         if name in ("velocity", "acceleration"):
             return scale
         if not conversion.is_constant and name != "jacobian":
@@ -519,7 +519,7 @@ class _Run:
         """
         conversion, row = self.conversion, self.row
         assert conversion is not None
-        if conversion.permutation is not None and conversion.rate_permutation is not None:
+        if conversion.permutation is not None and conversion.velocity_permutation is not None:
             return 0.0
         return 16.0 + 2.0 * row.factors * len(self.robot.tree.joints) * float(np.abs(q).max(initial=1.0))
 
@@ -580,7 +580,7 @@ class _Run:
     def _column_names(self) -> tuple[str, ...]:
         if not self.row.columns:
             return ()
-        return (self.conversion or self.robot).rate_names
+        return (self.conversion or self.robot).velocity_names
 
 
 @dataclass

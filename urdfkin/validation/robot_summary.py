@@ -53,7 +53,7 @@ def describe(robot: Robot) -> ReportedModel:
         "base": robot.base_frame,
         "tip": robot.tip_frame,
         "coordinates": robot.coordinate_names,
-        "rates": robot.rate_names,
+        "rates": robot.velocity_names,
         "frames": robot.frame_names,
         "links": robot.link_names,
         "joints": [_joint(robot, i, narrowed) for i in range(len(tree.joints))],

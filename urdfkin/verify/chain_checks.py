@@ -17,7 +17,7 @@ from urdfkin.dh.common_normals import left_out
 from urdfkin.dh.screws import ProductOfExponentials
 from urdfkin.dh.structure import Opw
 from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, joint_roundings
-from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import sample
 from urdfkin.model.tree import FloatArray, JointFrame
 from urdfkin.verify.oracle import QueryBatch
@@ -91,7 +91,7 @@ def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | Non
     coordinates = screws.coupling.select(verifier.tree, q)
     size = np.abs(coordinates).sum(axis=-1)
     off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
-    path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
+    path = make_chain(verifier.tree, screws.tip_frame, screws.base_frame)
     # Pinocchio computes the placements of the base and the tip relative to the root.
     # The product of exponentials is the placement of the tip relative to the base.
     lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])

@@ -39,7 +39,7 @@ from urdfkin.dh.snapping import LARGEST_TOLERANCE, rotation_angle
 from urdfkin.dh.table import DHTable
 from urdfkin.errors import UrdfkinError
 from urdfkin.kinematics.roundings import EPS, MIN_DIVISOR, joint_roundings, table_roundings
-from urdfkin.model.chain import chain
+from urdfkin.model.chain import make_chain
 from urdfkin.model.configuration import Samples
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, KinematicTree
@@ -281,7 +281,7 @@ def sizes(tree: KinematicTree, table: DHTable, samples: Samples) -> Sizes:
     # `Joint.tilt` is the angle between a joint's axis in urdfkin and the same axis in Pinocchio.
     # A term of the relative acceleration has up to four rotated vectors, so the factor is 4.
     counted = table_roundings(len(table.rows)) + joint_roundings(joints, 4.0 * tilt) + angles
-    rounding = EPS * counted + left_out(chain(tree, table.tip_frame, table.base_frame))
+    rounding = EPS * counted + left_out(make_chain(tree, table.tip_frame, table.base_frame))
     return Sizes(reach, weights[True], weights[False], rates, accelerations, rounding)
 
 

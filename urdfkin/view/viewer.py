@@ -175,7 +175,7 @@ def rate_rows(robot: Robot, *, second: bool) -> list[SliderRow]:
             if not second and joint.limit is not None and 0.0 < joint.limit.velocity < _UNLIMITED:
                 most = joint.limit.velocity
             turns = k >= 3 if joint.nv == 6 else _turns(joint, k)
-            rows.append(SliderRow(at + k, robot.rate_names[at + k], turns, -most, most))
+            rows.append(SliderRow(at + k, robot.velocity_names[at + k], turns, -most, most))
     return rows
 
 
@@ -499,7 +499,7 @@ class Viewer:
         return frame_motion(self.robot, (q, v, a), self.frame.value, reference)
 
     def _draw(self, x: FrameMotion) -> None:
-        stage, reach, rates = self.stage, self.stage.reach, self.robot.rate_names
+        stage, reach, rates = self.stage, self.stage.reach, self.robot.velocity_names
         columns, ellipsoid = self.columns.value, self.ellipsoid.value
         stage.arrows(
             "jacobian",

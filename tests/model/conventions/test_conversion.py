@@ -37,7 +37,7 @@ _FIELDS: dict[Any, tuple[str, str]] = {
     "point": ("origin", "centre of mass"), "quaternion": ("xyzw", "wxyz"),
 }  # fmt: skip
 ODD = [
-    replace(Convention(name=f"odd {k}", six=how[2]), **dict[Any, Any](zip(_FIELDS, how, strict=True)))
+    replace(Convention(name=f"odd {k}", six_vectors=how[2]), **dict[Any, Any](zip(_FIELDS, how, strict=True)))
     for k, how in enumerate(itertools.product(*_FIELDS.values()))
 ]
 PLANAR = urdfs.robot(
@@ -73,7 +73,7 @@ def _values(robot: Robot, n: int = 4) -> tuple[FloatArray, FloatArray, FloatArra
 
 
 def test_every_listed_convention_has_data_and_evidence() -> None:
-    assert tuple(module._built_in()) == BUILT_IN
+    assert tuple(module._load_built_in()) == BUILT_IN
     for name in BUILT_IN:
         found = find_convention(name)
         assert found.note or name == "urdfkin"
@@ -81,7 +81,7 @@ def test_every_listed_convention_has_data_and_evidence() -> None:
     own = {"urdfkin", "urdf", "alphabetical"}  # nothing to run: the file itself, and Python's sort
     measured = {name for name in BUILT_IN if find_convention(name).evidence == "measured"}
     assert measured == own | set(LIBRARIES)
-    assert {name for name in BUILT_IN if find_convention(name).measured} == set(LIBRARIES)
+    assert {name for name in BUILT_IN if find_convention(name).measurement} == set(LIBRARIES)
 
 
 def test_conversion_from_a_convention_is_the_inverse_of_conversion_to_the_convention(
@@ -440,7 +440,7 @@ def test_a_convention_that_is_written_as_toml_is_read_back(name: str) -> None:
         "c": JointRule(None, 1.0, 1e-300, 4096.0),
         "d": JointRule("m", unit="mm"),
     }
-    how = replace(how, rules=rules, evidence="", measured="", sources=())
+    how = replace(how, rules=rules, evidence="", measurement="", sources=())
     assert parse_convention(as_toml(how), "text", how.name) == how
     given = replace(how, order="given", joints=("m", "c"))
     assert parse_convention(as_toml(given), "text", how.name) == given
