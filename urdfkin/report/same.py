@@ -384,7 +384,7 @@ def pictures(
         T_b = T_a[0] @ base_as_written(ours, theirs) @ inverse(T_b[0]) @ T_b
     else:
         i, j = a.tree.link_index(found.base_links[0]), b.tree.link_index(found.base_links[1])
-        T_b = T_a[i] @ inverse(ours.homes[i]) @ found.base @ theirs.homes[j] @ inverse(T_b[j]) @ T_b
+        T_b = T_a[i] @ inverse(ours.zero_poses[i]) @ found.base @ theirs.zero_poses[j] @ inverse(T_b[j]) @ T_b
     bones = _bones(a, T_a), _bones(b, T_b)
     drawn = [_draw(title, turn, tip, bones) for title, turn, tip in VIEWS]
     if worst is not None:

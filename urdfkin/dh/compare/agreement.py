@@ -35,7 +35,7 @@ from urdfkin.model.chain import MIN_ROBOT_SIZE, FrameChain
 from urdfkin.model.configuration import sample_uniform
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
-from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
+from urdfkin.model.mechanisms.upper_bound import FINE_GRID, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit
 
 #: The default tolerance (m) covers the effect of one or two cells that are rounded to 0.1 mm.
@@ -287,7 +287,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     variables = variables_of(pair, tolerance_of(*mechanisms))
     tip = link_names(table)[-1]
     frame = next(frame for frame in pair.frames if pair.a.tree.links[frame.a] == tip)
-    return upper_bounds(pair, variables, frame, FINE)
+    return upper_bounds(pair, variables, frame, FINE_GRID)
 
 
 def _free(path: FrameChain, table: DHTable) -> KinematicTree:
