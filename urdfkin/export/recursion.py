@@ -42,8 +42,8 @@ class NumberKind:
 class TreeRecursion(Recursion):
     """The forward recursion along one path; `end` is the state of the frame.
 
-    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. Otherwise, it is
-    computed in the axes of the world frame. An input that is not needed consists of zeros. `turns` are
+    If `own_axes` is True, the motion of each link is computed in the axes of the link's frame. Otherwise, it
+    is computed in the axes of the world frame. An input that is not needed consists of zeros. `turns` are
     rotation matrices from the axes of each frame to the axes of the previous frame.
     """
 

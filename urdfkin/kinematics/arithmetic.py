@@ -34,9 +34,9 @@ def rebind_functions(
 ) -> dict[str, Any]:
     """Return copies of the functions of some modules, by name.
 
-    A copy calls other copies instead of the original functions. An entry of `replacements` replaces the function or
-    the module of the same name. `decorate` is applied to each copy. List a module after the modules whose
-    functions it uses.
+    A copy calls other copies instead of the original functions. An entry of `replacements` replaces the
+    function or the module of the same name. `decorate` is applied to each copy. List a module after the
+    modules whose functions it uses.
     """
     copies: dict[str, Any] = {}
     for module in modules:

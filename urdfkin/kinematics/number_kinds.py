@@ -9,10 +9,10 @@ sum, a cross product becomes the product of two lengths, and a rotation changes 
 as large as every term, every partial sum and the result. Rounding errors are proportional to the scale.
 Rounding errors are not proportional to the result, because the result is small where large terms cancel.
 
-A scale is 0 or at least `SMALLEST_NORMAL`, the smallest normal number. This lower bound has two reasons. First, a
-product below `SMALLEST_NORMAL` has an absolute error of up to half the smallest subnormal number. Second, a product
-of two small numbers may underflow to zero, and a later operation may multiply the lost product by a large
-number.
+A scale is 0 or at least `SMALLEST_NORMAL`, the smallest normal number. This lower bound has two reasons.
+First, a product below `SMALLEST_NORMAL` has an absolute error of up to half the smallest subnormal number.
+Second, a product of two small numbers may underflow to zero, and a later operation may multiply the lost
+product by a large number.
 """
 
 from __future__ import annotations

@@ -28,8 +28,8 @@ The acceleration of a frame, for example, is a sum of terms such as w x (w x d);
 factors of this term. The sum of the terms over the joints and the cross products in a term have rounding
 errors too. In each implementation, the sum of these errors is at most 2 eps for each term, which has two or
 three factors (`urdfkin.verify.bounds`). Two margins cover these errors. First, the count includes one more
-joint than the path has. This joint covers the frame's own offset and the first sum. Second, `PINOCCHIO_ROUNDINGS` is 24
-instead of 22.5. The difference of 1.5 covers the other sums.
+joint than the path has. This joint covers the frame's own offset and the first sum. Second,
+`PINOCCHIO_ROUNDINGS` is 24 instead of 22.5. The difference of 1.5 covers the other sums.
 
 The recursion expresses its vectors in the world's axes or in a link's axes. In the world's axes, each joint
 axis z and each offset R d is rotated once by every joint before it. In a link's axes, w of link k is
@@ -42,9 +42,9 @@ If a joint's axis is **not a coordinate axis**, urdfkin computes two more matrix
 A be the rotation that turns z to the joint's axis. urdfkin multiplies the joint's constant rotation by A, and
 by the inverse of the previous joint's A. Pinocchio uses Rodrigues' formula. In urdfkin and in Pinocchio, the
 result depends on the length of the axis. If all 340 rounding errors have the same sign, the total error is
-41. `PINOCCHIO_ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over its
-range, the standard deviation of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times this standard
-deviation.
+41. `PINOCCHIO_ROUNDINGS` does not cover this worst case. If each rounding error is uniformly distributed over
+its range, the standard deviation of the sum is 3.3. For a single joint, `PINOCCHIO_ROUNDINGS` is seven times
+this standard deviation.
 
 Pinocchio replaces an axis within 1e-12 of a coordinate axis by that coordinate axis. Let Q be the rotation
 that turns the file's axis to the coordinate axis, and let the tilt t be the angle of Q. Then |Q R Q^T - R| <=
@@ -81,9 +81,9 @@ Each omitted component of an offset causes an error of 0.5; two components cause
 offset's length. In a matrix row and in a cross product, an export also omits each product that contains an
 omitted component. These products would have a rounding error of 1.5, so the omission causes a smaller error.
 Without fused multiply-adds, an export and Pinocchio differ by at most 7.2 + 16.8 = 24.0 eps for each joint,
-plus the errors of the sums over the joints. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these sums. The standard
-deviation is the same as for urdfkin. If an export is compared with true values (test vectors), the error is
-at most 7.2 eps, which is within `PINOCCHIO_ROUNDINGS`.
+plus the errors of the sums over the joints. `PINOCCHIO_ROUNDINGS` is 24.0 and does not cover these sums. The
+standard deviation is the same as for urdfkin. If an export is compared with true values (test vectors), the
+error is at most 7.2 eps, which is within `PINOCCHIO_ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
 2^-23. The value of each operation and of each constant has a rounding error. `urdfkin.export.single`
@@ -113,8 +113,8 @@ converts it to a matrix. If all rounding errors have the same sign, the error is
 |---|---|
 | a joint about any axis: two products of quaternions, the norm, the matrix | 21.5 |
 
-With urdfkin's 5.7 the difference is 27.2. `MUJOCO_ROUNDINGS` is 30 instead of 27.2. The difference of 2.8 covers the
-sums over the joints. MuJoCo does not replace the file's axes by coordinate axes.
+With urdfkin's 5.7 the difference is 27.2. `MUJOCO_ROUNDINGS` is 30 instead of 27.2. The difference of 2.8
+covers the sums over the joints. MuJoCo does not replace the file's axes by coordinate axes.
 
 **A mimic joint** adds no rounding. urdfkin and the oracle compute a mimic joint's angle m q + c from the same
 doubles m and c. Both programs round the multiplication and then the addition, so IEEE 754 defines the result
@@ -139,8 +139,8 @@ rotation. The counts, with u = eps/2, are
 | a base's velocity and acceleration, expressed in its axes: two cross products and two sums | | 6.0 |
 | sum | 3.2 | 17.0 |
 
-The sum 20.2 is within `PINOCCHIO_ROUNDINGS`. The largest measured errors of the rotation are 0.6 (urdfkin) and 5.1
-(Pinocchio). They were measured with 1,500 matrices; the reference values have 50 digits.
+The sum 20.2 is within `PINOCCHIO_ROUNDINGS`. The largest measured errors of the rotation are 0.6 (urdfkin)
+and 5.1 (Pinocchio). They were measured with 1,500 matrices; the reference values have 50 digits.
 
 **An MJCF equality** is y - y0 = c0 + c1 (x - x0), with reference values y0 and x0. The tree's mimic rules
 satisfy it up to
@@ -256,8 +256,8 @@ ROTATION_ROUNDINGS = 8.0
 #: Error (in eps) of a mimic joint's limit that is converted to a limit of the mimicked joint.
 #: The conversion has a subtraction and a division; the mimic rule has a multiplication and an addition.
 #: Each of these four operations has an error of 0.5.
-#: The sum of the four errors is 2.0. `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the converted
-#: range are accepted.
+#: The sum of the four errors is 2.0. `MIMIC_LIMIT_ROUNDINGS` is twice this sum, so that both ends of the
+#: converted range are accepted.
 MIMIC_LIMIT_ROUNDINGS = 4.0
 
 
@@ -284,8 +284,8 @@ def table_roundings(rows: int) -> float:
 def read_back_roundings(rows: int) -> float:
     """Return the allowed difference (in eps) between a table and the URDF that was written from the table.
 
-    The pose from the table and Pinocchio's pose from the URDF have the error `table_roundings(rows)` each. The
-    conversion to roll, pitch and yaw has twice this error.
+    The pose from the table and Pinocchio's pose from the URDF have the error `table_roundings(rows)` each.
+    The conversion to roll, pitch and yaw has twice this error.
     """
     return 4.0 * table_roundings(rows)
 

@@ -73,7 +73,8 @@ class FrameChain(Displayable):
         T_last_tip: (4, 4) pose of the tip in the last joint's frame (in the base if no joint moves).
         lengths: (n + 1,) path lengths between joint origins, m, including the merged fixed joints. Entry k is
             an upper bound on the length of the translation in A_k, for any rotations of the fixed joints.
-        pose_counts: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed joints.
+        pose_counts: (n + 1,) number of URDF joint poses whose product is A_k, including those of fixed
+            joints.
 
     >>> import urdfkin
     >>> path = urdfkin.load("planar_two_link").chain("tip", "base")

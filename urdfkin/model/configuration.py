@@ -46,7 +46,8 @@ from urdfkin.model.tree import (
     is_bounded,
 )
 
-#: Sampled ranges are cut off at +-`MAX_SAMPLED_VALUE` (rad or m). A missing limit is replaced by +-`MAX_SAMPLED_VALUE`.
+#: Sampled ranges are cut off at +-`MAX_SAMPLED_VALUE` (rad or m). A missing limit is replaced by
+#: +-`MAX_SAMPLED_VALUE`.
 #: The range of a continuous joint is -pi to pi.
 MAX_SAMPLED_VALUE = 10.0
 
@@ -56,8 +57,8 @@ class RangeReduction:
     """A mimicked joint's own range, and the part of this range that its mimic joints allow.
 
     Attributes:
-        allowed_range: The part of `joint_range` in which all mimic joints are within their limits; None if no value is
-            allowed.
+        allowed_range: The part of `joint_range` in which all mimic joints are within their limits; None if no
+            value is allowed.
         mimic_joints: Names of the mimic joints whose limits make the range smaller.
     """
 
@@ -86,7 +87,7 @@ def format_range(ends: tuple[float, float]) -> str:
 
 
 def axis_range(kind: JointKind, limit: Limit | None, max_length: float = 1.0) -> tuple[float, float]:
-    """Return the ends of a joint's range; without limits, -pi to pi (rad) or -`max_length` to `max_length` (m)."""
+    """Return the ends of a joint's range; without limits, +-pi (rad) or +-`max_length` (m)."""
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
     return (-math.pi, math.pi) if kind.turns else (-max_length, max_length)
@@ -678,7 +679,7 @@ def draw_base_motion(n: int, rng: np.random.Generator) -> BaseMotion:
 
 
 def draw_samples(tree: KinematicTree, n: int, rng: np.random.Generator, *, with_special: bool) -> Samples:
-    """Return samples for a validation: `n` random samples and, if requested, the samples of `special_configurations`.
+    """Return samples for a validation: `n` random ones and, if requested, `special_configurations`.
 
     The samples cover each joint's own range, even if a mimic joint then exceeds its limits, because the
     equations are valid beyond the limits too. Every eighth sample has a hundred times larger velocities and

@@ -51,7 +51,8 @@ class CoordinateLayout:
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and their count.
         hints_by_name: Returns a hint for each joint without a coordinate, such as a fixed joint.
-        hints_by_length: Returns a hint for wrong lengths that users often pass, such as the length of Pinocchio's q.
+        hints_by_length: Returns a hint for wrong lengths that users often pass, such as the length of
+            Pinocchio's q.
     """
 
     what: str
@@ -214,8 +215,8 @@ with 'neutral, elbow=...'
 def as_text_or_mapping(value: ConfigurationLike, where: str) -> str | Mapping[str, ArrayLike] | None:
     """Return text or a mapping unchanged, a table with labels as a mapping, and None for other values.
 
-    >>> as_text_or_mapping([0.5, 0.1], "q"), as_text_or_mapping("ready", "q"), as_text_or_mapping({"elbow": 0.5}, "q")
-    (None, 'ready', {'elbow': 0.5})
+    >>> [as_text_or_mapping(value, "q") for value in ([0.5, 0.1], "ready", {"elbow": 0.5})]
+    [None, 'ready', {'elbow': 0.5}]
     """
     if isinstance(value, np.ndarray):
         return None

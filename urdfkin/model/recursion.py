@@ -61,8 +61,8 @@ class Column:
 class Recursion:
     """Steps of the recursion: each step computes a link's state from the state of the previous link.
 
-    Velocities and accelerations are expressed in each link's own axes if `own_axes` is True, and in world axes
-    otherwise.
+    Velocities and accelerations are expressed in each link's own axes if `own_axes` is True, and in world
+    axes otherwise.
     """
 
     eq: Any

@@ -868,8 +868,8 @@ class Robot(Displayable):
     ) -> FloatArray:
         """Return the velocity Jacobian J of a frame (..., 6, nv), with velocity = J v.
 
-        Column i is the frame's velocity [linear; angular] when the joint velocity `velocity_names[i]` is 1 and
-        all others are 0. Units: m/s and rad/s per rad/s or m/s.
+        Column i is the frame's velocity [linear; angular] when the joint velocity `velocity_names[i]` is 1
+        and all others are 0. Units: m/s and rad/s per rad/s or m/s.
 
         >>> import urdfkin
         >>> arm = urdfkin.load("planar_two_link")

@@ -312,7 +312,8 @@ def mujoco_magnitudes(size: Magnitudes) -> Magnitudes:
     the frame's origin. The distance of a joint or the frame from the centre of mass is at most the length p
     of the path. Lever arms are therefore at most 2 p long. A conversion to or from the centre of mass adds a
     cross product with a lever arm. This cross product at most doubles the number of factors in a term. For
-    each joint, the bound allows `MUJOCO_ROUNDINGS` = 30 instead of `PINOCCHIO_ROUNDINGS` = 24 rounding errors.
+    each joint, the bound allows `MUJOCO_ROUNDINGS` = 30 instead of `PINOCCHIO_ROUNDINGS` = 24 rounding
+    errors.
     """
     p = 2.0 * size.p
     shared = eq.tangential(size.w, size.vel)
@@ -349,10 +350,10 @@ def true_value_magnitudes(
     """Return the upper bounds on terms (`Magnitudes`) for a comparison of one program with the true values.
 
     The true values are computed from the decimals in the URDF and from the doubles q, v and a. The true
-    values are rounded to 17 digits. The bound allows `PINOCCHIO_ROUNDINGS` = 24 rounding errors for each joint. One
-    program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The difference
-    of 7.2 rounding errors is available for the conversion of decimals to doubles. The offset, the axis and
-    the true value have an error of half an eps each. The error of the axis counts twice, because two
+    values are rounded to 17 digits. The bound allows `PINOCCHIO_ROUNDINGS` = 24 rounding errors for each
+    joint. One program makes at most 16.8 rounding errors for each joint (`urdfkin.kinematics.roundings`). The
+    difference of 7.2 rounding errors is available for the conversion of decimals to doubles. The offset, the
+    axis and the true value have an error of half an eps each. The error of the axis counts twice, because two
     rotations use the axis. The conversion of two kinds of numbers causes larger errors:
 
     - Roll, pitch and yaw have an error of half an eps of their size. All vectors after the joint therefore
@@ -583,8 +584,8 @@ def euler_jacobian_bound(bound: Bound, size: Magnitudes, apart: FloatArray) -> B
     multiplied by 1.5 / s^2 for the first and last angle, and by 1 / s for the middle angle. The function uses
     the smallest possible value of s, which is `apart` - delta. The functions arctan2 and sine add about 3
     eps, and products and quotients about 10 eps. `Magnitudes.roundings` counts one joint more than the path
-    contains. For this additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` = 24 eps, so the bound covers
-    the 13 eps.
+    contains. For this additional joint, the bound allows at least `PINOCCHIO_ROUNDINGS` = 24 eps, so the
+    bound covers the 13 eps.
 
     `bound` is the bound of the velocity Jacobian, and `apart` (n, frames) is s of Pinocchio's rotation.
     """

@@ -49,7 +49,8 @@ from urdfkin.verify.verifier import Verifier
 
 #: Time limit for reading a stage, seconds.
 PATIENCE = 60.0
-#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF` (derived in `_check_joint`).
+#: Bound on a joint's angle error (rad) in OpenUSD's parser, divided by `SINGLE_ROUNDOFF` (derived in
+#: `_check_joint`).
 _ROTATION = 18.0
 #: Number of rounding errors in a joint's origin (derived in `_check_joint`).
 _ORIGIN = 3.0
@@ -245,8 +246,8 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
     """Compare the placements of links with the transforms of their prims, in the stage's configuration.
 
     The bound assumes that a prim's transform consists of several operations: one operation for each joint on
-    the path from the root, and one more. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at most
-    `_TRANSFORM` u, the largest of these three values:
+    the path from the root, and one more. With u = `SINGLE_ROUNDOFF`, the angle error of one operation is at
+    most `_TRANSFORM` u, the largest of these three values:
 
     - Angles: at most three rotations of at most one turn, with errors of at most 2 pi u each: 6 pi u.
     - Quaternion: the vector of the four errors is at most u long. The component perpendicular to the

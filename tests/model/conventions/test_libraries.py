@@ -101,7 +101,8 @@ def test_results_of_a_library_in_its_convention_equal_those_of_urdfkin(
 
 #: The two values of what a convention with a floating base states: a mistake is the other one.
 STATED = {
-    "quaternion": ("xyzw", "wxyz"), "six_vectors": ("linear first", "angular first"), "linear": ("body", "parent"),
+    "quaternion": ("xyzw", "wxyz"), "six_vectors": ("linear first", "angular first"),
+    "linear": ("body", "parent"),
     "angular": ("body", "parent"), "base_v": ("linear first", "angular first"), "angle": ("rad", "deg"),
     "base_q": ("position first", "quaternion first"), "point": ("origin", "centre of mass"),
 }  # fmt: skip

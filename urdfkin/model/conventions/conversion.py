@@ -347,7 +347,7 @@ class Conversion:
 
     @property
     def velocity_permutation(self) -> NDArray[np.intp] | None:
-        """Indices with `v_tool = v[..., velocity_permutation]`; None if the conversion also changes numbers."""
+        """Indices with `v_tool = v[..., velocity_permutation]`; None if the conversion changes numbers."""
         return self._v_index.copy() if self._plain_v else None
 
     @cached_property
@@ -596,7 +596,8 @@ class Conversion:
         A second call restores the original order.
 
         >>> import urdfkin
-        >>> urdfkin.load("planar_two_link").convention("drake").reorder_six_vector([1, 2, 3, 4, 5, 6]).tolist()
+        >>> drake = urdfkin.load("planar_two_link").convention("drake")
+        >>> drake.reorder_six_vector([1, 2, 3, 4, 5, 6]).tolist()
         [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]
         """
         array = np.asarray(x, dtype=np.float64)
@@ -711,7 +712,7 @@ class Reordering:
     zero: tuple[float, ...]
 
     def code(self, target: str, source: str) -> str:
-        """Return one line of Python code that computes the variable `target` from the variable `source` with NumPy.
+        """Return one line of NumPy code that computes the variable `target` from the variable `source`.
 
         >>> Reordering((1, 0), (1.0, 1.0), (0.0, 0.0)).code("q_b", "q_a")
         'q_b = q_a[..., [1, 0]]'

@@ -4,10 +4,10 @@ Joints at two matched bodies are paired by the names that the user gives, by equ
 
 Two subtrees match exactly if suitable zero offsets make every axis of one subtree coincide with an axis of
 the other subtree. Links with equal labels (by default, equal names) must also coincide. The multipliers of
-the mimic rules must correspond, unless `SubtreeMatcher.ignore_rules` was called. The value of the joint before a
-subtree does not matter, because the joint's zero offset can compensate any value. Therefore, the result
-depends only on the two joints before the subtrees, and on the pose of one joint's axis relative to the other.
-`SubtreeMatcher` stores the result of each such case, so that the search is fast even for long chains.
+the mimic rules must correspond, unless `SubtreeMatcher.ignore_rules` was called. The value of the joint
+before a subtree does not matter, because the joint's zero offset can compensate any value. Therefore, the
+result depends only on the two joints before the subtrees, and on the pose of one joint's axis relative to the
+other. `SubtreeMatcher` stores the result of each such case, so that the search is fast even for long chains.
 """
 
 from __future__ import annotations

@@ -434,9 +434,9 @@ class MechanismMatcher:
     ) -> Iterator[FloatArray]:
         """Yield candidates for the rigid motion N of a planar or floating joint (P_b = M P_a N).
 
-        `pose_a` (4, 4) is the frame of A's joint after the motion G. `zero_pose_b` (4, 4) is the frame of B's joint in
-        B's zero configuration. For a floating joint, `plane` is None. For a planar joint, `plane` (4, 4) is
-        one possible motion N, and every possible N is the product of `plane` and a planar pose.
+        `pose_a` (4, 4) is the frame of A's joint after the motion G. `zero_pose_b` (4, 4) is the frame of B's
+        joint in B's zero configuration. For a floating joint, `plane` is None. For a planar joint, `plane`
+        (4, 4) is one possible motion N, and every possible N is the product of `plane` and a planar pose.
         """
         yield IDENTITY if plane is None else plane
         candidates = [next_pair.XC]

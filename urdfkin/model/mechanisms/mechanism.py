@@ -434,8 +434,8 @@ class MatchedJoints:
             `axis` unless only the joint axes of A and B differ.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
-        kind_difference: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds differ;
-            else "".
+        kind_difference: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds
+            differ; else "".
         conversion: Converts A's coordinates of a planar or floating joint to B's; None if the coordinates are
             equal.
     """
@@ -505,7 +505,8 @@ class Alignment:
         X: (4, 4) pose of B's root in A's root frame.
         steps: The joint pairs, ordered outwards from the base.
         match_count: Number of joint pairs and link pairs that agree.
-        max_difference: Largest difference (m) between matched joints or links. Angles are multiplied by `size_of`.
+        max_difference: Largest difference (m) between matched joints or links. Angles are multiplied by
+            `size_of`.
     """
 
     a: Mechanism
