@@ -216,7 +216,7 @@ def test_no_mutant_gives_a_wrong_verified_result(ur5: Robot, name: str) -> None:
     source, q = inspect.getsource(module), ur5.sample(6, 2)
 
     def results() -> dict[str, FloatArray | None]:
-        rotation._sequence.cache_clear()
+        rotation._make_sequence.cache_clear()
         return {representation: outcome(ur5, q, representation) for representation in REPRESENTATIONS}
 
     with names_called() as called:
@@ -234,7 +234,7 @@ def test_no_mutant_gives_a_wrong_verified_result(ur5: Robot, name: str) -> None:
                 J.shape != right.shape or np.abs(J / right - 1.0)[np.abs(right) > 1e-6].max() > 1e-10
             ):
                 wrong.append((words, representation))
-    rotation._sequence.cache_clear()
+    rotation._make_sequence.cache_clear()
     assert wrong == []
     assert tried > 10
     assert caught > 0.5 * tried  # other mutants change only a check of inputs, a tie or a type

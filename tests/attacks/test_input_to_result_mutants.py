@@ -77,7 +77,7 @@ CHANGES = [
     ("kinematics.rotation.rotation_with_z_axis",
      "np.stack([*columns, axis], axis=-1)", "-np.stack([*columns, axis], axis=-1)"),
     # a table's URDF
-    ("model.path._moved", "motion.turns", "not motion.turns"),
+    ("model.path._apply_motion", "motion.turns", "not motion.turns"),
     ("dh.convert.frame_poses", "row.S @ row.X", "row.X @ row.S"),
     ("dh.convert.frame_poses", "T_last_tip @ table.tool", "table.tool @ T_last_tip"),
     ("urdf.writer._joint", "rpy_of(T[:3, :3])", "rpy_of(T[:3, :3])[::-1]"),

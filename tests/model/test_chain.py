@@ -14,7 +14,7 @@ from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.model.chain import make_chain
-from urdfkin.model.path import ElementaryMotion, Path, elementary
+from urdfkin.model.path import ElementaryMotion, Path, elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, build_tree, pose
 from urdfkin.verify.chain_checks import check_chain
 from urdfkin.verify.oracle import QueryBatch
@@ -184,14 +184,14 @@ AMOUNTS = np.random.default_rng(0).uniform(-1.0, 1.0, (4, len(MOTIONS)))
 def test_the_frames_of_a_path_are_products_of_the_elementary_motions() -> None:
     T, frames = np.broadcast_to(A, (4, 4, 4)), PATH.frames(AMOUNTS)
     for k, motion in enumerate(MOTIONS):
-        T = T @ elementary(motion.axis, motion.turns, AMOUNTS[:, k])
+        T = T @ elementary_pose(motion.axis, motion.turns, AMOUNTS[:, k])
         np.testing.assert_allclose(frames[:, 2 * k + 1], T, atol=1e-15)
         T = T @ A
         np.testing.assert_allclose(frames[:, 2 * k + 2], T, atol=1e-15)
 
 
 def test_the_jacobian_columns_of_a_path_are_difference_quotients() -> None:
-    poses, columns = PATH.columns(AMOUNTS)
+    poses, columns = PATH.pose_and_jacobian(AMOUNTS)
     for k in range(len(MOTIONS)):
         step = 1e-6 * np.eye(len(MOTIONS))[k]
         before, after = PATH.poses(AMOUNTS - step), PATH.poses(AMOUNTS + step)

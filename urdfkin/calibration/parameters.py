@@ -36,7 +36,7 @@ from urdfkin.errors.escape import log_line
 from urdfkin.kinematics.roundings import EPS, PINOCCHIO_ROUNDINGS
 from urdfkin.model.chain import FrameChain, joints_between, make_chain
 from urdfkin.model.mimic import Coupling
-from urdfkin.model.path import ElementaryMotion, Path, elementary
+from urdfkin.model.path import ElementaryMotion, Path, elementary_pose
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, inverse
 
 
@@ -120,7 +120,9 @@ class ParametricChain:
         is None, this method computes the poses.
         """
         amounts, factors = self._amounts(values, self.start if at is None else at)
-        T, twists = self.path.jacobian_from_frames(self.path.frames(amounts) if frames is None else frames)
+        T, twists = self.path.pose_and_jacobian_from_frames(
+            self.path.frames(amounts) if frames is None else frames
+        )
         columns = np.zeros((len(values), 6, len(self.parameters)))
         for k, drive in enumerate(self._drives):
             if drive.parameter is not None:
@@ -223,7 +225,7 @@ class CalibrationModel:
         motion = np.eye(4)
         for what, turns, axis in SIX:
             if what in values:
-                motion = motion @ elementary(axis, turns, values[what])
+                motion = motion @ elementary_pose(axis, turns, values[what])
         return motion
 
 
@@ -334,7 +336,7 @@ def table_model(table: DHTable, fit: Collection[str]) -> CalibrationModel:
                 unit = "rad" if turns else "m"
                 motions.append(Drive(axis, turns, builder.parameter(row.joint, cell, unit, cells[cell])))
             else:
-                motions.append(elementary(axis, turns, cells[cell]))
+                motions.append(elementary_pose(axis, turns, cells[cell]))
         joint = builder.joint(row.joint, i, turns=row.kind.turns, sense=float(row.sense))
         along, between = [*motions[:2], joint], motions[2:]
         standard = table.convention is DHConvention.STANDARD

@@ -33,7 +33,7 @@ from urdfkin.dh.table import DHConvention, DHRow, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import FrameChain
 from urdfkin.model.configuration import axis_range, sample_uniform
-from urdfkin.model.path import elementary
+from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind
 
 #: A property is reported if its deviation is at most this angle (rad) and this length (m).
@@ -261,7 +261,7 @@ def _sample_tips(screws: ProductOfExponentials) -> tuple[FloatArray, FloatArray]
     """Return the tip's positions on samples without mimic rules, and the Jacobian at the first sample."""
     ranges = [axis_range(joint.kind, joint.limit, max_length=math.pi) for joint in screws.joints]
     values = sample_uniform(ranges, _SAMPLES)
-    return screws.path.poses(values)[:, :3, 3], screws.path.columns(values[0])[1]
+    return screws.path.poses(values)[:, :3, 3], screws.path.pose_and_jacobian(values[0])[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -286,11 +286,11 @@ class Opw:
         x = c2 * np.sin(t[1]) + a2 * np.cos(t[1] + t[2]) + c3 * np.sin(t[1] + t[2]) + a1
         z = c2 * np.cos(t[1]) - a2 * np.sin(t[1] + t[2]) + c3 * np.cos(t[1] + t[2]) + c1
         T = (
-            elementary(2, True, t[0])
-            @ elementary(1, True, t[1] + t[2])
-            @ elementary(2, True, t[3])
-            @ elementary(1, True, t[4])
-            @ elementary(2, True, t[5])
+            elementary_pose(2, True, t[0])
+            @ elementary_pose(1, True, t[1] + t[2])
+            @ elementary_pose(2, True, t[3])
+            @ elementary_pose(1, True, t[4])
+            @ elementary_pose(2, True, t[5])
         )
         T[..., :3, 3] = np.stack(
             [x * np.cos(t[0]) - b * np.sin(t[0]), x * np.sin(t[0]) + b * np.cos(t[0]), z], -1

@@ -39,7 +39,7 @@ from urdfkin.errors import InputError
 from urdfkin.errors.display import CodeLine, Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_text
 from urdfkin.kinematics.roundings import EPS, table_roundings
-from urdfkin.model.path import elementary
+from urdfkin.model.path import elementary_pose
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, freeze
 
 _SIGMA = {JointKind.REVOLUTE: 0, JointKind.CONTINUOUS: 0, JointKind.PRISMATIC: 1, JointKind.FIXED: 2}
@@ -154,7 +154,7 @@ class TreeParameters:
             constant = along_axis(row.gamma, row.b) @ between_axes(row.d, row.alpha, row.beta)
             T = T @ constant @ along_axis(row.theta, row.r)
             if row.sigma < 2:
-                T = T @ elementary(2, row.sigma == 0, values[..., j])
+                T = T @ elementary_pose(2, row.sigma == 0, values[..., j])
             frames[..., j, :, :] = T
         return np.asarray(frames @ self.T_frame_link)
 

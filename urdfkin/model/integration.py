@@ -31,19 +31,19 @@ def integrate(tree: KinematicTree, q: FloatArray, v: FloatArray) -> FloatArray:
     """Return the configuration (..., nq) that `q` reaches in one second at constant velocities `v`."""
     shape = _common_shape(q, v)
     out = np.array(np.broadcast_to(q, (*shape, tree.nq)))
-    for joint, at, to in _coordinate_joints(tree):
-        step = v[..., to : to + joint.nv]
+    for joint, q_index, v_index in _coordinate_joints(tree):
+        step = v[..., v_index : v_index + joint.nv]
         if joint.nq == 1:
-            out[..., at] += step[..., 0]
+            out[..., q_index] += step[..., 0]
             continue
-        here = out[..., at : at + joint.nq]
-        p, R = _pose(joint, here)
+        block = out[..., q_index : q_index + joint.nq]
+        p, R = _pose(joint, block)
         s, w = _screw(joint, step)
         p = p + (R @ (_V(w) @ s[..., np.newaxis]))[..., 0]
         if joint.kind is JointKind.PLANAR:
-            here[...] = np.concatenate((p[..., :2], here[..., 2:] + w[..., 2:]), axis=-1)
+            block[...] = np.concatenate((p[..., :2], block[..., 2:] + w[..., 2:]), axis=-1)
         else:
-            here[...] = np.concatenate((p, quaternion_of(R @ exp_rotation(w))), axis=-1)
+            block[...] = np.concatenate((p, quaternion_of(R @ exp_rotation(w))), axis=-1)
     return out
 
 
@@ -55,21 +55,21 @@ def difference(tree: KinematicTree, start: FloatArray, end: FloatArray) -> Float
     shape = _common_shape(start, end)
     start, end = (np.broadcast_to(q, (*shape, tree.nq)) for q in (start, end))
     v = np.empty((*shape, tree.nv))
-    for joint, at, to in _coordinate_joints(tree):
-        one, other = (q[..., at : at + joint.nq] for q in (start, end))
+    for joint, q_index, v_index in _coordinate_joints(tree):
+        q_0, q_1 = (q[..., q_index : q_index + joint.nq] for q in (start, end))
         if joint.nq == 1:
-            way = other[..., 0] - one[..., 0]
-            v[..., to] = _shortest(way) if joint.kind is JointKind.CONTINUOUS else way
+            change = q_1[..., 0] - q_0[..., 0]
+            v[..., v_index] = _shortest(change) if joint.kind is JointKind.CONTINUOUS else change
             continue
-        (p_0, R_0), (p_1, R_1) = _pose(joint, one), _pose(joint, other)
-        back = np.swapaxes(R_0, -1, -2)
-        w = log_rotation(back @ R_1)
+        (p_0, R_0), (p_1, R_1) = _pose(joint, q_0), _pose(joint, q_1)
+        R_0_inverse = np.swapaxes(R_0, -1, -2)
+        w = log_rotation(R_0_inverse @ R_1)
         if joint.kind is JointKind.PLANAR:
             w = np.zeros((*shape, 3))
-            w[..., 2] = _shortest(other[..., 2] - one[..., 2])
-        s = np.linalg.solve(_V(w), back @ (p_1 - p_0)[..., np.newaxis])[..., 0]
-        six = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
-        v[..., to : to + joint.nv] = np.concatenate(six, axis=-1)
+            w[..., 2] = _shortest(q_1[..., 2] - q_0[..., 2])
+        s = np.linalg.solve(_V(w), R_0_inverse @ (p_1 - p_0)[..., np.newaxis])[..., 0]
+        parts = (s[..., :2], w[..., 2:]) if joint.kind is JointKind.PLANAR else (s, w)
+        v[..., v_index : v_index + joint.nv] = np.concatenate(parts, axis=-1)
     return v
 
 
@@ -83,7 +83,7 @@ def _common_shape(one: FloatArray, other: FloatArray) -> tuple[int, ...]:
 
 def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
     rows = zip(tree.joints, tree.q_index, tree.v_index, strict=True)
-    return [(joint, at, to) for joint, at, to in rows if joint.nv]
+    return [(joint, q_index, v_index) for joint, q_index, v_index in rows if joint.nv]
 
 
 def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -110,11 +110,11 @@ def _V(w: FloatArray) -> FloatArray:
     square = (w * w).sum(axis=-1)[..., np.newaxis, np.newaxis]
     angle, W = np.sqrt(square), skew(w)
     half = np.sinc(angle / math.tau)
-    summed = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
-    cubed = np.where(
-        square < _SERIES_BELOW, summed, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
+    series = sum((-square) ** k / math.factorial(2 * k + 3) for k in range(7))
+    coefficient = np.where(
+        square < _SERIES_BELOW, series, (1.0 - np.sinc(angle / math.pi)) / np.where(square > 0.0, square, 1.0)
     )
-    V: FloatArray = np.eye(3) + 0.5 * half**2 * W + cubed * (W @ W)
+    V: FloatArray = np.eye(3) + 0.5 * half**2 * W + coefficient * (W @ W)
     return V
 
 

@@ -158,7 +158,7 @@ def tip_derivatives(
     """
     scale = targets.scale
     path, amounts = model.path_at(targets.values)
-    poses, twists = path.jacobian_from_frames(path.frames(amounts) if frames is None else frames)
+    poses, twists = path.pose_and_jacobian_from_frames(path.frames(amounts) if frames is None else frames)
     n = len(model.cells)
     twists = twists * np.where(np.tile(_IS_ANGLE, n), 1.0 / scale, 1.0)
     twists[:, 3:] *= scale

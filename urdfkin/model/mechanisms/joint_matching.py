@@ -48,11 +48,11 @@ def motion_type(kind: JointKind) -> str:
 
 
 class JointMatcher:
-    """Find corresponding joints of A and B; `given` maps joint names of A to joint names of B."""
+    """Find corresponding joints of A and B; `name_map` maps joint names of A to joint names of B."""
 
-    def __init__(self, a: Mechanism, b: Mechanism, given: Mapping[str, str], tolerance: Tolerance) -> None:
-        self.a, self.b, self.given, self._tolerance = a, b, given, tolerance
-        self._named = {name for pair in given.items() for name in pair}
+    def __init__(self, a: Mechanism, b: Mechanism, name_map: Mapping[str, str], tolerance: Tolerance) -> None:
+        self.a, self.b, self.name_map, self._tolerance = a, b, name_map, tolerance
+        self._named = {name for pair in name_map.items() for name in pair}
         self._signatures: dict[tuple[bool, int, int], str] = {}
         self._links: dict[tuple[int, int], tuple[tuple[int, int], ...]] = {}
         self._by_names = dict[
@@ -149,16 +149,16 @@ class JointMatcher:
         return [edges[j] for _, j in ranked]
 
     def _name_pairs(
-        self, bodies: tuple[int, int], ours: list[Edge], theirs: list[Edge]
+        self, bodies: tuple[int, int], edges_a: list[Edge], edges_b: list[Edge]
     ) -> Iterator[EdgePair]:
-        by_name = {self.b.joint(f).name: f for f in theirs}
-        for e in ours:
+        by_name = {self.b.joint(f).name: f for f in edges_b}
+        for e in edges_a:
             name = self.a.joint(e).name
-            if (f := by_name.get(self.given.get(name, name))) is not None:
+            if (f := by_name.get(self.name_map.get(name, name))) is not None:
                 yield e, f
-        for e in ours:
+        for e in edges_a:
             links = {self.a.labels[k] for k in self.a.bodies[e.other_body(bodies[0])]}
-            for f in theirs:
+            for f in edges_b:
                 if links & {self.b.labels[k] for k in self.b.bodies[f.other_body(bodies[1])]}:
                     yield e, f
 
@@ -264,22 +264,22 @@ class Axis:
         return float(u @ (start.point + distance * start.direction))
 
 
-def zero_candidates(u: Screw, ours: Axis, theirs: Axis, turns: bool) -> Iterator[float]:
-    """Yield values (rad or m) of a joint that may move the axis `theirs` to the axis `ours`.
+def zero_candidates(u: Screw, axis_a: Axis, axis_b: Axis, turns: bool) -> Iterator[float]:
+    """Yield values (rad or m) of a joint that may move the axis `axis_b` to the axis `axis_a`.
 
     The axis of this joint is u.
     """
     if not turns:
-        heights = ours.height(u.direction), theirs.height(u.direction)
+        heights = axis_a.height(u.direction), axis_b.height(u.direction)
         if heights[0] is not None and heights[1] is not None:
             yield heights[0] - heights[1]
         return
-    s, t = ours.screw, theirs.screw
+    s, t = axis_a.screw, axis_b.screw
     candidate = angle_from_to(u.direction, t.direction, s.direction)
     if candidate is not None:
         yield candidate
         yield remainder(candidate + pi, 2.0 * pi)
-    if ours.turns:
+    if axis_a.turns:
         perpendiculars = [
             line.point - line.direction * (line.direction @ (line.point - u.point)) for line in (t, s)
         ]
@@ -310,16 +310,16 @@ def root_poses_by_axes(a: Mechanism, b: Mechanism, bodies: Both[int]) -> Iterato
     If possible, the poses also align the axes of other joints.
     """
     firsts = _first_axes((a, b), (None, None), bodies, ())
-    for (ours, theirs), before, after in firsts:
-        lines = ours.screw, theirs.screw
+    for (axis_a, axis_b), before, after in firsts:
+        lines = axis_a.screw, axis_b.screw
         # If no joint follows, other axes of the same body determine the pose, as for a drone's rotors.
         others = after or [_with_reference(lines, *pair) for pair, *_ in firsts]
-        for start in (theirs.screw, theirs.screw.reverse()):
-            K = smallest_motion(start, ours.screw, turns=True)[0]
-            for angle in _candidates(ours.screw, [*before, *others], K, turns=True):
-                X = screw_motion(ours.screw, angle, turns=True) @ K
-                for shift in _candidates(ours.screw, others, X, turns=False):
-                    yield screw_motion(ours.screw, shift, turns=False) @ X
+        for start in (axis_b.screw, axis_b.screw.reverse()):
+            K = smallest_motion(start, axis_a.screw, turns=True)[0]
+            for angle in _candidates(axis_a.screw, [*before, *others], K, turns=True):
+                X = screw_motion(axis_a.screw, angle, turns=True) @ K
+                for shift in _candidates(axis_a.screw, others, X, turns=False):
+                    yield screw_motion(axis_a.screw, shift, turns=False) @ X
 
 
 def root_poses_by_siblings(
@@ -330,31 +330,31 @@ def root_poses_by_siblings(
     If these axes do not determine the shift along the first axis, the axes of later joints determine it.
     """
     edges = _with_axes(a, bodies[0])
-    ours = [_axis(a, edge) for edge in edges]
-    turning = [i for i, axis in enumerate(ours) if axis.turns]
+    axes_a = [_axis(a, edge) for edge in edges]
+    turning = [i for i, axis in enumerate(axes_a) if axis.turns]
     if len(edges) < 2 or not turning:
         return
     first = turning[0]
-    u = ours[first].screw
-    sines = [float(np.linalg.norm(np.cross(u.direction, axis.screw.direction))) for axis in ours]
+    u = axes_a[first].screw
+    sines = [float(np.linalg.norm(np.cross(u.direction, axis.screw.direction))) for axis in axes_a]
     rest = sorted((i for i in range(len(edges)) if i != first), key=lambda i: -sines[i])
-    second, others = rest[0], [i for i in rest[1:] if ours[i].turns][:1]
-    theirs = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
-    for f, axis in theirs[first]:
+    second, others = rest[0], [i for i in rest[1:] if axes_a[i].turns][:1]
+    axes_b = [[(f, _axis(b, f)) for f in _with_axes(b, bodies[1]) if alike(edge, f)] for edge in edges]
+    for f, axis in axes_b[first]:
         lines = u, axis.screw
         pair_of = partial(_with_reference, lines)
         beyond = edges[first].other_body(bodies[0]), f.other_body(bodies[1])
         far = list(later_axes((a, b), (edges[first], f), beyond, lines))
-        for start, (g, other) in product((axis.screw, axis.screw.reverse()), theirs[second]):
+        for start, (g, other) in product((axis.screw, axis.screw.reverse()), axes_b[second]):
             if g is f:
                 continue
-            pair = pair_of(ours[second], other)
+            pair = pair_of(axes_a[second], other)
             more = [
-                pair_of(ours[i], one) for i in others for h, one in theirs[i] if h is not f and h is not g
+                pair_of(axes_a[i], one) for i in others for h, one in axes_b[i] if h is not f and h is not g
             ]
             # The axis of a prismatic joint has no position.
             # So the axes of the next joints must determine the shift along u.
-            if not ours[second].turns:
+            if not axes_a[second].turns:
                 carried = edges[second].other_body(bodies[0]), g.other_body(bodies[1])
                 led = _next_joints((a, b), (edges[second], g), carried)
                 more += [pair_of(_axis(a, e), _axis(b, h)) for e, h in led]
@@ -366,8 +366,8 @@ def root_poses_by_siblings(
                     yield screw_motion(u, shift, turns=False) @ X
 
 
-def _with_reference(lines: Both[Screw], ours: Axis, theirs: Axis) -> Both[Axis]:
-    return replace(ours, reference=lines[0]), replace(theirs, reference=lines[1])
+def _with_reference(lines: Both[Screw], axis_a: Axis, axis_b: Axis) -> Both[Axis]:
+    return replace(axis_a, reference=lines[0]), replace(axis_b, reference=lines[1])
 
 
 def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
@@ -375,9 +375,9 @@ def _with_axes(mechanism: Mechanism, body: int) -> list[Edge]:
 
 
 def _candidates(u: Screw, pairs: Sequence[Both[Axis]], X: FloatArray, *, turns: bool) -> list[float]:
-    return [x for ours, theirs in pairs for x in zero_candidates(u, ours, theirs.transform(X), turns)] or [
-        0.0
-    ]
+    return [
+        x for axis_a, axis_b in pairs for x in zero_candidates(u, axis_a, axis_b.transform(X), turns)
+    ] or [0.0]
 
 
 def _first_axes(
@@ -403,7 +403,7 @@ def _first_axes(
 def _next_joints(
     mechanisms: Both[Mechanism], via: Both[Edge | None], bodies: Both[int]
 ) -> Iterator[Both[Edge]]:
-    ours, theirs = (
+    edges_a, edges_b = (
         [
             edge
             for edge in mechanism.edges_by_body[body]
@@ -411,7 +411,7 @@ def _next_joints(
         ]
         for mechanism, by, body in zip(mechanisms, via, bodies, strict=True)
     )
-    for e, f in product(ours, theirs):
+    for e, f in product(edges_a, edges_b):
         if _axis(mechanisms[0], e).turns is _axis(mechanisms[1], f).turns:
             yield e, f
 

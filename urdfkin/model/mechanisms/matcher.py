@@ -220,15 +220,15 @@ class MechanismMatcher:
         if self.base is not None:
             yield self.a.body_of[self.base[0]], self.b.body_of[self.base[1]]
             return
-        theirs = _find_shared_body(self.a, self.b)
-        if theirs is not None:
-            yield 0, theirs
+        body_b = _find_shared_body(self.a, self.b)
+        if body_b is not None:
+            yield 0, body_b
             return
         yield from ((0, body) for body, links in enumerate(self.b.bodies) if links)
         # B's root body can correspond to a body of A that follows a joint, such as a floating root joint.
-        ours = _find_shared_body(self.b, self.a)
-        if ours is not None:
-            yield ours, 0
+        body_a = _find_shared_body(self.b, self.a)
+        if body_a is not None:
+            yield body_a, 0
 
     def _root_poses_by_axes(self, base: tuple[int, int]) -> Iterator[FloatArray]:
         scored = list[tuple[float, BodyPair, Score]]()
@@ -309,20 +309,20 @@ class MechanismMatcher:
         The result is None if a link of one body already matches a link of the other body. The result is also
         None if every link name of one body occurs in the other model.
         """
-        ours, theirs = self._own_links(body_pair)
-        if matched or not ours or not theirs:
+        links_a, links_b = self._own_links(body_pair)
+        if matched or not links_a or not links_b:
             return None
-        zero_pose = self.a.zero_poses[ours[0]]
-        tool = inverse(body_pair.G @ zero_pose) @ body_pair.XC @ self.b.zero_poses[theirs[0]]
-        return FramePair(ours[0], theirs[0], body_pair.previous, zero_pose, IDENTITY, 0.0, 0.0, tool)
+        zero_pose = self.a.zero_poses[links_a[0]]
+        tool = inverse(body_pair.G @ zero_pose) @ body_pair.XC @ self.b.zero_poses[links_b[0]]
+        return FramePair(links_a[0], links_b[0], body_pair.previous, zero_pose, IDENTITY, 0.0, 0.0, tool)
 
     def _all_links(self, body_pair: BodyPair) -> list[tuple[int, int]]:
         pairs = list(self.joint_matcher.links(*body_pair.bodies))
         taken = {j for _, j in pairs}
-        ours, theirs = self._own_links(body_pair)
-        for i in ours:
+        links_a, links_b = self._own_links(body_pair)
+        for i in links_a:
             pose_a = body_pair.G @ self.a.zero_poses[i]
-            for j in theirs:
+            for j in links_b:
                 if j not in taken and self.tolerance.holds(
                     *pose_difference(pose_a, body_pair.XC @ self.b.zero_poses[j])
                 ):
@@ -333,8 +333,8 @@ class MechanismMatcher:
 
     def _own_links(self, body_pair: BodyPair) -> tuple[list[int], list[int]]:
         names_a, names_b = self.a.labels, self.b.labels
-        ours = [i for i in self.a.bodies[body_pair.bodies[0]] if names_a[i] not in names_b]
-        return ours, [j for j in self.b.bodies[body_pair.bodies[1]] if names_b[j] not in names_a]
+        links_a = [i for i in self.a.bodies[body_pair.bodies[0]] if names_a[i] not in names_b]
+        return links_a, [j for j in self.b.bodies[body_pair.bodies[1]] if names_b[j] not in names_a]
 
     def _match_joints(
         self, body_pair: BodyPair, e: Edge, f: Edge, index: int, depth: int
@@ -390,8 +390,8 @@ class MechanismMatcher:
         step = MatchedJoints(
             e.joint, f.joint, kind, body_pair.previous, 1, 0.0, IDENTITY, axis, axis, 0.0, 0.0
         )
-        given = None if self.choices is None else self.choices.conversions.get(self.a.joint(e).name)
-        as_written = self.choices is not None and given is None
+        prescribed = None if self.choices is None else self.choices.conversions.get(self.a.joint(e).name)
+        as_written = self.choices is not None and prescribed is None
         if as_written:
             K, tilt, shift = pose_b @ inverse(pose_a), *pose_difference(pose_a, pose_b)
         else:
@@ -403,8 +403,8 @@ class MechanismMatcher:
             return replace(step, kind_difference="kind" if back else ""), next_pair, (0, 0.0)
         M = inverse(pose_b) @ pose_a
         exact = self._exact_pose(body_pair, next_pair)
-        if given is not None:
-            tried: Iterable[FloatArray] = [inverse(given.before) if backwards[1] else given.behind]
+        if prescribed is not None:
+            tried: Iterable[FloatArray] = [inverse(prescribed.before) if backwards[1] else prescribed.behind]
         elif exact is not None:
             tried = [inverse(pose_a) @ exact @ zero_poses[1]]
         else:
@@ -412,8 +412,8 @@ class MechanismMatcher:
             tried = self._motions_after(
                 next_pair, pose_a, zero_poses[1], plane, self._root_poses_by_axes(next_pair.bodies)
             )
-        places = ((N, replace(next_pair, XC=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
-        N, moved, score = self._best(places, depth)
+        body_pairs = ((N, replace(next_pair, XC=pose_a @ N @ inverse(zero_poses[1]))) for N in tried)
+        N, moved, score = self._best(body_pairs, depth)
         # Let P_a and P_b be the joint's poses in A and B, so P_b = M P_a N.
         # If the path leads from the joint's child to its parent, P_a and P_b are the inverse poses.
         pair = (inverse(N), inverse(M)) if backwards[1] else (M, N)
@@ -567,10 +567,10 @@ class MechanismMatcher:
                 yield angle_about(u.direction, pose_a[:3, :3] @ pose_b[:3, :3].T)
             else:
                 yield float(u.direction @ (pose_a[:3, 3] - pose_b[:3, 3]))
-        for ours, theirs in later_axes(
+        for axis_a, axis_b in later_axes(
             (self.a, self.b), next_pair.via, next_pair.bodies, (u.transform(inverse(G)), t)
         ):
-            yield from zero_candidates(u, ours.transform(G), theirs.transform(next_pair.XC), turns)
+            yield from zero_candidates(u, axis_a.transform(G), axis_b.transform(next_pair.XC), turns)
 
 
 def _subtree_sizes(mechanism: Mechanism) -> list[tuple[int, int]]:
@@ -645,31 +645,31 @@ MOST_EXCHANGED = 12
 
 
 def align(
-    a: Mechanism, b: Mechanism, given: Mapping[str, str], choices: AlignmentChoices | None = None
+    a: Mechanism, b: Mechanism, name_map: Mapping[str, str], choices: AlignmentChoices | None = None
 ) -> Alignment:
-    """Align B with A; `given` maps joint names of A to joint names of B."""
+    """Align B with A; `name_map` maps joint names of A to joint names of B."""
     if choices is not None:
         for taken in choices.orders:
             b = b.reorder(taken)
-        return _best_alignment(a, b, given, choices)
-    best = _best_alignment(a, b, given, None, LookAhead(MOST_LOOK_AHEAD))
+        return _best_alignment(a, b, name_map, choices)
+    best = _best_alignment(a, b, name_map, None, LookAhead(MOST_LOOK_AHEAD))
     for orders in b.orders_of_runs(tolerance_of(a, b)):
         if best.is_complete:
             break
         present, run = best.b, next(orders)
-        for names in _orders_to_try(a, present, given, run, orders):
+        for names in _orders_to_try(a, present, name_map, run, orders):
             moved = [k for k, name in enumerate(names) if name != run[k]]
             other = present.reorder(names[moved[0] : moved[-1] + 1])
-            found = _best_alignment(a, other, given, None)
+            found = _best_alignment(a, other, name_map, None)
             if is_better(found.score, best.score):
                 best = found
-    return _with_zeros_by_rules(_with_larger_tolerances(_with_exchanged_joints(best, given), given))
+    return _with_zeros_by_rules(_with_larger_tolerances(_with_exchanged_joints(best, name_map), name_map))
 
 
 def _orders_to_try(
-    a: Mechanism, b: Mechanism, given: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
+    a: Mechanism, b: Mechanism, name_map: Mapping[str, str], run: Sequence[str], orders: Iterator[list[str]]
 ) -> Iterator[Sequence[str]]:
-    called = {given.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
+    called = {name_map.get(joint.name, joint.name): i for i, joint in enumerate(a.tree.joints)}
     if not all(name in called for name in run):
         yield from islice(orders, MOST_ORDERS)
         return
@@ -693,26 +693,26 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
     )
 
 
-def _with_exchanged_joints(best: Alignment, given: Mapping[str, str]) -> Alignment:
+def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """Exchange the partners of two joint pairs if this is better, as for mirrored arms."""
     # A joint that only one model has is a difference, whichever pairs are exchanged.
     if best.only_a or best.only_b:
         return best
     tried, look_ahead = set[frozenset[tuple[int, int]]](), LookAhead(MOST_LOOK_AHEAD)
-    while (pairs := next((one for one in best.exchangeable(given) if one not in tried), None)) is not None:
+    while (pairs := next((one for one in best.exchangeable(name_map) if one not in tried), None)) is not None:
         tried.add(pairs)
         if len(tried) > MOST_EXCHANGED:
             break
         joints = best.a.tree.joints, best.b.tree.joints
         (a, b), (c, d) = pairs
         other = {joints[0][a].name: joints[1][d].name, joints[0][c].name: joints[1][b].name}
-        found = _best_alignment(best.a, best.b, {**given, **other}, None, look_ahead, base=best.base)
+        found = _best_alignment(best.a, best.b, {**name_map, **other}, None, look_ahead, base=best.base)
         if is_better(found.score, best.score):
-            best, given = found, {**given, **other}
+            best, name_map = found, {**name_map, **other}
     return best
 
 
-def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignment:
+def _with_larger_tolerances(best: Alignment, name_map: Mapping[str, str]) -> Alignment:
     """Return an alignment whose largest difference is less than half that of `best`, or else `best`.
 
     If all axes of A and B differ slightly, no axes agree, so the normal search cannot find the right choices.
@@ -725,7 +725,7 @@ def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignm
         if not least < angle * size < BETTER_RATIO * most:
             continue
         tolerance = Tolerance(angle, angle * size)
-        rough = _best_alignment(a, b, given, None, look_ahead, tolerance, best.base)
+        rough = _best_alignment(a, b, name_map, None, look_ahead, tolerance, best.base)
         unmatched = [(len(one.only_a), len(one.only_b)) for one in (rough, best)]
         if rough.inner_differences[1] or unmatched[0] != unmatched[1]:
             continue
@@ -737,14 +737,14 @@ def _with_larger_tolerances(best: Alignment, given: Mapping[str, str]) -> Alignm
 def _best_alignment(
     a: Mechanism,
     b: Mechanism,
-    given: Mapping[str, str],
+    name_map: Mapping[str, str],
     choices: AlignmentChoices | None,
     look_ahead: LookAhead | None = None,
     tolerance: Tolerance | None = None,
     base: tuple[int, int] | None = None,
 ) -> Alignment:
     tolerance = tolerance or tolerance_of(a, b)
-    joint_matcher = JointMatcher(a, b, given, tolerance)
+    joint_matcher = JointMatcher(a, b, name_map, tolerance)
     return MechanismMatcher(a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base).best()
 
 

@@ -565,13 +565,13 @@ class Alignment:
             {joints[step.a].name: step.conversion for step in self.steps if step.conversion is not None},
         )
 
-    def exchangeable(self, given: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
+    def exchangeable(self, name_map: Mapping[str, str]) -> Iterator[frozenset[tuple[int, int]]]:
         """Yield joint pairs (a, b) and (c, d) if the matcher could also pair a with d and c with b.
 
-        The names of a and c occur neither in B nor in `given`. For each of the two pairs, A and B differ at
-        this pair, or at a joint or link after this pair.
+        The names of a and c occur neither in B nor in `name_map`. For each of the two pairs, A and B differ
+        at this pair, or at a joint or link after this pair.
         """
-        known_names = {joint.name for joint in self.b.tree.joints} | set(given)
+        known_names = {joint.name for joint in self.b.tree.joints} | set(name_map)
         ends = [i for i, step in enumerate(self.steps) if step.differs]
         ends += [frame.previous for frame in self.frames if frame.differs]
         steps = [self.steps[i] for i in sorted({i for end in ends for i in self.indices(end)})]
