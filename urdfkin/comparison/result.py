@@ -824,7 +824,7 @@ def _joint_differences(alignment: Alignment, variables: Variables, i: int) -> li
     if step.differs and step.kind in ("planar", "floating"):
         some.append(Difference(place, "frame", radians=step.tilt, metres=step.shift))
     elif step.differs:
-        detail = "alone" if step.other is not step.axis else ""
+        detail = "alone" if step.axis_b is not step.axis_a else ""
         some.append(Difference(place, "axis", None, None, *_beyond_rounding(step, tolerance), detail))
     if i in variables.rules:
         some.append(Difference(place, "mimic rule", joint.mimic, other.mimic))

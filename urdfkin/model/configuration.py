@@ -204,7 +204,7 @@ def velocity_names(tree: KinematicTree) -> tuple[str, ...]:
 
 
 def _names_and_units(
-    tree: KinematicTree, of: Mapping[JointKind, Mapping[str, str]]
+    tree: KinematicTree, suffixes_by_kind: Mapping[JointKind, Mapping[str, str]]
 ) -> Iterator[tuple[str, str]]:
     taken = set[str]()
     for joint in tree.joints:
@@ -214,7 +214,7 @@ def _names_and_units(
             yield joint.name, "rad" if joint.kind.turns else "m"
             continue
         taken = taken or {other.name for other in tree.joints}
-        suffixes, separator = of[joint.kind], "."
+        suffixes, separator = suffixes_by_kind[joint.kind], "."
         while not taken.isdisjoint(names := [f"{joint.name}{separator}{suffix}" for suffix in suffixes]):
             separator = ":" if separator == "." else separator + ":"
         taken.update(names)

@@ -86,23 +86,23 @@ def _coordinate_joints(tree: KinematicTree) -> list[tuple[Joint, int, int]]:
     return [(joint, q_index, v_index) for joint, q_index, v_index in rows if joint.nv]
 
 
-def _pose(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _pose(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the position (..., 3) and rotation (..., 3, 3) of a planar or floating joint."""
-    p, orientation = _screw(joint, own)
+    p, orientation = _screw(joint, block)
     return p, (rotation_from_quaternion if joint.kind is JointKind.FLOATING else exp_rotation)(orientation)
 
 
-def _screw(joint: Joint, own: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _screw(joint: Joint, block: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the linear and angular part of a planar or floating joint's coordinates or velocity.
 
     The angular part is a vector (..., 3), or the quaternion (..., 4) in a floating joint's coordinates.
     """
     if joint.kind is JointKind.FLOATING:
-        return own[..., :3], own[..., 3:]
+        return block[..., :3], block[..., 3:]
     if joint.kind is not JointKind.PLANAR:
         raise NotImplementedError(f"the motion of a {joint.kind} joint")
-    linear, angular = np.zeros((2, *own.shape[:-1], 3))
-    linear[..., :2], angular[..., 2] = own[..., :2], own[..., 2]
+    linear, angular = np.zeros((2, *block.shape[:-1], 3))
+    linear[..., :2], angular[..., 2] = block[..., :2], block[..., 2]
     return linear, angular
 
 

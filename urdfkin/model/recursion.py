@@ -181,11 +181,11 @@ class Recursion:
         return rate, turning
 
     def _add_mimic_columns(
-        self, s: LinkState, reference: Reference, nv: int, found: Iterator[tuple[Column, Vector, Vector]]
+        self, s: LinkState, reference: Reference, nv: int, columns: Iterator[tuple[Column, Vector, Vector]]
     ) -> list[SixVector]:
         """Add the column of each mimic joint to the mimicked joint's column."""
         out: list[SixVector] = [(0,) * 6] * nv
-        for column, linear, angular in found:
+        for column, linear, angular in columns:
             six = self.in_reference(s, reference, linear, angular)
             out[column.v_index] = tuple(
                 x + column.factor * y for x, y in zip(out[column.v_index], six, strict=True)

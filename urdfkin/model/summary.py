@@ -37,7 +37,7 @@ def summarize(tree: KinematicTree, base: str, tip: str, order: str) -> TextDocum
     )
 
 
-class Joints(dict[str, Joint], Displayable):
+class JointTable(dict[str, Joint], Displayable):
     """The joints of a robot by name: a dict that `print` and notebooks show as a table."""
 
     def __init__(self, tree: KinematicTree) -> None:

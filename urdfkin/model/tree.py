@@ -31,7 +31,7 @@ class FrameName(str):
 
     A `FrameName` means the link or joint NAME, even if another link or joint has the name `link:NAME`.
 
-    >>> LinkFrame.of("hand"), LinkFrame.of("hand").own
+    >>> LinkFrame.of("hand"), LinkFrame.of("hand").bare_name
     ('link:hand', 'hand')
     """
 
@@ -39,11 +39,11 @@ class FrameName(str):
     prefix: ClassVar[str]
 
     @classmethod
-    def of(cls, own: str) -> Self:
-        return cls(f"{cls.prefix}{own}")
+    def of(cls, name: str) -> Self:
+        return cls(f"{cls.prefix}{name}")
 
     @property
-    def own(self) -> str:
+    def bare_name(self) -> str:
         return self[len(self.prefix) :]
 
 
@@ -397,7 +397,11 @@ class KinematicTree:
         return link if link is not None else self._joint_index[name] + 1
 
     def _frame_index(self, frame: FrameName) -> int:
-        return self.link_index(frame.own) if isinstance(frame, LinkFrame) else self.joint_index(frame.own) + 1
+        return (
+            self.link_index(frame.bare_name)
+            if isinstance(frame, LinkFrame)
+            else self.joint_index(frame.bare_name) + 1
+        )
 
     def _with_prefix(self, name: str) -> FrameName | None:
         kinds: tuple[tuple[type[FrameName], dict[str, int]], ...] = (

@@ -43,7 +43,7 @@ from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import sample
 from urdfkin.model.configuration_like import ConfigurationLike, join_names
 from urdfkin.model.reference import Reference
-from urdfkin.model.summary import Joints, summarize
+from urdfkin.model.summary import JointTable, summarize
 from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, with_locks
 from urdfkin.system.lazy_import import hook
 from urdfkin.system.locks import importing
@@ -418,7 +418,7 @@ class Robot(Displayable):
         return self.tip_frame
 
     @property
-    def joints(self) -> Joints:
+    def joints(self) -> JointTable:
         """All joints by name, fixed joints included, in Pinocchio's order: kind, axis, limit, mimic rule.
 
         The result is a dict of `Joint`; `print` and notebooks show it as a table.
@@ -428,7 +428,7 @@ class Robot(Displayable):
         >>> joint.axis.tolist(), joint.limit.lower, joint.limit.upper
         ([0.0, 0.0, 1.0], -3.0, 3.0)
         """
-        return Joints(self.tree)
+        return JointTable(self.tree)
 
     @property
     def frames(self) -> dict[str, str]:

@@ -197,15 +197,15 @@ def check_unique(names: Sequence[str], where: str) -> None:
         raise InputError("two joints have the same name in the convention", where=where, found=repr(double))
 
 
-def _as_text(value: object, word: str, where: str) -> str:
+def _as_text(value: object, key: str, where: str) -> str:
     if not isinstance(value, str):
-        raise InputError(f"`{word}` must be a text", where=where, found=safe_repr(value))
+        raise InputError(f"`{key}` must be a text", where=where, found=safe_repr(value))
     return value
 
 
-def _as_number(value: object, word: str, where: str) -> float:
+def _as_number(value: object, key: str, where: str) -> float:
     if not is_real(value) or not math.isfinite(value):
-        raise InputError(f"`{word}` must be a finite number", where=where, found=safe_repr(value))
+        raise InputError(f"`{key}` must be a finite number", where=where, found=safe_repr(value))
     return float(value)
 
 
@@ -231,17 +231,17 @@ def _parse_rule(rule: dict[str, Any], where: str) -> JointRule:
     return JointRule(name, sign, zero, unit)
 
 
-def as_toml(how: Convention) -> str:
-    lines = [f"{word} = {_quote(text)}" for word in ("title", "note") if (text := getattr(how, word))]
+def as_toml(convention: Convention) -> str:
+    lines = [f"{word} = {_quote(text)}" for word in ("title", "note") if (text := getattr(convention, word))]
     lines.append('like = "urdfkin"')
-    if how.order == "given":
-        lines.append(f"joints = [{', '.join(map(_quote, how.joints))}]")
+    if convention.order == "given":
+        lines.append(f"joints = [{', '.join(map(_quote, convention.joints))}]")
     plain = Convention(name="")
     for key in _CHOICES:
-        value = getattr(how, key)
+        value = getattr(convention, key)
         if value != getattr(plain, key) and value != "given":
             lines.append(f"{key} = {value if isinstance(value, int) else _quote(value)}")
-    for joint, rule in how.rules.items():
+    for joint, rule in convention.rules.items():
         lines += ["", f"[joint.{_quote(joint)}]"]
         lines += [] if rule.name is None else [f"name = {_quote(rule.name)}"]
         lines += [] if rule.sign == 1.0 else ["sign = -1"]
@@ -267,13 +267,13 @@ _DIGITS = string.digits + string.ascii_uppercase + string.ascii_lowercase
 _THRESHOLD = 31
 
 
-def spell_name(name: str, how: str) -> str:
-    """Return a name as another program writes it; `how` is a value of `Convention.names`.
+def spell_name(name: str, style: str) -> str:
+    """Return a name as another program writes it; `style` is a value of `Convention.names`.
 
-    >>> [spell_name("1", how) for how in ("urdf", "usd", "identifier", "isaacsim")]
+    >>> [spell_name("1", style) for style in ("urdf", "usd", "identifier", "isaacsim")]
     ['1', 'tn__1_', '_', 'a_1']
     """
-    match how:
+    match style:
         case "usd":
             return transcode(name)
         case "identifier":
@@ -290,7 +290,7 @@ def spellings(name: str) -> frozenset[str]:
     >>> sorted(spellings("arm-2"))
     ['arm-2', 'arm_2', 'tn__arm2_g6']
     """
-    return frozenset(spell_name(name, how) for how in ("urdf", "usd", "identifier", "isaacsim"))
+    return frozenset(spell_name(name, style) for style in ("urdf", "usd", "identifier", "isaacsim"))
 
 
 def make_identifier(name: str) -> str:

@@ -329,11 +329,11 @@ class Conversion:
             units = tuple(rate.unit for rate in self._rates)
             return CoordinateLayout(what, self.velocity_names, units, poses=lambda: rest)
 
-        def named() -> dict[str, FloatArray]:
+        def convert_poses() -> dict[str, FloatArray]:
             return {name: self.to(q) for name, q in configuration.poses(self.tree).items()}
 
         units = tuple(column.unit for column in self._columns)
-        return CoordinateLayout(what, self.coordinate_names, units, poses=named)
+        return CoordinateLayout(what, self.coordinate_names, units, poses=convert_poses)
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:

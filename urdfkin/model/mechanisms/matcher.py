@@ -483,7 +483,7 @@ class MechanismMatcher:
         if depth == LOOK_AHEAD_DEPTH:
             alone = self._best_zero(next_pair, body_pair.G, t, turns, zero, depth)
             if is_better(self._score(alone[1]), self._score(with_bodies[1])):
-                return replace(step, offset=alone[0], other=end.transform(back)), *alone[1:]
+                return replace(step, offset=alone[0], axis_b=end.transform(back)), *alone[1:]
         return replace(step, offset=with_bodies[0], before=back @ K @ body_pair.G), *with_bodies[1:]
 
     def _exact_pose(self, body_pair: BodyPair, next_pair: BodyPair) -> FloatArray | None:
@@ -871,4 +871,4 @@ def _keeps_axis(one: MatchedJoints, other: MatchedJoints) -> bool:
     if {one.kind, other.kind} - {"turns", "prismatic"}:
         return False
     with_distance = one.kind == other.kind == "turns"
-    return max(line_difference(one.axis, other.axis, with_distance=with_distance)) == 0.0
+    return max(line_difference(one.axis_a, other.axis_a, with_distance=with_distance)) == 0.0

@@ -140,9 +140,9 @@ class JointTransform:
     behind: FloatArray
     back: bool = False
 
-    def __call__(self, kind: JointKind, own: FloatArray) -> FloatArray:
+    def __call__(self, kind: JointKind, coordinates: FloatArray) -> FloatArray:
         """Convert coordinates (..., 3 or 7) of A's joint to coordinates of B's joint."""
-        P = pose_of(kind, own)
+        P = pose_of(kind, coordinates)
         return coordinates_of(kind, self.before @ (np.linalg.inv(P) if self.back else P) @ self.behind)
 
     def holds_for(self, kind: JointKind) -> bool:
@@ -153,16 +153,16 @@ class JointTransform:
         return all(is_pose(kind, self.before @ P @ self.behind) for P in (np.eye(4), away))
 
 
-def pose_of(kind: JointKind, own: FloatArray) -> FloatArray:
+def pose_of(kind: JointKind, coordinates: FloatArray) -> FloatArray:
     """Return P (..., 4, 4) for a joint's coordinates: (x, y, angle), or (x, y, z, qx, qy, qz, qw)."""
-    P = np.zeros((*own.shape[:-1], 4, 4))
+    P = np.zeros((*coordinates.shape[:-1], 4, 4))
     P[..., 3, 3] = 1.0
     if kind is JointKind.PLANAR:
-        P[..., :2, 3], P[..., :3, :3] = own[..., :2], rotation_about(_Z, own[..., 2])
+        P[..., :2, 3], P[..., :3, :3] = coordinates[..., :2], rotation_about(_Z, coordinates[..., 2])
     elif kind is not JointKind.FLOATING:
         raise NotImplementedError(f"the pose of a {kind} joint")
     else:
-        P[..., :3, 3], P[..., :3, :3] = own[..., :3], rotation_from_quaternion(own[..., 3:])
+        P[..., :3, 3], P[..., :3, :3] = coordinates[..., :3], rotation_from_quaternion(coordinates[..., 3:])
     return P
 
 
@@ -428,10 +428,10 @@ class MatchedJoints:
         offset: Rad or m. The value of B's joint is sense * (value of A's joint) + offset.
         before: (4, 4) rigid motion L at the joint (module docstring), in A's root frame and zero
             configuration.
-        axis: Screw S of A's joint in the zero configuration: exp(S t) moves the body farther from the base.
-            If A's joint is fixed, `axis` is the screw of B's joint.
-        other: Screw S' of B's joint (module docstring), with the positive direction of `axis`. It is equal to
-            `axis` unless only the joint axes of A and B differ.
+        axis_a: Screw S of A's joint in the zero configuration: exp(S t) moves the body farther from the base.
+            If A's joint is fixed, `axis_a` is the screw of B's joint.
+        axis_b: Screw S' of B's joint (module docstring), with the positive direction of `axis_a`. It is equal
+            to `axis_a` unless only the joint axes of A and B differ.
         tilt: Angle (rad) between the axes of the two joints, or between the normals of two planar joints.
         shift: Distance (m) between the axes, or between the origins of two planar or floating joints.
         kind_difference: "a" if only A's joint is fixed, "b" if only B's joint is fixed, "kind" if the kinds
@@ -447,8 +447,8 @@ class MatchedJoints:
     sense: int
     offset: float
     before: FloatArray
-    axis: Screw
-    other: Screw
+    axis_a: Screw
+    axis_b: Screw
     tilt: float
     shift: float
     kind_difference: str = ""

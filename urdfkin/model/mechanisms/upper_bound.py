@@ -267,7 +267,7 @@ def _angle_bound(
         total += pose_difference(IDENTITY, step.before)[0]
         if step.kind != "turns" or pair is None:
             continue
-        if step.other is not step.axis:
+        if step.axis_b is not step.axis_a:
             # Let R be the joint's rotation by t, and Q the rotation by the tilt s between the axes.
             # For the angle r of Q R Q^T R^T, sin(r/4) = sin(s/2) sin(t/2).
             most = min(max(map(abs, variables.range(pair.b))), math.pi)
@@ -288,7 +288,7 @@ def _distance_bound(
     by_constant_motions = _displacement_bound(frame.end, y.max_distance())
     for step, pair in zip(reversed(steps), reversed(pairs), strict=True):
         d, y = after_joint(step, pair, variables, d, y)
-        moves_alike = step.other is step.axis and pair is not None and pair.a == pair.b
+        moves_alike = step.axis_b is step.axis_a and pair is not None and pair.a == pair.b
         by_constant_motions += _displacement_bound(step.before, y.max_distance()) if moves_alike else math.inf
     return min(d.max_distance(), by_constant_motions)
 
@@ -323,7 +323,11 @@ def after_joint(
     else:
         d = d_after_joint(step, pair, variables, y, d)
         ends = variables.range(pair.b)
-        y = y.rotate(step.other, *ends) if step.kind == "turns" else y.translate(step.other.direction, *ends)
+        y = (
+            y.rotate(step.axis_b, *ends)
+            if step.kind == "turns"
+            else y.translate(step.axis_b.direction, *ends)
+        )
     return after_constant_motion(step, d, y)
 
 
@@ -339,9 +343,9 @@ def d_after_joint(
     step: MatchedJoints, pair: MatchedValues, variables: Variables, y: Support, d: Support
 ) -> Support:
     """Return the support function of d (module docstring) after a joint's motion, without the motion L."""
-    same = step.other is step.axis and pair.a == pair.b
+    same = step.axis_b is step.axis_a and pair.a == pair.b
     if step.kind == "turns":
-        about = Screw(step.axis.direction, np.zeros(3))
+        about = Screw(step.axis_a.direction, np.zeros(3))
         if same:
             return d.rotate(about, *variables.range(pair.a)) if d.values.any() else d
         z = _values(pair, variables, d.grid)
@@ -365,7 +369,7 @@ def _prismatic_difference(
         values = [(t, other) for t in variables.range(pair.a) for other in variables.range(pair.b)]
     with np.errstate(invalid="ignore"):
         found = [
-            grid.points @ step.other.direction * other - grid.points @ step.axis.direction * t
+            grid.points @ step.axis_b.direction * other - grid.points @ step.axis_a.direction * t
             for t, other in values
         ]
     max_difference = np.max(found, axis=0)
@@ -410,7 +414,7 @@ def _common_difference(
     axis.
     """
     G = y.grid.points
-    axis, other = step.axis, step.other
+    axis, other = step.axis_a, step.axis_b
     t, t_other = (line.constant + line.slope * z for line in (pair.a, pair.b))
     turns = [rotation_about(screw.direction, values) for screw, values in ((axis, t), (other, t_other))]
     D = turns[1] - turns[0]
@@ -445,13 +449,13 @@ def _independent_difference(
     largest difference of the angles. If the axes differ, the change of d is e(S' t') y - e(S t) y (module
     docstring). The result is then the sum of the support functions of e(S' t') y and of -e(S t) y.
     """
-    G, u = y.grid.points, step.axis.direction
-    if step.other is not step.axis:
-        y_b = y.rotate(step.other, *variables.range(pair.b))
-        y_a = y.rotate(step.axis, *variables.range(pair.a))
+    G, u = y.grid.points, step.axis_a.direction
+    if step.axis_b is not step.axis_a:
+        y_b = y.rotate(step.axis_b, *variables.range(pair.b))
+        y_a = y.rotate(step.axis_a, *variables.range(pair.a))
         return Support(y.grid, y_b.values + y_a.evaluate(-G))
     chord = _product(
-        2.0 * math.sin(min(variables.value_difference(pair), math.pi) / 2.0), y.radius(step.axis)
+        2.0 * math.sin(min(variables.value_difference(pair), math.pi) / 2.0), y.radius(step.axis_a)
     )
     across = np.linalg.norm(G - (G @ u)[:, None] * u, axis=1)
     return Support(y.grid, np.array([_product(length, chord) for length in across]))
@@ -531,9 +535,9 @@ def _derivatives(
     The module docstring defines the symbols. The callers apply L to the result.
     """
     if step.kind != "turns":
-        u, other = step.axis.direction, step.other.direction
+        u, other = step.axis_a.direction, step.axis_b.direction
         return point_support(d.grid, other - u), point_support(d.grid, other)
-    d, y = d_after_joint(step, pair, variables, y, d), y.rotate(step.other, *variables.range(pair.b))
+    d, y = d_after_joint(step, pair, variables, y, d), y.rotate(step.axis_b, *variables.range(pair.b))
     return _cross_products(step, d, y)
 
 
@@ -542,7 +546,7 @@ def _cross_products(step: MatchedJoints, d: Support, y: Support) -> _Vectors:
 
     The bound on u x d includes the terms (u' - u) x (Y - o') and u x (o - o') of the module docstring.
     """
-    G, axis, other = d.grid.points, step.axis, step.other
+    G, axis, other = d.grid.points, step.axis_a, step.axis_b
     by_axes = 0.0
     if other is not axis:
         reach = Support(d.grid, y.values - G @ other.point).max_distance()
@@ -558,10 +562,10 @@ def _as_free_vectors(step: MatchedJoints) -> MatchedJoints:
 
     Translations do not affect free vectors.
     """
-    axis = Screw(step.axis.direction, np.zeros(3))
-    other = axis if step.other is step.axis else Screw(step.other.direction, np.zeros(3))
+    axis = Screw(step.axis_a.direction, np.zeros(3))
+    other = axis if step.axis_b is step.axis_a else Screw(step.axis_b.direction, np.zeros(3))
     before = IDENTITY if step.before is IDENTITY else pose(step.before[:3, :3])
-    return replace(step, axis=axis, other=other, before=before)
+    return replace(step, axis_a=axis, axis_b=other, before=before)
 
 
 def relevant_joints(
