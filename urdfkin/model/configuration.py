@@ -124,24 +124,24 @@ def coordinate_ranges(tree: KinematicTree) -> dict[str, tuple[float, float]]:
 
 def range_reductions(tree: KinematicTree) -> tuple[RangeReduction, ...]:
     ranges = joint_ranges(tree)
-    allowed, by = dict[str, tuple[float, float]](), dict[str, list[str]]()
+    allowed, limiting_joints = dict[str, tuple[float, float]](), dict[str, list[str]]()
     for joint in tree.joints:
         if (rule := joint.mimic) is None or (limit := joint.limit) is None:
             continue
         own = ranges[rule.leader]
         if restrict_range(rule, limit, *own) != own:
-            by.setdefault(rule.leader, []).append(joint.name)
+            limiting_joints.setdefault(rule.leader, []).append(joint.name)
         allowed[rule.leader] = restrict_range(rule, limit, *allowed.get(rule.leader, own))
     return tuple(
         RangeReduction(
             leader,
             ranges[leader],
             ends if ends[0] < ends[1] else None,
-            tuple(by[leader]),
+            tuple(limiting_joints[leader]),
             "rad" if tree.joints[tree.joint_index(leader)].kind.turns else "m",
         )
         for leader, ends in allowed.items()
-        if leader in by
+        if leader in limiting_joints
     )
 
 
@@ -310,13 +310,13 @@ def poses(tree: KinematicTree) -> dict[str, FloatArray]:
     for name, (lower, upper) in coordinate_ranges(tree).items():
         if not lower <= 0.0 <= upper:
             ready[tree.q_index[tree.joint_index(name)]] = (lower + upper) / 2.0
-    found = {"neutral": neutral(tree), "ready": ready}
+    configurations = {"neutral": neutral(tree), "ready": ready}
     for pose, values in tree.poses.items():
         q = ready.copy() if pose == "ready" else neutral(tree)
         for name, value in values.items():
             q[tree.q_index[tree.joint_index(name)]] = value
-        found[pose] = q
-    return found
+        configurations[pose] = q
+    return configurations
 
 
 def parse_locks(
@@ -331,14 +331,14 @@ def parse_locks(
     """
     layout = coordinate_layout(tree, "q")
     values, pose = layout.parse_by_name(lock, "lock")
-    chosen = set(values)
+    locked_names = set(values)
     if joints is not None:
         layout.check_names(joints, "joints")
-        if twice := sorted(chosen.intersection(joints)):
+        if repeated := sorted(locked_names.intersection(joints)):
             raise InputError(
-                "a joint to lock is also in the list joints", where="lock", found=join_names(twice)
+                "a joint to lock is also in the list joints", where="lock", found=join_names(repeated)
             )
-        chosen |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
+        locked_names |= {joint.name for joint in tree.joints if joint.nq}.difference(joints)
     elif pose is not None:
         remedy = "write NAME=VALUE, or use joints (--joints) to list the joints that remain movable"
         raise InputError(
@@ -348,16 +348,16 @@ def parse_locks(
             question=QuestionsSection.LOCKED_JOINTS,
         )
     for name, (at, size) in layout.spans.items():
-        if not chosen.isdisjoint([name, *layout.names[at : at + size]]):
+        if not locked_names.isdisjoint([name, *layout.names[at : at + size]]):
             kind = tree.joints[tree.joint_index(name)].kind.value
             remedy = "leave it out" if joints is None else "add it to joints (--joints)"
             claim, question = f"a {kind} joint has no single value to lock", QuestionsSection.LOCKED_JOINTS
             raise InputError(claim, where=name, remedy=remedy, question=question)
-    rest = zip(layout.names, (neutral(tree) if pose is None else pose).tolist(), strict=True)
-    q = layout.parse({**dict(rest), **values}, "lock")
+    defaults = zip(layout.names, (neutral(tree) if pose is None else pose).tolist(), strict=True)
+    q = layout.parse({**dict(defaults), **values}, "lock")
     if q.ndim > 1:
         raise InputError("a locked joint needs one value", where="lock", found=f"shape {q.shape[:-1]}")
-    locked = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in chosen}
+    locked = {name: float(x) for name, x in zip(layout.names, q, strict=True) if name in locked_names}
     for name, x in locked.items():
         if not math.isfinite(x):
             raise NotFiniteError("a locked joint needs a finite value", where=f"lock, {name}", found=str(x))
@@ -388,19 +388,19 @@ def _check_limits(tree: KinematicTree, locked: Mapping[str, float]) -> None:
 
 
 def limits(tree: KinematicTree) -> FloatArray:
-    found = np.tile([[-np.inf], [np.inf]], tree.nq)
+    bounds = np.tile([[-np.inf], [np.inf]], tree.nq)
     for joint, at in zip(tree.joints, tree.q_index, strict=True):
         if joint.nq == 1 and joint.limit is not None and joint.kind is not JointKind.CONTINUOUS:
-            found[:, at] = joint.limit.lower, joint.limit.upper
-    return freeze(found)
+            bounds[:, at] = joint.limit.lower, joint.limit.upper
+    return freeze(bounds)
 
 
 def velocity_limits(tree: KinematicTree) -> FloatArray:
-    found = np.full(tree.nv, np.inf)
+    bounds = np.full(tree.nv, np.inf)
     for joint, at in zip(tree.joints, tree.v_index, strict=True):
         if joint.nv == 1 and joint.limit is not None:
-            found[at] = joint.limit.velocity
-    return freeze(found)
+            bounds[at] = joint.limit.velocity
+    return freeze(bounds)
 
 
 def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
@@ -420,12 +420,12 @@ def parse_numbers(tree: KinematicTree, value: ConfigurationLike, what: str) -> F
     array, width = as_floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
     if array.shape[-1:] != (width,):
         names = ", ".join(_names(tree, what)) or "none, no joint moves"
-        instead = _hints_by_length(tree, what).get(array.shape[-1]) if array.ndim else None
+        hint = _hints_by_length(tree, what).get(array.shape[-1]) if array.ndim else None
         raise InputError(
             f"{what} needs {width} numbers for {tree.name}: {names}",
             found=f"shape {array.shape}",
-            remedy=instead and instead.remedy,
-            question=instead.question if instead else QuestionsSection.JOINT_ORDER,
+            remedy=hint and hint.remedy,
+            question=hint.question if hint else QuestionsSection.JOINT_ORDER,
         )
     return array
 

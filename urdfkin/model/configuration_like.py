@@ -100,12 +100,12 @@ with 'neutral, elbow=...'
             return {}, None
         if self._is_in_order(cells):
             raise InputError("give each number with its name", where=where, found=repr(value.strip()[:60]))
-        named = [_split_pair(cell) for cell in cells]
-        if named[0][0] is None:
+        pairs = [_split_pair(cell) for cell in cells]
+        if pairs[0][0] is None:
             pose = self._find_pose(cells[0], where)
-            named = named[1:]
+            pairs = pairs[1:]
         values: dict[str, ArrayLike] = {}
-        for name, number in named:
+        for name, number in pairs:
             if name is None or name in values:
                 wrong = f"{name!r} twice" if name else repr(number[:60])
                 raise InputError(
@@ -141,27 +141,27 @@ with 'neutral, elbow=...'
         )
 
     def _combine_values(
-        self, values: dict[str, ArrayLike], where: str, rest: FloatArray | None
+        self, values: dict[str, ArrayLike], where: str, pose: FloatArray | None
     ) -> FloatArray:
-        found: dict[int, FloatArray] = {}
+        columns: dict[int, FloatArray] = {}
         index = {name: i for i, name in enumerate(self.names)}
         for name, value in values.items():
             if name in index:
                 i = index[name]
-                place = f"{where}, {name}"
-                number = self._parse_number(value, place, self.units[i]) if isinstance(value, str) else value
-                found[i] = as_floats(number, place)
+                label = f"{where}, {name}"
+                number = self._parse_number(value, label, self.units[i]) if isinstance(value, str) else value
+                columns[i] = as_floats(number, label)
             else:
-                found |= self._parse_joint(name, value, where)
-        missing = [name for i, name in enumerate(self.names) if i not in found]
-        if missing and rest is None:
+                columns |= self._parse_joint(name, value, where)
+        missing = [name for i, name in enumerate(self.names) if i not in columns]
+        if missing and pose is None:
             begin = f"'neutral, {next(iter(values), missing[0])}=...'"
             raise InputError(
                 f"no value for {join_names(missing)}",
                 where=where,
                 remedy=f"give a value for each joint, or begin with {begin}",
             )
-        shapes = [x.shape for x in found.values()]
+        shapes = [x.shape for x in columns.values()]
         try:
             shape = np.broadcast_shapes(*shapes)
         except ValueError:
@@ -169,8 +169,8 @@ with 'neutral, elbow=...'
                 "the batches have different shapes", where=where, found=safe_repr(shapes)
             ) from None
         out = np.empty((*shape, len(self.names)))
-        out[...] = 0.0 if rest is None else rest
-        for i, x in found.items():
+        out[...] = 0.0 if pose is None else pose
+        for i, x in columns.items():
             out[..., i] = x
         return out
 
@@ -195,16 +195,16 @@ with 'neutral, elbow=...'
         return UnknownNameError(kind, name[:60], [*self.names, *self.spans], where=where)
 
     def _parse_number(self, text: str, where: str, unit: str | None) -> float:
-        found = parse_quantity(text)
-        value = parse_float(text) if found is None else found.value
+        quantity = parse_quantity(text)
+        value = parse_float(text) if quantity is None else quantity.value
         if value is None:
             hint = remedy(text) or "write 0.5, 30deg, pi/2 or 5mm"
             raise InputError("not a finite number", where=where, found=repr(text.strip()[:60]), remedy=hint)
-        if found is None:
+        if quantity is None:
             return value
         order = "qva".index(self.what)
-        other = unit is not None and found.unit not in (None, unit)
-        if other or found.per not in (0, order):
+        other = unit is not None and quantity.unit not in (None, unit)
+        if other or quantity.per not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]
             per = ("", ", or these units per s", ", or these units per s^2")[order]
             hint = f"use {kinds}{per}"

@@ -155,33 +155,33 @@ def find_convention(name: str | Path | Convention) -> Convention:
 def parse_convention(text: str, where: str, name: str) -> Convention:
     """Parse the TOML text of a convention; `name` replaces a missing name."""
     try:
-        found = tomllib.loads(text)
+        entries = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError("this is not a TOML file", where=where, found=str(error)) from None
-    like = found.pop("like", "urdf")
+    like = entries.pop("like", "urdf")
     if like not in _load_built_in():
         raise UnknownNameError("convention", str(like), BUILT_IN, where=where)
     base = replace(
         _load_built_in()[like], name=name, title=name, evidence="", measurement="", sources=(), note=""
     )
     changes: dict[str, Any] = {}
-    for word in ("name", "title", "note"):
-        if word in found:
-            changes[word] = _as_text(found.pop(word), word, where)
-    joints = found.pop("joints", None)
+    for key in ("name", "title", "note"):
+        if key in entries:
+            changes[key] = _as_text(entries.pop(key), key, where)
+    joints = entries.pop("joints", None)
     if joints is not None:
         if not isinstance(joints, list) or not all(isinstance(joint, str) for joint in joints):
             raise InputError("`joints` must be a list of names", where=where, found=safe_repr(joints))
         changes |= {"order": "given", "joints": tuple(joints)}
         check_unique(joints, where)
-    rules = found.pop("joint", {})
+    rules = entries.pop("joint", {})
     if not isinstance(rules, dict) or not all(isinstance(rule, dict) for rule in rules.values()):
         raise InputError(
             "`joint` must contain tables, such as [joint.elbow]", where=where, found=safe_repr(rules)
         )
     changes["rules"] = {joint: _parse_rule(rule, f"{where}: joint {joint}") for joint, rule in rules.items()}
     check_unique([rule.name for rule in changes["rules"].values() if rule.name is not None], where)
-    for key, value in found.items():
+    for key, value in entries.items():
         if key not in _CHOICES:
             raise UnknownNameError("key", key, (*_CHOICES, "like", "joints", "joint", "title"), where=where)
         if value not in _CHOICES[key]:

@@ -122,8 +122,8 @@ class Conversion:
                 " TOML file",
             )
         own = {rule.name: joint for joint, rule in how.rules.items() if rule.name is not None}
-        every = [(name, self._index(own.get(name, name))) for name in how.joints]
-        named = [(name, i) for name, i in every if self.tree.joints[i].lock is None]
+        all_names = [(name, self._index(own.get(name, name))) for name in how.joints]
+        named = [(name, i) for name, i in all_names if self.tree.joints[i].lock is None]
         order = [i for _, i in named]
         for name, i in named:
             if i not in moving:
@@ -155,30 +155,30 @@ class Conversion:
 
     def _sort_joints(self) -> list[int]:
         tree, order = self.tree, self.convention.order
-        every = range(len(tree.joints))
+        all_joints = range(len(tree.joints))
         if order == "depth first, by name":
-            return list(every)
+            return list(all_joints)
         tag = "link" if order.endswith("link") else "joint"
         written = {e.get("name", ""): k for k, e in enumerate(plain_xml(self._urdf).iterfind(tag))}
         names = tree.links[1:] if tag == "link" else [joint.name for joint in tree.joints]
         # The file does not contain a root joint that urdfkin added; the place -1 puts this joint first.
-        place = [written.get(name, -1) for name in names]
+        ranks = [written.get(name, -1) for name in names]
         if order == "name":
-            return sorted(every, key=lambda i: (place[i] >= 0, tree.joints[i].name))
+            return sorted(all_joints, key=lambda i: (ranks[i] >= 0, tree.joints[i].name))
         if order == "file":
-            return sorted(every, key=place.__getitem__)
+            return sorted(all_joints, key=ranks.__getitem__)
         children: dict[int, list[int]] = {}
         for i, joint in enumerate(tree.joints):
             children.setdefault(joint.parent, []).append(i)
         if order.startswith("breadth first"):
             of_joints = [joint.name for joint in tree.joints]
-            keys = of_joints if order.endswith(("by name", "fixed joints")) else place
+            keys = of_joints if order.endswith(("by name", "fixed joints")) else ranks
             return self._breadth_first(children, keys, merged=not order.endswith("fixed joints"))
-        found, stack = [], sorted(children.get(0, []), key=place.__getitem__, reverse=True)
+        ordered_joints, stack = [], sorted(children.get(0, []), key=ranks.__getitem__, reverse=True)
         while stack:
-            found.append(i := stack.pop())
-            stack += sorted(children.get(i + 1, []), key=place.__getitem__, reverse=True)
-        return found
+            ordered_joints.append(i := stack.pop())
+            stack += sorted(children.get(i + 1, []), key=ranks.__getitem__, reverse=True)
+        return ordered_joints
 
     def _breadth_first(
         self, children: Mapping[int, list[int]], keys: Sequence[Any], *, merged: bool
@@ -189,16 +189,16 @@ class Conversion:
         """
 
         def below(link: int) -> list[int]:
-            found, links = list[int](), [link]
+            joints, links = list[int](), [link]
             # The loop also visits the links that it appends to the list.
             for parent in links:
                 for i in children.get(parent, []):
                     # A locked joint is still a moving joint in the target program.
                     if self.tree.joints[i].original.kind.nv or not merged:
-                        found.append(i)
+                        joints.append(i)
                     else:
                         links.append(i + 1)
-            return sorted(found, key=keys.__getitem__)
+            return sorted(joints, key=keys.__getitem__)
 
         order = below(0)
         for i in order:
@@ -354,13 +354,13 @@ class Conversion:
     def q_and_v_indices(self) -> dict[str, tuple[list[int], list[int]]]:
         """Indices of each joint in the target program's q and v, by the joint's name in the URDF."""
         names = [self.tree.joints[i].name for i in self._order]
-        found, q, v = {}, 0, 0
+        indices, q, v = {}, 0, 0
         for i, name in zip(self._order, names, strict=True):
             kind = self.tree.joints[i].kind
             nq = kind.nq_pinocchio if self.convention.continuous == 2 else kind.nq
-            found[name] = list(range(q, q + nq)), list(range(v, v + kind.nv))
+            indices[name] = list(range(q, q + nq)), list(range(v, v + kind.nv))
             q, v = q + nq, v + kind.nv
-        return found
+        return indices
 
     # -- vectors -------------------------------------------------------------------------------------
 
@@ -386,12 +386,12 @@ class Conversion:
         True
         """
         inputs = self._parse_inputs(q, v, a)
-        found = [self._to_q(inputs[0])]
+        results = [self._to_q(inputs[0])]
         if len(inputs) > 1:
-            found.append(self._to_rates(inputs[0], inputs[1]))
+            results.append(self._to_rates(inputs[0], inputs[1]))
         if len(inputs) > 2:
-            found.append(self._to_rates(inputs[0], inputs[2], inputs[1]))
-        return found[0] if len(found) == 1 else tuple(found)
+            results.append(self._to_rates(inputs[0], inputs[2], inputs[1]))
+        return results[0] if len(results) == 1 else tuple(results)
 
     @overload
     def from_(self, q: ArrayLike) -> FloatArray: ...
@@ -439,23 +439,23 @@ class Conversion:
     def _to_q(self, q: FloatArray) -> FloatArray:
         if self._same_q:
             return q
-        found: FloatArray = q[..., self._q_index]
+        target_q: FloatArray = q[..., self._q_index]
         if self._plain_q:
-            return found
-        found = found * self._q_factor + self._q_zero
+            return target_q
+        target_q = target_q * self._q_factor + self._q_zero
         for k, column in enumerate(self._columns):
             if column.part:
                 value = q[..., column.index] * column.factor + column.zero
-                found[..., k] = np.cos(value) if column.part == "cos" else np.sin(value)
-        return found
+                target_q[..., k] = np.cos(value) if column.part == "cos" else np.sin(value)
+        return target_q
 
     def _from_q(self, target_q: FloatArray) -> FloatArray:
         if self._same_q:
             return target_q
         source = self._q_source
-        found: FloatArray = target_q[..., source]
+        q: FloatArray = target_q[..., source]
         if not self._plain_q:
-            found = (found - self._q_zero[source]) / self._q_factor[source]
+            q = (q - self._q_zero[source]) / self._q_factor[source]
         for at, k in enumerate(source):
             column = self._columns[k]
             if column.part:
@@ -468,53 +468,53 @@ class Conversion:
                         found=f"{norm.max():.6g}",
                     )
                 angle = np.arctan2(pair[..., 1], pair[..., 0])
-                found[..., at] = (angle - column.zero) / column.factor
+                q[..., at] = (angle - column.zero) / column.factor
         copies = [(k, column) for k, column in enumerate(self._columns) if column.is_mimic]
-        expected = self._to_q(found) if copies else target_q
+        expected = self._to_q(q) if copies else target_q
         for k, column in copies:
-            apart = float(np.abs(target_q[..., k] - expected[..., k]).max(initial=0.0))
-            if apart > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
+            difference = float(np.abs(target_q[..., k] - expected[..., k]).max(initial=0.0))
+            if difference > _MIMIC_TOLERANCE * max(1.0, abs(column.factor)):
                 raise InputError(
                     "the value of a mimic joint contradicts its mimic rule",
                     where=column.name,
-                    found=f"{apart:.3g} rad or m from the rule",
+                    found=f"{difference:.3g} rad or m from the rule",
                     remedy="correct the value, or load with mimic=False (--no-mimic)",
                     question=QuestionsSection.MIMIC_JOINTS,
                 )
-        return found
+        return q
 
     def _to_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return M x, or M x + M' v if v is given, with the matrix M of the module docstring."""
         if self._same_v:
             return x
-        found: FloatArray = x[..., self._v_index]
+        rates: FloatArray = x[..., self._v_index]
         if self._plain_v:
-            return found
-        found = found * self._v_factor
+            return rates
+        rates = rates * self._v_factor
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
             B = self._block(block, q)
             part = _multiply(B, x[..., own])
             if v is not None:
                 part = part + _multiply(self._block(block, q, v[..., own]), v[..., own])
-            found = _replace_slice(found, block.rows, part)
-        return found
+            rates = _replace_slice(rates, block.rows, part)
+        return rates
 
     def _from_rates(self, q: FloatArray, x: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return M^-1 x or, if v is given, M^-1 (x - (dM/dt) v), with M = `matrix(q)`."""
         if self._same_v:
             return x
-        found: FloatArray = x[..., self._v_source]
+        rates: FloatArray = x[..., self._v_source]
         if self._plain_v:
-            return found
-        found = found / self._v_factor[self._v_source]
+            return rates
+        rates = rates / self._v_factor[self._v_source]
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
             part = x[..., block.rows]
             if v is not None:
                 part = part - _multiply(self._block(block, q, v[..., own]), v[..., own])
-            found = _replace_slice(found, own, _multiply(_inverse(self._block(block, q)), part))
-        return found
+            rates = _replace_slice(rates, own, _multiply(_inverse(self._block(block, q)), part))
+        return rates
 
     # -- matrices ------------------------------------------------------------------------------------
 
@@ -541,11 +541,11 @@ class Conversion:
         """Return M' (..., program's nv, nv), the time derivative of `matrix`."""
         configurations, velocities = self._parse_inputs(q, v, None)
         shape = np.broadcast_shapes(configurations.shape[:-1], velocities.shape[:-1])
-        found = np.zeros((*shape, self.nv, self.tree.nv))
+        M_rate = np.zeros((*shape, self.nv, self.tree.nv))
         for block in self._blocks:
             own = slice(block.v, block.v + block.joint.kind.nv)
-            found[..., block.rows, own] = self._block(block, configurations, velocities[..., own])
-        return found
+            M_rate[..., block.rows, own] = self._block(block, configurations, velocities[..., own])
+        return M_rate
 
     def inverse_matrix(self, q: ConfigurationLike | None = None) -> FloatArray:
         """Return M^-1 (..., nv, program's nv) with v = M^-1 v_tool.
@@ -554,13 +554,13 @@ class Conversion:
         the columns of the other numbers are 0.
         """
         if not self._blocks:
-            found = np.zeros((self.tree.nv, self.nv))
-            found[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
-            return found
+            M_inverse = np.zeros((self.tree.nv, self.nv))
+            M_inverse[np.arange(self.tree.nv), self._v_source] = 1.0 / self._v_factor[self._v_source]
+            return M_inverse
         M = self.matrix(q)
-        found = np.zeros((*M.shape[:-2], self.tree.nv, self.nv))
-        found[..., self._v_source] = _inverse(M[..., self._v_source, :])
-        return found
+        M_inverse = np.zeros((*M.shape[:-2], self.tree.nv, self.nv))
+        M_inverse[..., self._v_source] = _inverse(M[..., self._v_source, :])
+        return M_inverse
 
     def _block(self, block: _FreeJoint, q: FloatArray, v: FloatArray | None = None) -> FloatArray:
         """Return a joint's block (..., k, k) of `matrix`; with v, return the time derivative of the block."""
@@ -633,13 +633,13 @@ class Conversion:
         self, q: ConfigurationLike, v: ConfigurationLike, J: ArrayLike, rate: ArrayLike
     ) -> FloatArray:
         """Convert the time derivative J' of a Jacobian J: S (J' M^-1 + J (M^-1)')."""
-        found = self.jacobian(q, rate)
+        converted = self.jacobian(q, rate)
         if not self._blocks:
-            return found
+            return converted
         inverse = self.inverse_matrix(q)
         change = -inverse @ self.matrix_rate(q, v) @ inverse
         array = self.reorder_six_vector(J, -2)
-        return found + array @ _add_frame_axis(change, array.ndim)
+        return converted + array @ _add_frame_axis(change, array.ndim)
 
     def hessian(self, q: ConfigurationLike, J: ArrayLike, H: ArrayLike) -> FloatArray:
         """Convert a Jacobian's derivatives H (..., 6, nv, nv) with respect to the joint coordinates."""
@@ -650,15 +650,15 @@ class Conversion:
             self.reorder_six_vector(J, -2),
         )
         W = _add_frame_axis(inverse, columns.ndim)
-        found: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
+        converted: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
         if self._blocks:
             change = np.zeros((*inverse.shape, self.nv))
             for j in range(self.nv):
                 along = self.matrix_rate(q, inverse[..., j])
                 change[..., j] = -inverse @ along @ inverse
             lifted = change if columns.ndim == change.ndim - 1 else change[..., None, :, :, :]
-            found += np.asarray(np.einsum("...rk,...kij->...rij", columns, lifted), dtype=np.float64)
-        return found
+            converted += np.asarray(np.einsum("...rk,...kij->...rij", columns, lifted), dtype=np.float64)
+        return converted
 
     def convert_result(
         self,

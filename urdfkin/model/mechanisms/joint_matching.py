@@ -388,7 +388,7 @@ def _first_axes(
     Each item contains this pair, the pairs of prismatic axes before it, and the pairs of axes after it. If
     two branches have only pairs of prismatic axes, the last of these pairs replaces the revolute pair.
     """
-    found = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
+    first_axes = list[tuple[Both[Axis], tuple[Both[Axis], ...], list[Both[Axis]]]]()
     for e, f in _next_joints(mechanisms, via, bodies):
         pair, beyond = (
             (_axis(mechanisms[0], e), _axis(mechanisms[1], f)),
@@ -396,8 +396,8 @@ def _first_axes(
         )
         lines = pair[0].screw, pair[1].screw
         deeper = [] if pair[0].turns else _first_axes(mechanisms, (e, f), beyond, (*near, pair))
-        found += deeper or [(pair, near, list(later_axes(mechanisms, (e, f), beyond, lines)))]
-    return found
+        first_axes += deeper or [(pair, near, list(later_axes(mechanisms, (e, f), beyond, lines)))]
+    return first_axes
 
 
 def _next_joints(
@@ -490,46 +490,46 @@ class SubtreeMatcher:
 
     def _assign(
         self,
-        left: Sequence[Edge],
+        edges: Sequence[Edge],
         candidates: Sequence[Sequence[Edge]],
         bodies: tuple[int, int],
         X: FloatArray,
         tries: list[int],
         ratios: VelocityRatios,
     ) -> tuple[Sequence[EdgePair], VelocityRatios] | None:
-        if not left:
+        if not edges:
             return [], ratios
-        at = min(range(len(left)), key=lambda i: len(candidates[i]))
-        for f in candidates[at]:
+        k = min(range(len(edges)), key=lambda i: len(candidates[i]))
+        for f in candidates[k]:
             tries[0] -= 1
-            found = self._match_subtrees(left[at], f, bodies, X) if tries[0] >= 0 else None
-            both = None if found is None else self._merge_ratios(ratios, found.ratios)
+            match = self._match_subtrees(edges[k], f, bodies, X) if tries[0] >= 0 else None
+            both = None if match is None else self._merge_ratios(ratios, match.ratios)
             if both is None:
                 continue
-            others = [[g for g in some if g is not f] for i, some in enumerate(candidates) if i != at]
-            rest = self._assign([*left[:at], *left[at + 1 :]], others, bodies, X, tries, both)
+            others = [[g for g in some if g is not f] for i, some in enumerate(candidates) if i != k]
+            rest = self._assign([*edges[:k], *edges[k + 1 :]], others, bodies, X, tries, both)
             if rest is not None:
-                return [(left[at], f), *rest[0]], rest[1]
+                return [(edges[k], f), *rest[0]], rest[1]
         return None
 
     def _match_subtrees(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> _Match | None:
         if not self._axes_coincide(e, f, X):
             return None
-        known = self._cache.setdefault((e.joint, f.joint, bodies[0]), [])
-        for other, match in known:
+        cases = self._cache.setdefault((e.joint, f.joint, bodies[0]), [])
+        for other, match in cases:
             if self._is_same_case(e, other, X):
                 return match
         beyond = e.other_body(bodies[0]), f.other_body(bodies[1])
-        found, own = None, self._velocity_ratio(e, f, bodies, X)
+        match, own = None, self._velocity_ratio(e, f, bodies, X)
         if self.joint_matcher.has_same_shape(beyond, (e, f)):
             for there in _distinct(self.poses(beyond, (e, f), X)):
-                some = self._match_bodies(beyond, (e, f), there)
-                ratios = None if some is None else self._merge_ratios(own, some[1])
+                found_pairs = self._match_bodies(beyond, (e, f), there)
+                ratios = None if found_pairs is None else self._merge_ratios(own, found_pairs[1])
                 if ratios is not None:
-                    found = _Match(there, ratios)
+                    match = _Match(there, ratios)
                     break
-        known.append((X, found))
-        return found
+        cases.append((X, match))
+        return match
 
     def _velocity_ratio(self, e: Edge, f: Edge, bodies: tuple[int, int], X: FloatArray) -> VelocityRatios:
         """Return the coordinates that move two joints, and the ratio of the coordinates' velocities."""

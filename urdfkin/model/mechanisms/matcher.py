@@ -128,12 +128,12 @@ class MechanismMatcher:
 
     # -- first bodies ------------------------------------------------------------------------------
 
-    def best(self) -> Alignment:
+    def find_best(self) -> Alignment:
         best: Alignment | None = None
         for bodies, X in self._start_candidates():
-            found = self._match_from(bodies, X)
-            if best is None or is_better(found.score, best.score):
-                best, self.match_count = found, found.match_count
+            alignment = self._match_from(bodies, X)
+            if best is None or is_better(alignment.score, best.score):
+                best, self.match_count = alignment, alignment.match_count
             if not best.max_difference and not (best.only_a and best.only_b):
                 break
         assert best is not None
@@ -241,23 +241,27 @@ class MechanismMatcher:
     # -- matching ------------------------------------------------------------------------------------
 
     def _match_from(self, base: tuple[int, int], X: FloatArray) -> Alignment:
-        found = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
+        alignment = Alignment(self.a, self.b, (self.a.bodies[base[0]][0], self.b.bodies[base[1]][0]), X)
         stack = [BodyPair(base, (None, None), -1, IDENTITY, X)]
         while stack:
             body_pair = stack.pop()
-            self._match_links(body_pair, found)
+            self._match_links(body_pair, alignment)
             pairs, only_a, only_b = self._joint_pairs(body_pair)
-            found.only_a += _joints_beyond(self.a, body_pair.bodies[0], only_a)
-            found.only_b += _joints_beyond(self.b, body_pair.bodies[1], only_b)
+            alignment.only_a += _joints_beyond(self.a, body_pair.bodies[0], only_a)
+            alignment.only_b += _joints_beyond(self.b, body_pair.bodies[1], only_b)
             for e, f in pairs:
-                step, next_pair, _ = self._match_joints(body_pair, e, f, len(found.steps), LOOK_AHEAD_DEPTH)
+                step, next_pair, _ = self._match_joints(
+                    body_pair, e, f, len(alignment.steps), LOOK_AHEAD_DEPTH
+                )
                 stack.append(next_pair)
-                found.steps.append(step)
+                alignment.steps.append(step)
                 if step.differs:
-                    found.max_difference = max(found.max_difference, step.tilt * self.size + step.shift)
+                    alignment.max_difference = max(
+                        alignment.max_difference, step.tilt * self.size + step.shift
+                    )
                 elif not step.kind_difference:
-                    found.match_count += 1
-        return found
+                    alignment.match_count += 1
+        return alignment
 
     def _joint_pairs(self, body_pair: BodyPair) -> tuple[Sequence[EdgePair], Sequence[Edge], Sequence[Edge]]:
         if self.exact is not None:
@@ -284,10 +288,10 @@ class MechanismMatcher:
         ):
             yield zero_poses[0] @ N @ inverse(zero_poses[1])
 
-    def _match_links(self, body_pair: BodyPair, found: Alignment) -> None:
+    def _match_links(self, body_pair: BodyPair, alignment: Alignment) -> None:
         pairs = self._all_links(body_pair)
         if (other := self._pair_of_tools(body_pair, pairs)) is not None:
-            found.frames.append(other)
+            alignment.frames.append(other)
         for link_a, link_b in pairs:
             zero_pose = self.a.zero_poses[link_a]
             pose_a, pose_b = body_pair.G @ zero_pose, body_pair.XC @ self.b.zero_poses[link_b]
@@ -295,11 +299,11 @@ class MechanismMatcher:
             end = IDENTITY
             if self.tolerance.holds(angle, distance):
                 angle = distance = 0.0
-                found.match_count += 1
+                alignment.match_count += 1
             else:
                 end = inverse(body_pair.G) @ pose_b @ inverse(zero_pose)
-                found.max_difference = max(found.max_difference, angle * self.size + distance)
-            found.frames.append(
+                alignment.max_difference = max(alignment.max_difference, angle * self.size + distance)
+            alignment.frames.append(
                 FramePair(link_a, link_b, body_pair.previous, zero_pose, end, angle, distance)
             )
 
@@ -612,13 +616,13 @@ def _require_edges(via: tuple[Edge | None, Edge | None]) -> tuple[Edge, Edge]:
 
 
 def _joints_beyond(mechanism: Mechanism, body: int, edges: Sequence[Edge]) -> list[int]:
-    found, stack = [], [(body, edge) for edge in edges]
+    joints, stack = [], [(body, edge) for edge in edges]
     while stack:
-        here, edge = stack.pop()
-        found.append(edge.joint)
-        beyond = edge.other_body(here)
+        current, edge = stack.pop()
+        joints.append(edge.joint)
+        beyond = edge.other_body(current)
         stack += [(beyond, other) for other in mechanism.edges_by_body[beyond] if other is not edge]
-    return found
+    return joints
 
 
 def _align_normals(pose_a: FloatArray, pose_b: FloatArray) -> tuple[FloatArray, float, float]:
@@ -649,8 +653,8 @@ def align(
 ) -> Alignment:
     """Align B with A; `name_map` maps joint names of A to joint names of B."""
     if choices is not None:
-        for taken in choices.orders:
-            b = b.reorder(taken)
+        for order in choices.orders:
+            b = b.reorder(order)
         return _best_alignment(a, b, name_map, choices)
     best = _best_alignment(a, b, name_map, None, LookAhead(MOST_LOOK_AHEAD))
     for orders in b.orders_of_runs(tolerance_of(a, b)):
@@ -660,9 +664,9 @@ def align(
         for names in _orders_to_try(a, present, name_map, run, orders):
             moved = [k for k, name in enumerate(names) if name != run[k]]
             other = present.reorder(names[moved[0] : moved[-1] + 1])
-            found = _best_alignment(a, other, name_map, None)
-            if is_better(found.score, best.score):
-                best = found
+            candidate = _best_alignment(a, other, name_map, None)
+            if is_better(candidate.score, best.score):
+                best = candidate
     return _with_zeros_by_rules(_with_larger_tolerances(_with_exchanged_joints(best, name_map), name_map))
 
 
@@ -685,10 +689,13 @@ def _with_zeros_by_rules(best: Alignment) -> Alignment:
     if not zeros:
         return best
     choices = best.choices
-    found = _best_alignment(best.a, best.b, best.names, replace(choices, zeros={**choices.zeros, **zeros}))
+    candidate = _best_alignment(
+        best.a, best.b, best.names, replace(choices, zeros={**choices.zeros, **zeros})
+    )
     return (
-        found
-        if found.difference_count <= best.difference_count and found.max_difference <= best.max_difference
+        candidate
+        if candidate.difference_count <= best.difference_count
+        and candidate.max_difference <= best.max_difference
         else best
     )
 
@@ -706,9 +713,9 @@ def _with_exchanged_joints(best: Alignment, name_map: Mapping[str, str]) -> Alig
         joints = best.a.tree.joints, best.b.tree.joints
         (a, b), (c, d) = pairs
         other = {joints[0][a].name: joints[1][d].name, joints[0][c].name: joints[1][b].name}
-        found = _best_alignment(best.a, best.b, {**name_map, **other}, None, look_ahead, base=best.base)
-        if is_better(found.score, best.score):
-            best, name_map = found, {**name_map, **other}
+        candidate = _best_alignment(best.a, best.b, {**name_map, **other}, None, look_ahead, base=best.base)
+        if is_better(candidate.score, best.score):
+            best, name_map = candidate, {**name_map, **other}
     return best
 
 
@@ -745,7 +752,9 @@ def _best_alignment(
 ) -> Alignment:
     tolerance = tolerance or tolerance_of(a, b)
     joint_matcher = JointMatcher(a, b, name_map, tolerance)
-    return MechanismMatcher(a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base).best()
+    return MechanismMatcher(
+        a, b, joint_matcher, choices, look_ahead or LookAhead(0), tolerance, base
+    ).find_best()
 
 
 #: Numbers of full turns that are added to the zero offset of a revolute joint with a mimic rule.

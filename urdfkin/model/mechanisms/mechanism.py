@@ -349,11 +349,11 @@ class Mechanism:
 
     @cached_property
     def edges_by_body(self) -> list[list[Edge]]:
-        found: list[list[Edge]] = [[] for _ in self.bodies]
+        edges: list[list[Edge]] = [[] for _ in self.bodies]
         for edge in self.edges:
-            found[edge.inner].append(edge)
-            found[edge.outer].append(edge)
-        return found
+            edges[edge.inner].append(edge)
+            edges[edge.outer].append(edge)
+        return edges
 
     @cached_property
     def size(self) -> float:
@@ -600,11 +600,11 @@ class Alignment:
         return frames
 
     def indices(self, last: int) -> list[int]:
-        found = []
+        path = []
         while last >= 0:
-            found.append(last)
+            path.append(last)
             last = self.steps[last].previous
-        return found[::-1]
+        return path[::-1]
 
     def path(self, last: int) -> list[MatchedJoints]:
         return [self.steps[i] for i in self.indices(last)]

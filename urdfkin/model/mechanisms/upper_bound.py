@@ -368,11 +368,11 @@ def _prismatic_difference(
     else:
         values = [(t, other) for t in variables.range(pair.a) for other in variables.range(pair.b)]
     with np.errstate(invalid="ignore"):
-        found = [
+        differences = [
             grid.points @ step.axis_b.direction * other - grid.points @ step.axis_a.direction * t
             for t, other in values
         ]
-    max_difference = np.max(found, axis=0)
+    max_difference = np.max(differences, axis=0)
     return Support(grid, np.where(np.isnan(max_difference), np.inf, max_difference))
 
 
