@@ -221,28 +221,28 @@ def _names_and_units(
         yield from zip(names, suffixes.values(), strict=True)
 
 
-def units(tree: KinematicTree, what: str) -> tuple[str, ...]:
+def units(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
     """Return the unit of each number of q, v or a: "rad", "m" or ""; the time unit is omitted."""
     return tuple(
-        unit for _, unit in _names_and_units(tree, _Q_SUFFIXES if what == "q" else _VELOCITY_SUFFIXES)
+        unit for _, unit in _names_and_units(tree, _Q_SUFFIXES if symbol == "q" else _VELOCITY_SUFFIXES)
     )
 
 
-def coordinate_layout(tree: KinematicTree, what: str) -> CoordinateLayout:
-    is_q = what == "q"
+def coordinate_layout(tree: KinematicTree, symbol: str) -> CoordinateLayout:
+    is_q = symbol == "q"
     spans = {
         joint.name: (at, joint.nq if is_q else joint.nv)
         for joint, at in zip(tree.joints, tree.q_index if is_q else tree.v_index, strict=True)
         if joint.nv > 1
     }
     return CoordinateLayout(
-        what,
-        _names(tree, what),
-        units(tree, what),
+        symbol,
+        _names(tree, symbol),
+        units(tree, symbol),
         spans,
         poses=lambda: poses(tree) if is_q else {"neutral": np.zeros(tree.nv)},
         hints_by_name=lambda: _hints_by_name(tree),
-        hints_by_length=lambda: _hints_by_length(tree, what),
+        hints_by_length=lambda: _hints_by_length(tree, symbol),
     )
 
 
@@ -261,7 +261,7 @@ def _hints_by_name(tree: KinematicTree) -> dict[str, Hint]:
     }
 
 
-def _hints_by_length(tree: KinematicTree, what: str) -> dict[int, Hint]:
+def _hints_by_length(tree: KinematicTree, symbol: str) -> dict[int, Hint]:
     """Return hints for wrong lengths of q, v or a that users often pass.
 
     These are the lengths of Pinocchio's vectors, and the length of a vector that includes the mimic joints.
@@ -273,7 +273,7 @@ def _hints_by_length(tree: KinematicTree, what: str) -> dict[int, Hint]:
     )
     mimic_count = sum(joint.kind.nv for joint in tree.joints if joint.mimic)
     hints: dict[int, Hint] = {}
-    if what == "q":
+    if symbol == "q":
         for mimic in (False, True):
             option = f", mimic={mimic}" if has_mimic_joints else ""
             hints[_pinocchio_length(tree, mimic=mimic)] = Hint(
@@ -285,9 +285,9 @@ def _hints_by_length(tree: KinematicTree, what: str) -> dict[int, Hint]:
             remedy = f"{convert.remedy}; or {leave_out.remedy}" if convert else leave_out.remedy
             hints[tree.nq + mimic_count] = leave_out._replace(remedy=remedy)
     elif has_mimic_joints:
-        remedy = f"Pinocchio's {what} has that length: {leave_out.remedy}"
+        remedy = f"Pinocchio's {symbol} has that length: {leave_out.remedy}"
         hints[tree.nv + mimic_count] = leave_out._replace(remedy=remedy)
-    hints.pop(len(_names(tree, what)), None)
+    hints.pop(len(_names(tree, symbol)), None)
     return hints
 
 
@@ -414,15 +414,15 @@ def with_unit_quaternions(tree: KinematicTree, q: FloatArray) -> FloatArray:
     return q
 
 
-def parse_numbers(tree: KinematicTree, value: ConfigurationLike, what: str) -> FloatArray:
-    if (named := as_text_or_mapping(value, what)) is not None:
-        return coordinate_layout(tree, what).parse(named)
-    array, width = as_floats(cast("ArrayLike", value), what), tree.nq if what == "q" else tree.nv
+def parse_numbers(tree: KinematicTree, value: ConfigurationLike, symbol: str) -> FloatArray:
+    if (named := as_text_or_mapping(value, symbol)) is not None:
+        return coordinate_layout(tree, symbol).parse(named)
+    array, width = as_floats(cast("ArrayLike", value), symbol), tree.nq if symbol == "q" else tree.nv
     if array.shape[-1:] != (width,):
-        names = ", ".join(_names(tree, what)) or "none, no joint moves"
-        hint = _hints_by_length(tree, what).get(array.shape[-1]) if array.ndim else None
+        names = ", ".join(_names(tree, symbol)) or "none, no joint moves"
+        hint = _hints_by_length(tree, symbol).get(array.shape[-1]) if array.ndim else None
         raise InputError(
-            f"{what} needs {width} numbers for {tree.name}: {names}",
+            f"{symbol} needs {width} numbers for {tree.name}: {names}",
             found=f"shape {array.shape}",
             remedy=hint and hint.remedy,
             question=hint.question if hint else QuestionsSection.JOINT_ORDER,
@@ -431,11 +431,11 @@ def parse_numbers(tree: KinematicTree, value: ConfigurationLike, what: str) -> F
 
 
 def parse_and_normalise(
-    tree: KinematicTree, value: ConfigurationLike, what: str, *, warn: bool = True
+    tree: KinematicTree, value: ConfigurationLike, symbol: str, *, warn: bool = True
 ) -> FloatArray:
     """Parse q, v or a; normalise the quaternions of q, and warn of degrees if `warn` is true."""
-    array = parse_numbers(tree, value, what)
-    if what != "q":
+    array = parse_numbers(tree, value, symbol)
+    if symbol != "q":
         return array
     if warn:
         warn_of_degrees(tree, array)
@@ -443,20 +443,20 @@ def parse_and_normalise(
 
 
 def parse_finite(
-    tree: KinematicTree, value: ConfigurationLike, what: str, *, warn: bool = True
+    tree: KinematicTree, value: ConfigurationLike, symbol: str, *, warn: bool = True
 ) -> FloatArray:
     """Return the result of `parse_and_normalise`; raise NotFiniteError if a number is not finite."""
-    array = parse_and_normalise(tree, value, what, warn=warn)
+    array = parse_and_normalise(tree, value, symbol, warn=warn)
     if not np.isfinite(array).all():
         where = np.argwhere(~np.isfinite(array))[0]
         raise NotFiniteError(
-            f"{what} must be finite", where=_names(tree, what)[where[-1]], found=str(array[tuple(where)])
+            f"{symbol} must be finite", where=_names(tree, symbol)[where[-1]], found=str(array[tuple(where)])
         )
     return array
 
 
-def _names(tree: KinematicTree, what: str) -> tuple[str, ...]:
-    return coordinate_names(tree) if what == "q" else velocity_names(tree)
+def _names(tree: KinematicTree, symbol: str) -> tuple[str, ...]:
+    return coordinate_names(tree) if symbol == "q" else velocity_names(tree)
 
 
 def limit_violations(tree: KinematicTree, q: FloatArray) -> list[str]:

@@ -47,7 +47,7 @@ class CoordinateLayout:
     """Names and units of the numbers of q, v or a.
 
     Attributes:
-        what: "q", "v" or "a".
+        symbol: "q", "v" or "a".
         units: "rad", "m", "" for a number without a unit (such as a quaternion's), or None if unknown.
         spans: For each joint with several numbers: the index of its first number, and their count.
         hints_by_name: Returns a hint for each joint without a coordinate, such as a fixed joint.
@@ -55,7 +55,7 @@ class CoordinateLayout:
             Pinocchio's q.
     """
 
-    what: str
+    symbol: str
     names: tuple[str, ...]
     units: tuple[str | None, ...]
     spans: Mapping[str, tuple[int, int]] = field(default_factory=dict)
@@ -77,7 +77,7 @@ class CoordinateLayout:
         urdfkin.errors.InputError: q: no value for shoulder; give a value for each joint, or begin \
 with 'neutral, elbow=...'
         """
-        where = where or self.what
+        where = where or self.symbol
         if not isinstance(value, Mapping) and self._is_in_order(cells := _split_cells(value)):
             return self._parse_in_order(cells, where)
         values, pose = self.parse_by_name(value, where)
@@ -187,7 +187,7 @@ with 'neutral, elbow=...'
         return {at + k: x[..., k] for k in range(size)}
 
     def _unknown_name_error(self, name: object, where: str) -> InputError | UnknownNameError:
-        kind = {"q": "coordinate", "v": "joint velocity"}.get(self.what, "joint acceleration")
+        kind = {"q": "coordinate", "v": "joint velocity"}.get(self.symbol, "joint acceleration")
         if not isinstance(name, str):
             return InputError(f"the name of a {kind} must be text", where=where, found=safe_repr(name))
         if (hint := self.hints_by_name().get(name)) is not None:
@@ -202,7 +202,7 @@ with 'neutral, elbow=...'
             raise InputError("not a finite number", where=where, found=repr(text.strip()[:60]), remedy=hint)
         if quantity is None:
             return value
-        order = "qva".index(self.what)
+        order = "qva".index(self.symbol)
         other = unit is not None and quantity.unit not in (None, unit)
         if other or quantity.per not in (0, order):
             kinds = {"rad": "rad or deg", "m": "m or mm", "": "no unit", None: "rad, deg, m or mm"}[unit]

@@ -54,7 +54,7 @@ class Coupling:
         """The vector g (joints,): the joint values if every coordinate is zero."""
         return freeze([mimic.offset if mimic else 0.0 for mimic in self.mimics])
 
-    def layout(self, what: str = "q") -> CoordinateLayout:
+    def layout(self, symbol: str = "q") -> CoordinateLayout:
         rules = list(zip(self.joints, self.mimics, self.kinds, strict=True))
         units = {joint: "rad" if kind.turns else "m" for joint, mimic, kind in rules if not mimic}
         # A mimicked joint that is not on the path may be of any kind, so its unit is unknown here.
@@ -65,7 +65,7 @@ class Coupling:
             if mimic
         }
         neutral = {"neutral": np.zeros(len(self.names))}
-        return CoordinateLayout(what, self.names, own, poses=lambda: neutral, hints_by_name=lambda: hints)
+        return CoordinateLayout(symbol, self.names, own, poses=lambda: neutral, hints_by_name=lambda: hints)
 
     def values(self, q: ConfigurationLike) -> FloatArray:
         """Return the values (..., joints) of all joints, rad or m, for `q` (..., coordinates)."""
@@ -73,13 +73,14 @@ class Coupling:
         # Each row of G contains only one number that is not zero, so no matrix product is needed.
         return np.asarray(coordinates[..., self._leader_index] * self._multiplier + self.offset)
 
-    def parse(self, array: ConfigurationLike, what: str) -> FloatArray:
-        if (named := as_text_or_mapping(array, what)) is not None:
-            return self.layout(what).parse(named)
+    def parse(self, array: ConfigurationLike, symbol: str) -> FloatArray:
+        if (by_name := as_text_or_mapping(array, symbol)) is not None:
+            return self.layout(symbol).parse(by_name)
         values = np.asarray(array, dtype=np.float64)
         if values.ndim == 0 or values.shape[-1] != len(self.names):
+            names = ", ".join(self.names) or "none"
             raise InputError(
-                f"{what} needs {len(self.names)} values on its last axis: {', '.join(self.names) or 'none'}",
+                f"{symbol} needs {len(self.names)} values on its last axis: {names}",
                 found=f"shape {values.shape}",
                 remedy="take the path's coordinates from the robot's q, for example with select()",
             )

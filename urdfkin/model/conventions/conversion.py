@@ -322,18 +322,18 @@ class Conversion:
         """The target program's name of each element of v, and of each column of the Jacobian."""
         return tuple(rate.name for rate in self._rates)
 
-    def layout(self, what: str) -> CoordinateLayout:
+    def layout(self, symbol: str) -> CoordinateLayout:
         """Return names and units of the target program's "q", "v" or "a", to parse values by name."""
-        if what != "q":
+        if symbol != "q":
             rest = {"neutral": np.zeros(self.nv)}
             units = tuple(rate.unit for rate in self._rates)
-            return CoordinateLayout(what, self.velocity_names, units, poses=lambda: rest)
+            return CoordinateLayout(symbol, self.velocity_names, units, poses=lambda: rest)
 
         def convert_poses() -> dict[str, FloatArray]:
             return {name: self.to(q) for name, q in configuration.poses(self.tree).items()}
 
         units = tuple(column.unit for column in self._columns)
-        return CoordinateLayout(what, self.coordinate_names, units, poses=convert_poses)
+        return CoordinateLayout(symbol, self.coordinate_names, units, poses=convert_poses)
 
     @property
     def permutation(self) -> NDArray[np.intp] | None:
@@ -425,12 +425,13 @@ class Conversion:
         letters = zip("qva", values, strict=True)
         return [configuration.parse_finite(self.tree, x, letter) for letter, x in letters if x is not None]
 
-    def _check_target(self, value: ArrayLike, what: str) -> FloatArray:
-        array, width = as_finite(value, what), self.nq if what == "q" else self.nv
+    def _check_target(self, value: ArrayLike, symbol: str) -> FloatArray:
+        array, width = as_finite(value, symbol), self.nq if symbol == "q" else self.nv
         if array.shape[-1:] != (width,):
-            names = self.coordinate_names if what == "q" else self.velocity_names
+            names = self.coordinate_names if symbol == "q" else self.velocity_names
             raise InputError(
-                f"{what} needs {width} numbers in the convention {self.convention.name}: {', '.join(names)}",
+                f"{symbol} needs {width} numbers in the convention {self.convention.name}:"
+                f" {', '.join(names)}",
                 found=f"shape {array.shape}",
                 question=QuestionsSection.JOINT_ORDER,
             )
@@ -726,7 +727,7 @@ class Reordering:
         return f"{target} = {line}"
 
 
-def find_reordering(what: str, start: Conversion, end: Conversion) -> Reordering | None:
+def find_reordering(symbol: str, start: Conversion, end: Conversion) -> Reordering | None:
     """Return the `Reordering` that converts "q" or "v" between two conventions; None if none exists.
 
     A `Reordering` cannot convert an angle to its cosine and sine, or a velocity to a different frame.
@@ -736,7 +737,7 @@ def find_reordering(what: str, start: Conversion, end: Conversion) -> Reordering
     >>> find_reordering("q", robot.convention("isaaclab"), robot.convention("mujoco")).index
     (1, 5, 9, 0, 4, 8, 3, 7, 11, 2, 6, 10)
     """
-    if what == "q":
+    if symbol == "q":
         if start.convention.continuous != end.convention.continuous and (start.has_pairs or end.has_pairs):
             return None
         own, other = start._columns, end._columns
