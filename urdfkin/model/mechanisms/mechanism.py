@@ -282,7 +282,7 @@ class Mechanism:
         joints = [self.tree.joint_index(name) for name in names]
         run = [edge for edge in self.edges if edge.joint in joints]
         other = copy(self)
-        vars(other).pop("edges_of", None)
+        vars(other).pop("edges_by_body", None)
         new = dict(zip(run, joints, strict=True))
         other.edges = [replace(edge, joint=new[edge]) if edge in new else edge for edge in self.edges]
         other.bodies = list(self.bodies)
