@@ -31,10 +31,10 @@ from typing import Any, Literal
 import numpy as np
 
 from urdfkin.errors import InputError, SourceError, UnknownNameError
-from urdfkin.kinematics.rotation import quaternion_of, rotation_of
-from urdfkin.kinematics.roundings import SINGLE
+from urdfkin.kinematics.rotation import quaternion_of, rotation_from_quaternion
+from urdfkin.kinematics.roundings import SINGLE_ROUNDOFF
 from urdfkin.model.tree import (
-    LARGEST_ANGLE,
+    MAX_PLAUSIBLE_ANGLE,
     FloatArray,
     Joint,
     JointKind,
@@ -481,7 +481,7 @@ class _StageReader:
         while (prim := prim.GetParent()) and not prim.IsPseudoRoot():
             local = np.array(self._cache.GetLocalTransformation(prim)[0])[:3, :3]
             scale = np.linalg.norm(local, axis=1)
-            if np.ptp(scale) > _SHEAR * SINGLE * scale.max():
+            if np.ptp(scale) > _SHEAR * SINGLE_ROUNDOFF * scale.max():
                 return f"the scale {', '.join(f'{x:g}' for x in scale)} of {prim.GetPath()}"
         return None
 
@@ -498,7 +498,7 @@ class _StageReader:
         if np.linalg.det(M[:3, :3]) < 0.0:
             scale = -scale
         R = M[:3, :3] / scale
-        if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR * SINGLE * prim.GetPath().pathElementCount:
+        if np.abs(R.T @ R - np.eye(3)).max() > _SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount:
             message = "the frame of a prim has shear, so it cannot be the frame of a rigid body"
             remedy = "apply the scale to the shapes, not to a parent of a rotated body"
             raise InputError(message, where=where, found=self._uneven_scale(prim), remedy=remedy)
@@ -621,7 +621,7 @@ class _StageReader:
             found = f"{p.tolist()}, {quaternion}"
             raise InputError(message, where=f"{self.source}: joint {prim.GetPath()}", found=found)
         off = float(np.linalg.norm(_rounding(p))) * self._unit, _turned(xyzw)
-        R, p = rotation_of(xyzw / size), p * self._unit
+        R, p = rotation_from_quaternion(xyzw / size), p * self._unit
         if target is None:
             return None, pose(self._up @ R, self._up @ p), float(np.linalg.norm(p)), off
         other = self.stage.GetPrimAtPath(target)
@@ -656,7 +656,7 @@ class _StageReader:
                     turned |= rotates
                     moved |= not rotates or str(prim.GetPath()) != path
             prim = prim.GetParent()
-        return SINGLE * length if moved else 0.0, 2.0 * SINGLE if turned else 0.0
+        return SINGLE_ROUNDOFF * length if moved else 0.0, 2.0 * SINGLE_ROUNDOFF if turned else 0.0
 
     def _is_instanced(self, path: object) -> bool:
         return any(str(path).startswith(one) for one in self._instancers)
@@ -910,7 +910,7 @@ class _StageReader:
         if backwards:
             A, B, parent, child, axis = B, A, child, parent, -axis
         name, here, there = edge.name, links[parent], links[child]
-        mimic_error = SINGLE if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
+        mimic_error = SINGLE_ROUNDOFF if any(map(_is_mimic, _schemas(edge.prim))) else 0.0
         lever = float(np.linalg.norm(B[:3, 3]))
         self._single[name] = *edge.rounded, edge.size, mimic_error, lever
         if kind is JointKind.FIXED:
@@ -953,7 +953,7 @@ class _StageReader:
             return None if math.isinf(rate) else Limit(-math.inf, math.inf, rate, math.inf)
         largest = math.degrees(max(abs(lower), abs(upper)))
         turns = edge.kind is JointKind.REVOLUTE
-        if turns and _SMALLEST_ANGLE < largest <= LARGEST_ANGLE and upper > lower:
+        if turns and _SMALLEST_ANGLE < largest <= MAX_PLAUSIBLE_ANGLE and upper > lower:
             words = f"{math.degrees(lower):g} to {math.degrees(upper):g} degrees"
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
@@ -1106,7 +1106,7 @@ class _StageReader:
         if root.HasInfo(tokens.metersPerUnit):
             unit = float(root.GetInfo(tokens.metersPerUnit))
             factor = unit / self._unit
-            if abs(factor - 1.0) > SINGLE and not self._is_scaled(prim, factor):
+            if abs(factor - 1.0) > SINGLE_ROUNDOFF and not self._is_scaled(prim, factor):
                 what = f"the layer {name} has metersPerUnit {unit:g}, but the stage {self._unit:g}"
                 remedy = f"scale this prim by {factor:g}, or save the layer in the unit of the stage"
                 self._report("unit-scale", path, f"{what}; lengths of the layer are not converted", remedy)
@@ -1119,7 +1119,7 @@ class _StageReader:
     def _is_scaled(self, prim: Any, factor: float) -> bool:
         M = np.array(self._cache.GetLocalToWorldTransform(prim))[:3, :3]
         scale = np.linalg.norm(M, axis=1) / factor
-        return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE * prim.GetPath().pathElementCount).all())
+        return bool((np.abs(scale - 1.0) <= _SHEAR * SINGLE_ROUNDOFF * prim.GetPath().pathElementCount).all())
 
     def _is_resolved(self, prim: Any) -> bool:
         """Return whether a prim or an ancestor has a `unitsResolve` operation for units and axes."""

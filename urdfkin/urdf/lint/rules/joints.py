@@ -408,7 +408,7 @@ class _MimicChecker:
             self.check_range(joint, mimic, joint.limit)
 
     def check_range(self, joint: JointRecord, mimic: MimicRecord, limit: LimitRecord) -> None:
-        from urdfkin.model.configuration import allowed_range, range_words
+        from urdfkin.model.configuration import format_range, restrict_range
         from urdfkin.model.tree import Limit
 
         rule, leader = self.resolved(mimic)
@@ -416,14 +416,14 @@ class _MimicChecker:
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
         bounds = Limit(*limits, math.inf, math.inf)
-        low, high = allowed_range(rule, bounds, *moving)
+        low, high = restrict_range(rule, bounds, *moving)
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - LEAST_LOST) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
         # Rounding errors narrow a range of one value to an empty range.
-        single = [f"only {end:.6g}" for end in moving if allowed_range(rule, bounds, end, end) == (end, end)]
-        allowed = f"only {range_words((low, high))}" if low < high else (*single, "no value")[0]
-        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
+        single = [f"only {end:.6g}" for end in moving if restrict_range(rule, bounds, end, end) == (end, end)]
+        allowed = f"only {format_range((low, high))}" if low < high else (*single, "no value")[0]
+        message = f"the mimic joint leaves its limits: {leader.name!r} moves from {format_range(moving)}, "
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
             MIMIC_RANGE,
