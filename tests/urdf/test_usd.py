@@ -114,6 +114,15 @@ def reach(robot: urdfkin.Robot) -> float:
     return float(robot.placement([0.0, 0.0], "lower")[0, 3])
 
 
+def test_a_prismatic_joint_with_one_limit_keeps_this_limit_and_the_note_names_the_other(read: Read) -> None:
+    rail = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, "inf"), localPos0=(2, 0, 0))
+    robot = read(LINKS + SHOULDER + rail)
+    limit = present(robot.tree.joints[1].limit)
+    assert (limit.lower, limit.upper) == (-1.0, 1000.0)
+    what = "a prismatic joint without an upper limit gets +1000 m, because URDF requires limits"
+    assert findings(robot) == [f"USD102 /arm/rail: {what}"]
+
+
 def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks(read: Read) -> None:
     robot = read(ARM)
     assert (robot.name, robot.link_names) == ("arm", ("base", "upper", "lower"))
