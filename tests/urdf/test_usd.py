@@ -491,6 +491,10 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "a joint outside the articulation": (
         ARM + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"), ["USD101 /arm/closing"],
     ),
+    "a distance joint": (
+        ARM + joint("rope", "Distance", "upper", "lower"),
+        ["USD101 /arm/rope: a tree cannot represent this DistanceJoint"],
+    ),
     "a disabled joint": (
         ARM + joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false"),
         ["USD101 /arm/off"],
@@ -520,7 +524,7 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "an equality with more terms than the mimic rule": (equality(1), ["USD101 /arm/rail"]),
     "a joint with a schema that would be listed": (
         ARM + joint("weld", "Fixed", "lower", "base", OUTSIDE, '"MjcEqualityWeldAPI"'),
-        ["USD101 /arm/weld: a tree cannot represent this FixedJoint, which is outside the articulation"],
+        ["USD101 /arm/weld: this FixedJoint is excluded from the articulation"],
     ),
     "a PointInstancer of a shape": (
         ARM + CROWD % 'def Cube "one" {\n}\n',

@@ -422,11 +422,15 @@ _BLANKS = re.compile(r"[ \t\r\n]+")
 
 @dataclass(slots=True)
 class NumberReader:
-    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`."""
+    """Read numbers; report an invalid number by `bad_number`, and a wrong count by `bad_vector`.
+
+    `effect` is appended to these messages.
+    """
 
     report: Reporter
     bad_number: Rule = BAD_NUMBER
     bad_vector: Rule = BAD_VECTOR
+    effect: str = ""
 
     def scalar(self, element: Element, attribute: str, default: float | None = None) -> float | None:
         """Return a number; `default` if the attribute is missing, None if the number is invalid."""
@@ -460,7 +464,7 @@ class NumberReader:
                 return None
             values.append(value)
         if len(values) != count:
-            message = f"{attribute} needs {count} numbers, but has {len(values)}"
+            message = f"{attribute} needs {count} numbers, but has {len(values)}{self.effect}"
             remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quoted(written)}"
             self.report.add(
                 self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
@@ -480,9 +484,9 @@ class NumberReader:
             return value
         what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
         part = "" if piece == element.attributes[attribute] else "a part of "
-        message, remedy = f"{part}{what} is not a number", _remedy(piece)
+        message, remedy = f"{part}{what} is not a number{self.effect}", _remedy(piece)
         if value is not None:
-            message, remedy = f"{part}{what} is too large for a double", "check the exponent"
+            message, remedy = f"{part}{what} is too large for a double{self.effect}", "check the exponent"
         found = quoted(piece)
         self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
@@ -752,7 +756,8 @@ class JointReader:
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):  # The axis of these joints has no effect.
-            NumberReader(self.report, IGNORED, IGNORED).vector(axis, "xyz")
+            effect = f"; a {joint.kind} joint ignores its axis"
+            NumberReader(self.report, IGNORED, IGNORED, effect).vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
             joint.axis = self.numbers.vector(axis, "xyz")

@@ -589,8 +589,11 @@ class _StageReader:
             self._report("left-out-of-usd", path, f"both ends of this joint are in {where}")
             return None
         kind_name = str(prim.GetTypeName()).removeprefix("Physics")
-        if self._value(prim, "physics:excludeFromArticulation") or kind_name.endswith(_NO_JOINTS):
-            what = f"a tree cannot represent this {kind_name}, which is outside the articulation"
+        excluded = self._value(prim, "physics:excludeFromArticulation")
+        if excluded or kind_name.endswith(_NO_JOINTS):
+            what = f"a tree cannot represent this {kind_name}"
+            if excluded:
+                what = f"this {kind_name} is excluded from the articulation"
             self._report("left-out-of-usd", path, what)
             return None
         kind, axis, limits, free = self._motion(prim)

@@ -43,6 +43,10 @@ MESSAGES: dict[str, tuple[str | bytes, str, str]] = {
     "planar-without-xyz": (
         arm(attributes='type="planar"', limit="", axis="<axis/>"), "URDF505", "found <axis> without xyz",
     ),
+    "axis-of-a-fixed-joint": (
+        arm(attributes='type="fixed"', limit="", axis='<axis xyz="x 0 1"/>'), "URDF510",
+        "a part of xyz is not a number; a fixed joint ignores its axis",
+    ),
     "negative-pi": (
         arm(origin='<origin rpy="-1.5708 0 0"/>'), "URDF601",
         "rpy contains a rounded -pi/2, off by 3.7e-06 rad",
