@@ -119,6 +119,15 @@ def reach(robot: urdfkin.Robot) -> float:
     return float(robot.placement([0.0, 0.0], "lower")[0, 3])
 
 
+def test_a_prismatic_joint_with_one_limit_keeps_this_limit_and_the_note_names_the_other(read: Read) -> None:
+    rail = joint("rail", "Prismatic", "upper", "lower", axis="Y", limits=(-1, "inf"), localPos0=(2, 0, 0))
+    robot = read(LINKS + SHOULDER + rail)
+    limit = present(robot.tree.joints[1].limit)
+    assert (limit.lower, limit.upper) == (-1.0, 1000.0)
+    what = "a prismatic joint without an upper limit gets +1000 m, because URDF requires limits"
+    assert findings(robot) == [f"USD102 /arm/rail: {what}"]
+
+
 def test_joints_move_as_usdphysics_defines_and_the_certificate_states_the_checks(read: Read) -> None:
     robot = read(ARM)
     assert (robot.name, robot.link_names) == ("arm", ("base", "upper", "lower"))
@@ -487,6 +496,10 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "a joint outside the articulation": (
         ARM + CLOSING.replace("\n}", f"\n{OUTSIDE}\n}}"), ["USD101 /arm/closing"],
     ),
+    "a distance joint": (
+        ARM + joint("rope", "Distance", "upper", "lower"),
+        ["USD101 /arm/rope: a tree cannot represent this DistanceJoint"],
+    ),
     "a disabled joint": (
         ARM + joint("off", "Fixed", "upper", "lower", "bool physics:jointEnabled = false"),
         ["USD101 /arm/off"],
@@ -516,7 +529,7 @@ LISTED: dict[str, tuple[str, list[str]]] = {
     "an equality with more terms than the mimic rule": (equality(1), ["USD101 /arm/rail"]),
     "a joint with a schema that would be listed": (
         ARM + joint("weld", "Fixed", "lower", "base", OUTSIDE, '"MjcEqualityWeldAPI"'),
-        ["USD101 /arm/weld: a tree cannot represent this FixedJoint, which is outside the articulation"],
+        ["USD101 /arm/weld: this FixedJoint is excluded from the articulation"],
     ),
     "a PointInstancer of a shape": (
         ARM + CROWD % 'def Cube "one" {\n}\n',

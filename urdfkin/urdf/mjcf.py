@@ -353,7 +353,7 @@ def _left_out(mujoco: Any, spec: Any) -> Iterator[Listed]:
             yield Listed(what, f"equality {one.name or i}", moves=bool(one.active))
     useless = dict(_useless(spec))
     for words, tag in (("tendons", "tendon"), ("flexes", "flex")):
-        if words in useless:
+        if useless.pop(words, None):
             yield Listed(f"urdfkin ignores {words}", tag, moves=True)
     if useless:
         counts = ", ".join(f"{len(found)} {words}" for words, found in useless.items())

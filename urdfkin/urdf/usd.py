@@ -589,8 +589,11 @@ class _StageReader:
             self._report("left-out-of-usd", path, f"both ends of this joint are in {where}")
             return None
         kind_name = str(prim.GetTypeName()).removeprefix("Physics")
-        if self._value(prim, "physics:excludeFromArticulation") or kind_name.endswith(_NO_JOINTS):
-            what = f"a tree cannot represent this {kind_name}, which is outside the articulation"
+        excluded = self._value(prim, "physics:excludeFromArticulation")
+        if excluded or kind_name.endswith(_NO_JOINTS):
+            what = f"a tree cannot represent this {kind_name}"
+            if excluded:
+                what = f"this {kind_name} is excluded from the articulation"
             self._report("left-out-of-usd", path, what)
             return None
         kind, axis, limits, free = self._motion(prim)
@@ -958,7 +961,11 @@ class _StageReader:
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            what = f"a prismatic joint without limits gets +-{UNBOUNDED:g} m, because URDF requires limits"
+            absent, value = "limits", f"+-{UNBOUNDED:g}"
+            if math.isfinite(lower) or math.isfinite(upper):
+                absent, value = ("an upper limit", "+") if math.isfinite(lower) else ("a lower limit", "-")
+                value += f"{UNBOUNDED:g}"
+            what = f"a prismatic joint without {absent} gets {value} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
             lower, upper = (x if math.isfinite(x) else math.copysign(UNBOUNDED, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)

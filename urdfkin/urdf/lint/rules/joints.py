@@ -164,7 +164,9 @@ def check_axes(report: Reporter, robot: RobotRecord) -> None:
 
 def _written(joint: JointRecord) -> str:
     axis = joint.axis_element
-    return f"xyz={quoted(axis.attributes.get('xyz', ''))}" if axis is not None else 'the default "1 0 0"'
+    if axis is None:
+        return 'the default "1 0 0"'
+    return f"xyz={quoted(axis.attributes['xyz'])}" if "xyz" in axis.attributes else "<axis> without xyz"
 
 
 def _check_axis(report: Reporter, joint: JointRecord) -> None:
@@ -559,14 +561,15 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
     if not off or joint.origin_element is None:
         return
     origin = joint.origin_element
+    named = f"-{_as_pi(multiple)}" if meant < 0.0 else _as_pi(multiple)
     moves = f", which moves the links below by up to {_metres(off * reach)}" if reach > 0.0 else ""
     report.add(
         ROUNDED_PI,
-        f"rpy contains a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
+        f"rpy contains a rounded {named}, off by {off:.1e} rad{moves}",
         origin,
         attribute="rpy",
         found=quoted(text),
-        remedy=f"write {meant!r} if you mean {_as_pi(multiple)}; urdfkin uses the value in the file",
+        remedy=f"write {meant!r} if you mean {named}; urdfkin uses the value in the file",
         severity=Severity.WARNING if off * reach > NOTICEABLE else None,
         weight=off * reach,
         fix=lambda: report.rewritten(origin, "rpy", _replace_words(report.raw(origin, "rpy"), exact), turns),
@@ -653,7 +656,7 @@ def _check_places(report: Reporter, robot: RobotRecord) -> None:
         first = places.setdefault(place, joint)
         if first is not joint:
             message = f"the joint has the same origin and axis as joint {quoted(first.name)}"
-            remedy = "ignore this finding if both joints are intended"
+            remedy = "correct one of the two origins, or ignore this note if both joints are intended"
             report.add(SAME_PLACE, message, joint.element, remedy=remedy)
 
 
@@ -679,5 +682,5 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
         found = quoted(element.attributes.get("xyz", ""))
         report.add(OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent")
     elif 0.0 < whole < TINY:
-        message = f"the sum of all lengths of the robot is {_metres(whole)}"
+        message = f"the joint origins along the longest chain of the robot add up to {_metres(whole)}"
         report.add(TINY_ROBOT, message, robot.element, remedy="write lengths in metres")
