@@ -30,7 +30,7 @@ from urdfkin.report.words import more_accurate_counts
 from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.findings import WRITTEN_OUT, shortened
+from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, shorten
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.pages import page as page_of
@@ -75,7 +75,7 @@ LIMITS = {
     "--max-name": (DEFAULT_LIMITS.name, "characters of a name"),
     "--max-number": (DEFAULT_LIMITS.number, "characters of a number"),
     "--max-markup": (DEFAULT_LIMITS.markup, "bytes of one tag or comment"),
-    "": (WRITTEN_OUT, "complete findings of a kind, also in JSON and SARIF"),
+    "": (MAX_COMPLETE_FINDINGS, "complete findings of a kind, also in JSON and SARIF"),
 }
 
 
@@ -90,7 +90,7 @@ def findings() -> dict[str, str]:
                 rule.id,
                 rule.slug,
                 rule.severity.value,
-                _cell(shortened(page_of(rule.id).title, 200)),
+                _cell(shorten(page_of(rule.id).title, 200)),
                 f"*{rule.oracle.value}*" if rule.oracle else "",
             )
             for rule in RULES.values()
@@ -100,9 +100,11 @@ def findings() -> dict[str, str]:
         codes.append(f"### {family}\n\n{table(heads, rows)}\n")
     found = []
     for name, finding in ((one, finding) for one in catalogue() for finding in warnings_of(one)):
-        lines = f"line {finding.line}" + (f" and {len(finding.also)} more" if finding.also else "")
+        lines = f"line {finding.line}" + (
+            f" and {len(finding.other_lines)} more" if finding.other_lines else ""
+        )
         what = f"{finding.subject}: {finding.message}" if finding.subject else finding.message
-        found.append((name, finding.code, lines, _cell(shortened(what, 200)), REMARKS[finding.code]))
+        found.append((name, finding.code, lines, _cell(shorten(what, 200)), REMARKS[finding.code]))
     return {
         "limits": table(("limit", "option"), limits).replace("|  |", "| |"),
         "codes": "\n".join(codes),

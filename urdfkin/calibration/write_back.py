@@ -38,13 +38,13 @@ def with_origins(data: bytes, origins: Mapping[str, FloatArray]) -> bytes:
     """
     report = Reporter("<text>", data)
     urdf = read_urdf(report, mimic=False)  # Mimic rules do not affect origins.
-    if urdf is None or report.failed:
+    if urdf is None or report.has_errors:
         errors = [one for one in report.findings() if one.severity is Severity.ERROR]
         raise InputError("a URDF with errors is not edited", found=str(errors[0]))
     mark = codecs.BOM_UTF8 if data.startswith(codecs.BOM_UTF8) else b""
     edits = list[Edit]()
     for name, T in origins.items():
-        if (joint := urdf.by_name.get(name)) is None:
+        if (joint := urdf.joints_by_name.get(name)) is None:
             raise InputError("the URDF has no such joint", found=repr(name))
         edits += _edits(report.data, joint, T)
     return mark + edited(report.data, edits)

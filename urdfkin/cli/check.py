@@ -33,7 +33,7 @@ from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
 from urdfkin.system.git import Version, version_before
 from urdfkin.system.lazy_import import installed_version
-from urdfkin.urdf.findings import Excerpts, UrdfError, UrdfWarning
+from urdfkin.urdf.findings import ExcerptFormatter, UrdfError, UrdfWarning
 from urdfkin.urdf.lint import Finding, Limits, Severity
 from urdfkin.urdf.lint.autofix import mend, patch
 from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
@@ -52,7 +52,7 @@ from urdfkin.urdf.lint.settings import (
     read_baseline,
     read_settings,
 )
-from urdfkin.urdf.sources import USD, Text, is_usd, is_xacro, read_source
+from urdfkin.urdf.sources import USD_SUFFIXES, Text, is_usd, is_xacro, read_source
 
 STYLES = ("terminal", "concise", "json", "sarif", "github")
 _COLOURS = {Severity.ERROR: "red", Severity.WARNING: "yellow", Severity.NOTE: "blue"}
@@ -72,7 +72,7 @@ class CheckOutcome:
 
     files: list[str] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
-    silenced: list[tuple[Finding, str]] = field(default_factory=list)
+    silenced_findings: list[tuple[Finding, str]] = field(default_factory=list)
     excerpts: list[str | None] = field(default_factory=list)
     errors: list[UrdfkinError] = field(default_factory=list)
     unchanged: int = 0
@@ -83,19 +83,19 @@ class CheckOutcome:
     unsafe: int = 0
 
     def add(self, file: str, found: Examined) -> None:
-        excerpts = Excerpts(found.data)
+        formatter = ExcerptFormatter(found.data)
         self.files.append(file)
         self.findings += found.findings
-        self.silenced += found.silenced
-        self.excerpts += [excerpts.of(finding) for finding in found.findings]
+        self.silenced_findings += found.silenced_findings
+        self.excerpts += [formatter.format(finding) for finding in found.findings]
 
 
 def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> None:
     findings, version = outcome.findings, installed_version("urdfkin") or "0+unknown"
     if style == "json":
-        click.echo(as_json(findings, outcome.files, version, outcome.silenced))
+        click.echo(as_json(findings, outcome.files, version, outcome.silenced_findings))
     elif style == "sarif":
-        click.echo(as_sarif(findings, version, outcome.silenced))
+        click.echo(as_sarif(findings, version, outcome.silenced_findings))
     elif style == "github":
         if findings:
             command_lines(as_github(findings))
@@ -132,7 +132,7 @@ def _print_findings(outcome: CheckOutcome, *, excerpts: bool) -> None:
 
 def _print_summary(outcome: CheckOutcome) -> None:
     counts = [
-        (len(outcome.silenced), "silenced by comments: {}"),
+        (len(outcome.silenced_findings), "silenced by comments: {}"),
         (outcome.unchanged, "unchanged files: {}"),
         (outcome.known, "already known: {}"),
         (outcome.gone, "listed in the baseline but no longer found: {}; write the baseline again"),
@@ -144,7 +144,7 @@ def _print_summary(outcome: CheckOutcome) -> None:
 def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:
     for code in sorted({finding.code for finding in fixed}):
         same_code = [finding for finding in fixed if finding.code == code]
-        turns = max(finding.fix.turns for finding in same_code if finding.fix)
+        turns = max(finding.fix.max_rotation for finding in same_code if finding.fix)
         lines = sorted({finding.line for finding in same_code})
         more = f" and {len(lines) - 4} more" if len(lines) > 4 else ""
         where = f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:4]))}{more}"
@@ -415,12 +415,12 @@ class CheckRun:
                 return
         if self.fix or self.diff:
             text = self._fix(file, text, lambda: self.choice.again(text, before))
-        found = self.look(text, fold=self.fold, wanted=self.choice.of(text, before))
+        found = self.look(text, fold=self.fold, is_reported=self.choice.of(text, before))
         findings = [self._with_severity(finding) for finding in found.findings]
         self.outcome.add(file, replace(found, findings=tuple(findings)))
 
     def _check_usd_or_mjcf(self, file: str) -> None:
-        suffixes = USD if is_usd(file) else _MJCF
+        suffixes = USD_SUFFIXES if is_usd(file) else _MJCF
         if self.version is not None and self._is_unchanged(file, suffixes, self.version):
             self.outcome.unchanged += 1
             return

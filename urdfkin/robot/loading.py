@@ -337,7 +337,7 @@ def robot_of(
     report = Reporter(text.label, text.data)
     urdf = read_urdf(report, mimic=mimic, root_joint=root_joint)
     findings = (*listed, *report.findings())
-    if urdf is None or report.failed:
+    if urdf is None or report.has_errors:
         raise UrdfError(findings)
     if text.entry is None and not quiet:
         for finding in findings:
@@ -355,7 +355,7 @@ def robot_of(
         verify=verify,
         mimic=mimic,
         findings=findings,
-        unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced))),
+        unverifiable=_unverifiable((*findings, *(finding for finding, _ in report.silenced_findings))),
         oracle=oracle,
         base_frame=text.entry.base if text.entry else None,
         tip_frame=text.entry.tip if text.entry else None,

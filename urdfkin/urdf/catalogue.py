@@ -112,17 +112,17 @@ def _read(file: str, *, own: bool) -> dict[str, Entry]:
 
 
 #: Environment variables with search paths for packages.
-VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
+PACKAGE_PATH_VARIABLES = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 
 _NAME = re.compile(rb"<name>([^<]*)</name>")
 
 #: Schemes of addresses that consist of a package name and a path in the package.
-SCHEMES = ("package://", "model://")
+PACKAGE_SCHEMES = ("package://", "model://")
 
 
 def split_uri(uri: str) -> tuple[str, str] | None:
     """Return package and path of a `package://` or `model://` address; None for other text."""
-    for scheme in SCHEMES:
+    for scheme in PACKAGE_SCHEMES:
         if uri.startswith(scheme):
             package, _, path = uri.removeprefix(scheme).partition("/")
             return package, path

@@ -19,7 +19,7 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, unique
+from urdfkin.urdf.mjcf import SLIDE_LIMIT, fixed_joint, unique
 from urdfkin.urdf.parser import QUATERNION
 from urdfkin.urdf.reader import joint_rows, root_link
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
@@ -273,7 +273,7 @@ class _ModelReader:
             if kind.turns:
                 kind = JointKind.CONTINUOUS
             else:
-                lower, upper = max(lower, -UNBOUNDED), min(upper, UNBOUNDED)
+                lower, upper = max(lower, -SLIDE_LIMIT), min(upper, SLIDE_LIMIT)
         return Joint(name, kind, 0, T, axis, Limit(lower, upper, speed, effort))
 
 

@@ -44,7 +44,7 @@ from urdfkin.system.files import at_home, read_start
 from urdfkin.urdf.mujoco import compiled, library
 
 #: Limit (m) that replaces a missing limit of a prismatic joint, because URDF requires limits.
-UNBOUNDED = 1000.0
+SLIDE_LIMIT = 1000.0
 #: The beginning of an MJCF text. Possessive quantifiers keep the matching time linear.
 _ROOT = re.compile(r"(?>\s+|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*+>)*+<mujoco[\s/>]", re.DOTALL)
 _SUFFIXES = (".xml", ".mjcf")
@@ -488,9 +488,9 @@ class _MjcfReader:
             return kind, Limit(lower, upper, np.inf, effort)
         if turns:
             return JointKind.CONTINUOUS, None
-        what = f"a slide joint without limits gets +-{UNBOUNDED:g} m, because URDF requires limits"
+        what = f"a slide joint without limits gets +-{SLIDE_LIMIT:g} m, because URDF requires limits"
         self.listed.append(Listed(what, f"joint {name}"))
-        return JointKind.PRISMATIC, Limit(-UNBOUNDED, UNBOUNDED, np.inf, effort)
+        return JointKind.PRISMATIC, Limit(-SLIDE_LIMIT, SLIDE_LIMIT, np.inf, effort)
 
     def _rules(self) -> Iterator[tuple[str, Mimic]]:
         m, rules = self.model, dict[str, Mimic]()

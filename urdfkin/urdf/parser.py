@@ -22,10 +22,10 @@ from xml.parsers import expat
 from urdfkin.errors.numbers import DECIMAL
 from urdfkin.system.files import Edit
 from urdfkin.urdf.findings import (
+    COMMENT_MARK,
     ERROR,
-    MARK,
+    MAX_QUOTE_LENGTH,
     NOTE,
-    QUOTED,
     REFUSES,
     WARNING,
     Comment,
@@ -33,9 +33,9 @@ from urdfkin.urdf.findings import (
     Reporter,
     Rule,
     Severity,
-    blanks_before,
-    quoted,
-    shortened,
+    quote,
+    shorten,
+    start_of_blanks,
 )
 from urdfkin.urdf.records import (
     FURTHER_LIMITS,
@@ -51,14 +51,14 @@ from urdfkin.urdf.records import (
 
 EMPTY = Rule("URDF101", "empty-file", ERROR)
 ENCODING = Rule("URDF102", "not-utf8", ERROR)
-DECLARED = Rule("URDF103", "declared-encoding", ERROR)
-DECLARED_ASCII = Rule("URDF104", "declared-encoding-unused", WARNING)
+DECLARED_ENCODING = Rule("URDF103", "declared-encoding", ERROR)
+UNUSED_DECLARED_ENCODING = Rule("URDF104", "declared-encoding-unused", WARNING)
 XML_VERSION = Rule("URDF111", "xml-version", WARNING)
 BYTE_ORDER_MARK = Rule("URDF113", "byte-order-mark", NOTE)
 
 #: First bytes of XML files in UTF-32 and UTF-16: a byte order mark, or the character '<'.
 #: UTF-32 must be tested first, because its byte order mark FF FE 00 00 begins with UTF-16's mark FF FE.
-_WIDE = {
+_WIDE_ENCODINGS = {
     "UTF-32": (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, b"<\0\0\0", b"\0\0\0<"),
     "UTF-16": (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, b"<\0", b"\0<"),
 }
@@ -77,7 +77,7 @@ def utf8_bytes(report: Reporter, data: bytes) -> bytes | None:
         what = "the file is empty" if not data else "the file contains only white space"
         report.add(EMPTY, what, remedy="check the program that wrote the file")
         return None
-    wide = next((encoding for encoding, begins in _WIDE.items() if data.startswith(begins)), None)
+    wide = next((encoding for encoding, begins in _WIDE_ENCODINGS.items() if data.startswith(begins)), None)
     if wide is not None:
         report.add(ENCODING, "the file is not UTF-8 text", found=wide, remedy="save the file as UTF-8")
         return None
@@ -121,7 +121,7 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
     declaration = _DECLARATION.match(text)
     version = _XML_VERSION.search(declaration[0]) if declaration else None
     if version is not None and version[1] != b"1.0":
-        found = quoted(version[1].decode())
+        found = quote(version[1].decode())
         report.add(XML_VERSION, "the XML version is not 1.0", found=found, remedy='write version="1.0"')
     if declared is None or _codec(declared) in ("utf-8", "ascii"):
         return True
@@ -129,11 +129,11 @@ def _agrees(report: Reporter, text: bytes, declared: str | None) -> bool:
         message = "the declared encoding is not UTF-8, but every character is ASCII"
         match = _ENCODING.search(text)
         fix = None if match is None else Fix((Edit(*match.span(1), "UTF-8"),))
-        remedy, found = 'write encoding="UTF-8"', quoted(declared)
-        report.add(DECLARED_ASCII, message, found=found, remedy=remedy, fix=lambda: fix)
+        remedy, found = 'write encoding="UTF-8"', quote(declared)
+        report.add(UNUSED_DECLARED_ENCODING, message, found=found, remedy=remedy, fix=lambda: fix)
         return True
     remedy = 'save the file as UTF-8 and write encoding="UTF-8"'
-    report.add(DECLARED, "the declared encoding is not UTF-8", found=quoted(declared), remedy=remedy)
+    report.add(DECLARED_ENCODING, "the declared encoding is not UTF-8", found=quote(declared), remedy=remedy)
     return False
 
 
@@ -170,13 +170,13 @@ MARKUP_TOO_LONG = Rule("URDF119", "markup-too-long", ERROR)
 COMMON_DEPTH = 256
 
 #: Number of bytes that expat parses in one call.
-_PIECE = 1_000_000
+_CHUNK_SIZE = 1_000_000
 
 #: If the stored text of an element has at least this many characters, the parser ignores further text.
-_STORED = 2 * QUOTED
+_MAX_STORED_TEXT = 2 * MAX_QUOTE_LENGTH
 
 #: Attributes whose value is the name of a link or joint.
-_NAMES = frozenset({"name", "link", "joint"})
+_NAME_ATTRIBUTES = frozenset({"name", "link", "joint"})
 
 
 class _StopError(Exception):
@@ -223,7 +223,7 @@ class _Builder:
         self.count = self.deepest = 0
         self.deepest_element: Element | None = None
         self.waiting: list[Comment] = []
-        self.marked = MARK.encode() in report.data
+        self.marked = COMMENT_MARK.encode() in report.data
         self.parser = parser = expat.ParserCreate("utf-8")
         parser.buffer_text = True
         parser.StartElementHandler = self.start
@@ -236,7 +236,7 @@ class _Builder:
 
     def read(self, data: bytes) -> None:
         """Parse the file in pieces, and refuse a tag, comment or instruction that is too long."""
-        whole, size = memoryview(data), min(_PIECE, self.limits.markup)
+        whole, size = memoryview(data), min(_CHUNK_SIZE, self.limits.markup)
         for start in range(0, len(whole), size):
             fed = min(start + size, len(whole))
             self.parser.Parse(whole[start:fed], False)
@@ -257,7 +257,7 @@ class _Builder:
             if not self.marked:
                 self.parser.CommentHandler = None
         else:
-            element.above = None if parent is self.root else parent.holder
+            element.top_ancestor = None if parent is self.root else parent.top_element
             parent.append(element)
         for comment in self.waiting:
             comment.element = element
@@ -275,18 +275,18 @@ class _Builder:
         if self.count > most.elements:
             self.refuse(TOO_MANY_ELEMENTS, "elements", "too many elements", f"more than {most.elements}")
         if len(attributes) > most.attributes:
-            found = f"{len(attributes)} in <{shortened(tag)}>, more than {most.attributes}"
+            found = f"{len(attributes)} in <{shorten(tag)}>, more than {most.attributes}"
             self.refuse(TOO_MANY_ATTRIBUTES, "attributes", "an element has too many attributes", found)
         if len(tag) > most.name:
             self.refuse_name("an element", tag)
         for key, value in attributes.items():
             if len(key) > most.name:
                 self.refuse_name("an attribute", key)
-            if len(value) > most.name and key in _NAMES:
+            if len(value) > most.name and key in _NAME_ATTRIBUTES:
                 self.refuse_name("a link or joint", value)
 
     def refuse_name(self, owner: str, name: str) -> None:
-        found = f"{quoted(name, 30)} of {len(name)} characters, more than {self.limits.name}"
+        found = f"{quote(name, 30)} of {len(name)} characters, more than {self.limits.name}"
         self.refuse(NAME_TOO_LONG, "name", f"the name of {owner} is too long", found)
 
     def refuse(self, code: Rule, limit: str, message: str, found: str) -> None:
@@ -302,15 +302,15 @@ class _Builder:
 
     def characters(self, text: str) -> None:
         element = self.open[-1]
-        if len(element.text) < _STORED and not text.isspace():
-            element.text += (text if element.text else text.lstrip())[:_STORED]
+        if len(element.text) < _MAX_STORED_TEXT and not text.isspace():
+            element.text += (text if element.text else text.lstrip())[:_MAX_STORED_TEXT]
 
     def comment(self, text: str) -> None:
         self.begun = True
-        if text.lstrip().startswith(MARK):
-            start = blanks_before(self.report.data, self.parser.CurrentByteIndex, b" \t")
-            behind = start > 0 and self.report.data[start - 1] not in b"\r\n"
-            comment = Comment(text, *self.position(), behind)
+        if text.lstrip().startswith(COMMENT_MARK):
+            start = start_of_blanks(self.report.data, self.parser.CurrentByteIndex, b" \t")
+            follows_text = start > 0 and self.report.data[start - 1] not in b"\r\n"
+            comment = Comment(text, *self.position(), follows_text)
             self.report.comments.append(comment)
             self.waiting.append(comment)
 
@@ -318,7 +318,7 @@ class _Builder:
         if self.begun:
             message = "a processing instruction is not at the beginning of the file; urdfdom refuses the file"
             remedy = "remove the instruction, or move it before every element, comment and document type"
-            found = quoted(f"<?{target} {text}".strip() + "?>")
+            found = quote(f"<?{target} {text}".strip() + "?>")
             self.report.add(INSTRUCTION, message, found=found, remedy=remedy, position=self.position())
 
     def doctype(self, name: str, system: str | None, public: str | None, has_subset: int) -> None:
@@ -328,11 +328,11 @@ class _Builder:
         position = line_and_column(self.report.data, start)
         if system is None and public is None and not has_subset:
             message = "a document type declaration has no use in a URDF"
-            remedy, found = "remove the declaration, which is ignored", quoted(f"<!DOCTYPE {name}>")
+            remedy, found = "remove the declaration, which is ignored", quote(f"<!DOCTYPE {name}>")
             self.report.add(DOCTYPE, message, found=found, remedy=remedy, position=position)
             return
         what = "contains definitions" if has_subset else "refers to an external definition"
-        found = quoted(f"<!DOCTYPE {name} [...") if system is None else quoted(system)
+        found = quote(f"<!DOCTYPE {name} [...") if system is None else quote(system)
         message = f"the document type declaration {what}"
         remedy = "remove the declaration and write the values directly; nothing was expanded or opened"
         self.report.add(ENTITY, message, found=found, remedy=remedy, position=position)
@@ -345,7 +345,7 @@ class _Builder:
     def undefined_entity(self, name: str | None) -> None:
         message = "the file uses an entity that XML does not define"
         remedy = "write the character itself, or one of &lt; &gt; &amp; &quot; &apos;"
-        found = quoted(f"&{name};") if name else None
+        found = quote(f"&{name};") if name else None
         self.report.add(ENTITY, message, found=found, remedy=remedy, position=self.position())
 
     def syntax_error(self, error: expat.ExpatError) -> None:
@@ -373,7 +373,7 @@ class _Builder:
         start = self.parser.ErrorByteIndex
         line = (self.report.data[start : start + 120].splitlines() or [b""])[0]
         text = line.decode("utf-8", "replace")[:30]
-        return quoted(text) if text.strip() else None
+        return quote(text) if text.strip() else None
 
 
 _ENTITY = re.compile(rb"&([A-Za-z_:\x80-\xff][^;\s<>&\"']{0,60});")
@@ -453,7 +453,7 @@ class NumberReader:
             values.append(value)
         if len(values) != count:
             message = f"{attribute} needs {count} numbers, but has {len(values)}"
-            remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quoted(written)}"
+            remedy, found = f"write {count} numbers separated by spaces", f"{attribute}={quote(written)}"
             self.report.add(
                 self.bad_vector, message, element, attribute=attribute, found=found, remedy=remedy
             )
@@ -467,15 +467,15 @@ class NumberReader:
         if value is not None and math.isfinite(value):
             if value == 0.0 and re.search("[1-9]", re.split("[eE]", piece)[0]):
                 message = f"{attribute} contains a number too small for a double, which is read as zero"
-                remedy, found = "check the exponent", quoted(piece)
+                remedy, found = "check the exponent", quote(piece)
                 self.report.add(UNDERFLOW, message, element, attribute=attribute, found=found, remedy=remedy)
             return value
-        what = attribute if element.tag in _PLAIN else f"{attribute} of <{element.tag}>"
+        what = attribute if element.tag in _ELEMENTS_NOT_NAMED else f"{attribute} of <{element.tag}>"
         part = "" if piece == element.attributes[attribute] else "a part of "
         message, remedy = f"{part}{what} is not a number", _remedy(piece)
         if value is not None:
             message, remedy = f"{part}{what} is too large for a double", "check the exponent"
-        found = quoted(piece)
+        found = quote(piece)
         self.report.add(self.bad_number, message, element, attribute=attribute, found=found, remedy=remedy)
         return None
 
@@ -483,7 +483,7 @@ class NumberReader:
         """Report text that is too long, because converting text to a number takes quadratic time."""
         if len(written) <= most:
             return False
-        found = f"{quoted(written, 30)} of {len(written)} characters, more than {most}"
+        found = f"{quote(written, 30)} of {len(written)} characters, more than {most}"
         remedy = "write 17 digits, enough for every double, or raise the limit with --max-number"
         self.report.add(
             NUMBER_TOO_LONG, f"{attribute} is too long for a number", element,
@@ -494,10 +494,12 @@ class NumberReader:
     def _check_raw(self, element: Element, attribute: str, count: int) -> None:
         """Report tabs and line ends between or after numbers: urdfdom refuses these characters."""
         # expat replaces tabs and line ends in attributes by spaces, so this check reads the raw text.
-        raw = self.report.raw(element, attribute)
-        if raw is None or self._is_too_long(element, attribute, raw, count * self.report.limits.number):
+        raw_value = self.report.raw_value(element, attribute)
+        if raw_value is None or self._is_too_long(
+            element, attribute, raw_value, count * self.report.limits.number
+        ):
             return
-        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw))
+        seen = html.unescape(_LEADING_ZEROS.sub(r"\1", raw_value))
         pieces = [seen] if count == 1 else [piece for piece in seen.split(" ") if piece]
         if not all(DECIMAL.fullmatch(piece.lstrip("\t\r\n ")) for piece in pieces):
             self._report_refused(element, attribute, "a tab or line end between or after the numbers")
@@ -512,15 +514,15 @@ class NumberReader:
             message,
             element,
             attribute=attribute,
-            found=quoted(self.report.raw(element, attribute) or value),
+            found=quote(self.report.raw_value(element, attribute) or value),
             remedy="write single spaces between numbers and none around them",
-            fix=lambda: self.report.rewritten(element, attribute, " ".join(value.split())),
+            fix=lambda: self.report.make_value_fix(element, attribute, " ".join(value.split())),
         )
 
 
 #: For an attribute of these elements, a message about an invalid number names only the attribute.
 #: For other elements, the message also names the element.
-_PLAIN = ("origin", "axis", "limit")
+_ELEMENTS_NOT_NAMED = ("origin", "axis", "limit")
 
 #: Leading zeros of a character reference. `html.unescape` fails for thousands of zeros.
 _LEADING_ZEROS = re.compile(r"(&#[xX]?)0+")
@@ -558,7 +560,7 @@ DUPLICATE_NAME = Rule("URDF402", "duplicate-name", ERROR)
 UNKNOWN_TYPE = Rule("URDF501", "unknown-joint-type", ERROR)
 EMPTY_AXIS = Rule("URDF504", "axis-without-xyz", ERROR)
 MISSING_LIMIT = Rule("URDF506", "missing-limit", ERROR)
-IGNORED = Rule("URDF510", "ignored-value", WARNING)
+IGNORED_VALUE = Rule("URDF510", "ignored-value", WARNING)
 QUATERNION_IGNORED = Rule("URDF511", "quat-xyzw-ignored", WARNING)
 QUATERNION = Rule("URDF512", "quat-xyzw", WARNING)
 BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
@@ -566,11 +568,11 @@ BAD_QUATERNION = Rule("URDF513", "bad-quaternion", ERROR)
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "planar", "floating")
 
 #: Newest URDF version that urdfdom 6 supports.
-NEWEST = (1, 2)
+NEWEST_VERSION = (1, 2)
 _VERSION = re.compile(r"\s*\+?([0-9]+)\.\+?([0-9]+)")
 
 #: The square of a length between these bounds neither underflows nor overflows.
-SHORTEST, LONGEST = 1e-150, 1e150
+MIN_VECTOR_LENGTH, MAX_VECTOR_LENGTH = 1e-150, 1e150
 
 
 def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
@@ -579,7 +581,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
         return None
     version = _version(report, root)
     robot = RobotRecord(root, version)
-    for element in root.all("link"):
+    for element in root.find_all("link"):
         name = named(report, element)
         if name and name in robot.links:
             report_duplicate(report, element, robot.links[name])
@@ -587,7 +589,7 @@ def read_robot(report: Reporter, root: Element) -> RobotRecord | None:
             robot.links[name] = element
     reader = JointReader(report, version)
     seen: dict[str, Element] = {}
-    for element in root.all("joint"):
+    for element in root.find_all("joint"):
         joint = reader.read(element)
         if joint.name and joint.name in seen:
             report_duplicate(report, element, seen[joint.name])
@@ -630,7 +632,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
     rule, remedy = VERSION, 'write version="1.0" if the file follows URDF 1.0, or remove the attribute'
     if version is None:
         message = "a URDF version has the form 1.0"
-    elif version > NEWEST:
+    elif version > NEWEST_VERSION:
         message = "the URDF version is later than 1.2, the last version that urdfdom and Pinocchio read"
         remedy = "write the version that the file follows, 1.0 to 1.2"
     elif version < (1, 0):
@@ -640,7 +642,7 @@ def _version(report: Reporter, root: Element) -> tuple[int, int]:
     else:
         rule, message = NEWER_VERSION, "most readers support only URDF 1.0"
         remedy = "remove the attribute unless the file uses features of the version"
-    report.add(rule, message, root, attribute="version", found=quoted(written), remedy=remedy)
+    report.add(rule, message, root, attribute="version", found=quote(written), remedy=remedy)
     return version if version is not None and rule is NEWER_VERSION else (1, 0)
 
 
@@ -682,7 +684,7 @@ class JointReader:
         if value is None or not (value or number):
             empty = "" if value is None else ", which is empty"
             message = f"<{element.tag}> needs the attribute {attribute}{empty}"
-            found, remedy = quoted(element.text) if element.text else None, f"write {example}"
+            found, remedy = quote(element.text) if element.text else None, f"write {example}"
             self.report.add(
                 MISSING_ATTRIBUTE, message, element, attribute=attribute, found=found, remedy=remedy
             )
@@ -695,19 +697,19 @@ class JointReader:
         close = nearest_tag(written, frozenset(JOINT_TYPES))
         message = "unknown joint type"
         remedy = f"did you mean {close}?" if close else f"the types are {', '.join(JOINT_TYPES)}"
-        found = quoted(written)
+        found = quote(written)
         self.report.add(UNKNOWN_TYPE, message, element, attribute="type", found=found, remedy=remedy)
         return None
 
     def _end(self, element: Element, tag: str) -> str | None:
         example = f'<{tag} link="..."/>'
-        if (end := element.first(tag)) is None:
+        if (end := element.find(tag)) is None:
             self.report.add(MISSING_ELEMENT, f"the joint has no <{tag}>", element, remedy=f"write {example}")
             return None
         return self.required(end, "link", example)
 
     def _origin(self, joint: JointRecord) -> None:
-        origin = joint.origin_element = joint.element.first("origin")
+        origin = joint.origin_element = joint.element.find("origin")
         if origin is None:
             return
         joint.xyz = self.numbers.vector(origin, "xyz") or joint.xyz
@@ -716,7 +718,7 @@ class JointReader:
             self._quaternion(joint, origin)
 
     def _quaternion(self, joint: JointRecord, origin: Element) -> None:
-        found = f"quat_xyzw={quoted(origin.attributes['quat_xyzw'])}"
+        found = f"quat_xyzw={quote(origin.attributes['quat_xyzw'])}"
 
         def add(rule: Rule, message: str, remedy: str) -> None:
             self.report.add(rule, message, origin, attribute="quat_xyzw", found=found, remedy=remedy)
@@ -728,7 +730,10 @@ class JointReader:
         quaternion = self.numbers.vector(origin, "quat_xyzw", 4)
         if quaternion is None:
             return
-        both, zero = "rpy" in origin.attributes, not SHORTEST < sum(map(abs, quaternion)) < LONGEST
+        both, zero = (
+            "rpy" in origin.attributes,
+            not MIN_VECTOR_LENGTH < sum(map(abs, quaternion)) < MAX_VECTOR_LENGTH,
+        )
         if both:
             add(BAD_QUATERNION, "rpy and quat_xyzw are both given", "remove one of these attributes")
         elif zero:
@@ -739,11 +744,11 @@ class JointReader:
             add(QUATERNION, message, "write the rotation as rpy for these readers")
 
     def _axis(self, joint: JointRecord) -> None:
-        axis = joint.axis_element = joint.element.first("axis")
+        axis = joint.axis_element = joint.element.find("axis")
         if axis is None:
             return
         if joint.kind in ("fixed", "floating"):  # The axis of these joints has no effect.
-            NumberReader(self.report, IGNORED, IGNORED).vector(axis, "xyz")
+            NumberReader(self.report, IGNORED_VALUE, IGNORED_VALUE).vector(axis, "xyz")
             return
         if "xyz" in axis.attributes:
             joint.axis = self.numbers.vector(axis, "xyz")
@@ -757,7 +762,7 @@ class JointReader:
         self.report.add(EMPTY_AXIS, message, axis, remedy=remedy, severity=severity)
 
     def _limit(self, joint: JointRecord) -> None:
-        limit = joint.element.first("limit")
+        limit = joint.element.find("limit")
         bounded = joint.kind in ("revolute", "prismatic")
         if limit is None:
             if bounded:
@@ -775,7 +780,7 @@ class JointReader:
         joint.limit = LimitRecord(limit, **values)
 
     def _mimic(self, joint: JointRecord) -> None:
-        mimic = joint.element.first("mimic")
+        mimic = joint.element.find("mimic")
         if mimic is None:
             return
         leader = self.required(mimic, "joint", '<mimic joint="..."/>')
@@ -786,14 +791,14 @@ class JointReader:
 
     def _others(self, joint: JointRecord) -> None:
         """Check unused elements too: urdfdom refuses a file if one of these elements is invalid."""
-        dynamics, safety = (joint.element.first(tag) for tag in ("dynamics", "safety_controller"))
+        dynamics, safety = (joint.element.find(tag) for tag in ("dynamics", "safety_controller"))
         if dynamics is not None and not {"damping", "friction"} & dynamics.attributes.keys():
             self.required(dynamics, "damping", '<dynamics damping="0"/>, or remove <dynamics>')
         if safety is not None:
             example = '<safety_controller k_velocity="0"/>, or remove <safety_controller>'
             self.required(safety, "k_velocity", example, number=True)
         for tag, attributes in _UNUSED_NUMBERS.items():
-            if (element := joint.element.first(tag)) is not None:
+            if (element := joint.element.find(tag)) is not None:
                 for attribute in attributes:
                     self.numbers.scalar(element, attribute)
 
@@ -810,7 +815,7 @@ _UNUSED_NUMBERS = {
 
 def nearest_tag(word: str, known: frozenset[str]) -> str | None:
     # A name in the file may have megabytes, and the cache must not store such a name.
-    return _nearest_tag(word, known) if len(word) <= _LONGEST_WORD else None
+    return _nearest_tag(word, known) if len(word) <= _MAX_WORD_LENGTH else None
 
 
 @lru_cache(1024)
@@ -824,4 +829,4 @@ def _nearest_tag(word: str, known: frozenset[str]) -> str | None:
 
 
 #: A word with more characters is not similar to any tag or attribute of URDF.
-_LONGEST_WORD = 32
+_MAX_WORD_LENGTH = 32

@@ -18,7 +18,7 @@ from urdfkin.errors.validators import as_bool, as_str, safe_repr
 from urdfkin.system.files import MOST, at_home, exists, read_start, read_start_of_standard_input
 from urdfkin.urdf.catalogue import Entry, catalogue, find_package, split_uri
 
-USD = (".usd", ".usda", ".usdc", ".usdz")
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +189,7 @@ def is_usd(source: object) -> TypeGuard[str | os.PathLike[str]]:
     >>> is_usd("arm.usda"), is_usd("arm.USDZ"), is_usd("arm.urdf"), is_usd("<robot/>")
     (True, True, False, False)
     """
-    return _suffix(source) in USD
+    return _suffix(source) in USD_SUFFIXES
 
 
 def _suffix(source: object) -> str:

@@ -48,8 +48,8 @@ from urdfkin.model.tree import (
 from urdfkin.system.files import MOST, read_start
 from urdfkin.system.lazy_import import install_remedy, installed_version
 from urdfkin.urdf.confinement import Ground
-from urdfkin.urdf.mjcf import UNBOUNDED, fixed_joint, leads, resolve, unique
-from urdfkin.urdf.sources import USD
+from urdfkin.urdf.mjcf import SLIDE_LIMIT, fixed_joint, leads, resolve, unique
+from urdfkin.urdf.sources import USD_SUFFIXES
 
 #: Maximum number of layers of a stage.
 _LAYERS = 1_000
@@ -252,7 +252,7 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
     if not ground.holds(outer):
         what = "a reference leads outside the folder, package and repository of the stage"
         raise _refused(what, where, written)
-    if Path(inner or outer).suffix.lower() not in USD:
+    if Path(inner or outer).suffix.lower() not in USD_SUFFIXES:
         raise _refused("a reference names a file that is not USD", where, written)
     return address if os.path.exists(outer) else None  # noqa: PTH110  Path.exists() can fail
 
@@ -958,9 +958,11 @@ class _StageReader:
             what = f"the limits of this joint are {words}: the numbers are probably radians"
             self._report("limit-unit", edge.path, what, "write the limits in degrees")
         if not (math.isfinite(lower) and math.isfinite(upper)):
-            what = f"a prismatic joint without limits gets +-{UNBOUNDED:g} m, because URDF requires limits"
+            what = f"a prismatic joint without limits gets +-{SLIDE_LIMIT:g} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
-            lower, upper = (x if math.isfinite(x) else math.copysign(UNBOUNDED, x) for x in (lower, upper))
+            lower, upper = (
+                x if math.isfinite(x) else math.copysign(SLIDE_LIMIT, x) for x in (lower, upper)
+            )
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -24,7 +24,7 @@ from urdfkin.errors import QuestionsSection, SourceError, UnknownNameError, Urdf
 from urdfkin.system.files import read_bytes
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.system.processes import ask_python, own_python
-from urdfkin.urdf.catalogue import VARIABLES, search_path
+from urdfkin.urdf.catalogue import PACKAGE_PATH_VARIABLES, search_path
 from urdfkin.urdf.confinement import Ground
 from urdfkin.urdf.expressions import RefusedError
 
@@ -122,7 +122,9 @@ def expand(path: Path, arguments: Mapping[str, str], *, patience: float = PATIEN
 
 
 def _request(path: Path, arguments: Mapping[str, str], patience: float) -> bytes:
-    paths = {name: [str(folder.absolute()) for folder in search_path(name)] for name in VARIABLES}
+    paths = {
+        name: [str(folder.absolute()) for folder in search_path(name)] for name in PACKAGE_PATH_VARIABLES
+    }
     installed = [folder for folders in paths.values() for folder in folders]
     request = {
         "path": str(path),

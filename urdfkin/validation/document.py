@@ -126,7 +126,9 @@ class ReportedFinding(TypedDict):
         Literal["refuses", "differs"] | None,
         says("refuses: Pinocchio refuses the file. differs: Pinocchio misreads the file. null: neither."),
     ]
-    also: Annotated[list[int], says("Line numbers of further findings that are merged into this finding.")]
+    other_lines: Annotated[
+        list[int], says("Line numbers of further findings that are merged into this finding.")
+    ]
 
 
 class ReportedDHRow(TypedDict):

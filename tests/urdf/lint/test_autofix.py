@@ -19,7 +19,7 @@ from tests.urdf.lint.cases.arm import Case, arm, axis, limit
 from tests.urdfs import joint, robot
 from urdfkin.system.files import Edit
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.findings import WRITTEN_OUT, Fix
+from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, Fix
 from urdfkin.urdf.lint import Severity
 from urdfkin.urdf.lint.autofix import TILT, Mended, differences, mend
 from urdfkin.urdf.lint.rules.joints import unit_vector
@@ -167,7 +167,7 @@ def test_same_proves_that_a_fixed_robot_is_the_same(name: str) -> None:
         text = text.replace(old, new)
     done = mended(text)
     assert {"URDF208", "URDF503"} <= {finding.code for finding in done.fixed}
-    pi = [finding.fix.turns for finding in done.fixed if finding.code == "URDF601" and finding.fix]
+    pi = [finding.fix.max_rotation for finding in done.fixed if finding.code == "URDF601" and finding.fix]
     found = urdfkin.same(name, done.text.data)
     if not pi:
         assert found
@@ -183,7 +183,9 @@ def test_the_fix_of_a_rounded_pi_rotates_no_frame_by_more_than_its_bound() -> No
     (finding,) = done.fixed
     a, b = (urdfkin.load(data) for data in (rough, done.text.data))
     R_a, R_b = (robot.placement(robot.neutral(), "l1")[:3, :3] for robot in (a, b))
-    assert 0.0 < math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0) <= present(finding.fix).turns < 1.2e-5
+    assert (
+        0.0 < math.sqrt(float(((R_a - R_b) ** 2).sum()) / 2.0) <= present(finding.fix).max_rotation < 1.2e-5
+    )
 
 
 def test_a_change_of_any_field_of_a_joint_is_a_difference_except_for_positions_in_the_file() -> None:
@@ -208,7 +210,7 @@ def test_a_file_with_an_error_is_not_fixed() -> None:
 
 @pytest.mark.slow
 def test_findings_beyond_the_number_of_stored_ones_are_also_fixed() -> None:
-    many = WRITTEN_OUT + 5
+    many = MAX_COMPLETE_FINDINGS + 5
     text = robot(*(joint(f"j{i}", "fixed", "l0", f"l{i}", axis="") for i in range(1, many)))
     done = mended(text.replace("<link ", '<link shade="3" '))
     assert (len(done.fixed), done.kept) == (many, {})

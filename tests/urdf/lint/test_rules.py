@@ -15,7 +15,7 @@ from tests.urdf.lint.cases.arm import arm
 from tests.urdf.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.catalogue import catalogue
-from urdfkin.urdf.findings import WRITTEN_OUT, Rule
+from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, Rule
 from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Limits, Severity, check, rules
 from urdfkin.urdf.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
 
@@ -175,6 +175,8 @@ def test_the_nearest_comment_silences_a_finding_and_all_other_comments_are_unuse
 
 @pytest.mark.slow
 def test_findings_beyond_the_number_of_stored_ones_are_also_silenced() -> None:
-    text = urdfs.robot(urdfs.joint("j", "fixed", "a", "b", axis="", more="<odd/>" * (WRITTEN_OUT + 5)))
-    assert len(check(text)) == WRITTEN_OUT
+    text = urdfs.robot(
+        urdfs.joint("j", "fixed", "a", "b", axis="", more="<odd/>" * (MAX_COMPLETE_FINDINGS + 5))
+    )
+    assert len(check(text)) == MAX_COMPLETE_FINDINGS
     assert check(COMMENT.format("URDF207") + text) == []

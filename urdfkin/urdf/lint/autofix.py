@@ -6,7 +6,7 @@ urdfkin accepts a fix if three conditions hold:
 - The new file has no new findings.
 - The new file describes the same robot: all names and numbers that URDF readers use are equal. There are two
   exceptions. A joint axis may rotate by the rounding error of its numbers. The rotation of a joint origin may
-  change by at most `Fix.turns` (rad).
+  change by at most `Fix.max_rotation` (rad).
 
 A patch for `git apply` contains whole lines of the file. A line can contain text that controls a terminal or
 a CI service, for example an escape sequence. Such text must be escaped, but `git apply` refuses escaped
@@ -29,9 +29,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from urdfkin.urdf.findings import Finding, Severity, apply
+from urdfkin.urdf.findings import Finding, Severity, apply_fixes
 from urdfkin.urdf.lint.runner import Examined
-from urdfkin.urdf.records import AXIAL, FURTHER_LIMITS, JointRecord, RobotRecord
+from urdfkin.urdf.records import AXIAL_TYPES, FURTHER_LIMITS, JointRecord, RobotRecord
 from urdfkin.urdf.sources import Text
 
 #: Maximum number of passes of `--fix` over a file. One pass applies non-overlapping fixes of one code.
@@ -71,7 +71,7 @@ def mend(
             }
             break
         by_fix = {id(f.fix): f for f in candidates if f.code == code}
-        data, applied = apply(now.text.data, (f.fix for f in by_fix.values() if f.fix))
+        data, applied = apply_fixes(now.text.data, (f.fix for f in by_fix.values() if f.fix))
         fixable = [by_fix[id(fix)] for fix in applied]
         after = look(replace(now.text, data=data))
         if objection := next(_objections(now, after, fixable), None):
@@ -85,7 +85,7 @@ def mend(
 def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> Iterator[str]:
     code = fixable[0].code
     # `findings` contains only some findings of a very frequent code. Such codes are not compared.
-    many = {finding.code for finding in before.findings if finding.also}
+    many = {finding.code for finding in before.findings if finding.other_lines}
     old = Counter((f.code, f.element, f.name) for f in before.findings if f.code not in many)
     new = Counter((f.code, f.element, f.name) for f in after.findings if f.code not in many)
     if appeared := new - old:
@@ -96,42 +96,42 @@ def _objections(before: Examined, after: Examined, fixable: list[Finding]) -> It
         if before.robot is not after.robot:
             yield "the fixed file would not be a URDF"
         return
-    turns = defaultdict[str, float](float)
+    max_rotations = defaultdict[str, float](float)
     for finding in fixable:
-        turns[finding.name or ""] += finding.fix.turns if finding.fix else 0.0
-    yield from differences(before.robot, after.robot, turns)
+        max_rotations[finding.name or ""] += finding.fix.max_rotation if finding.fix else 0.0
+    yield from differences(before.robot, after.robot, max_rotations)
 
 
-def differences(a: RobotRecord, b: RobotRecord, turns: Mapping[str, float]) -> Iterator[str]:
+def differences(a: RobotRecord, b: RobotRecord, max_rotations: Mapping[str, float]) -> Iterator[str]:
     """Yield a message for each difference between two robots.
 
-    The function compares the version, the links, and the joint values that URDF readers use. `turns`
+    The function compares the version, the links, and the joint values that URDF readers use. `max_rotations`
     contains the angle (rad) by which a joint origin may rotate, by joint name.
     """
     if (a.version, [*a.links], len(a.joints)) != (b.version, [*b.links], len(b.joints)):
         yield "the fix would change the links or joints"
         return
     for one, other in zip(a.joints, b.joints, strict=True):
-        if what := _difference(one, other, turns.get(one.name, 0.0)):
+        if what := _difference(one, other, max_rotations.get(one.name, 0.0)):
             yield f"the fix would change the {what} of joint {one.name}"
 
 
-def _difference(a: JointRecord, b: JointRecord, turns: float) -> str | None:
+def _difference(a: JointRecord, b: JointRecord, max_rotations: float) -> str | None:
     # If roll, pitch or yaw changes by an angle, the frame rotates by at most this angle.
     rotation = sum(abs(Fraction(y) - Fraction(x)) for x, y in zip(a.rpy, b.rpy, strict=True))
     names_a, names_b = ((one.name, one.kind, one.parent, one.child) for one in (a, b))
     equal = {
         "name, type, parent or child": names_a == names_b,
         "origin": (a.xyz, a.quaternion) == (b.xyz, b.quaternion),
-        "orientation": rotation <= Fraction(turns) * _SLACK,
-        "axis": a.kind not in AXIAL or _same_direction(a.axis, b.axis),
+        "orientation": rotation <= Fraction(max_rotations) * _SLACK,
+        "axis": a.kind not in AXIAL_TYPES or _same_direction(a.axis, b.axis),
         "limit": _limits(a) == _limits(b),
         "mimic": a.kind == "fixed" or _rule(a) == _rule(b),
     }
     return next((what for what, same in equal.items() if not same), None)
 
 
-#: Factor that covers the rounding errors of `Fix.turns`, which is a sum of doubles.
+#: Factor that covers the rounding errors of `Fix.max_rotation`, which is a sum of doubles.
 _SLACK = 1 + Fraction(1, 2**50)
 
 

@@ -14,12 +14,12 @@ from urdfkin.urdf.findings import Finding, Findings, Reporter
 from urdfkin.urdf.lint.pages import CODES
 from urdfkin.urdf.lint.rules.bodies import check_inertials, check_materials, check_meshes, check_shapes
 from urdfkin.urdf.lint.rules.dialect import (
+    apply_comments,
     check_dialect,
     check_names,
     check_prefixes,
-    check_unused,
+    check_unused_comments,
     check_vocabulary,
-    read_comments,
 )
 from urdfkin.urdf.lint.rules.joints import (
     check_axes,
@@ -61,8 +61,8 @@ def check(
     Returns:
         The findings that no comment silences, as a list. Notebooks show this list as a table. The list is
         empty if the file has no problem. If a file has more than 10,000 findings with one code, the list
-        contains the first 10,000. The attribute `also` of the 10,000th finding lists the line numbers of all
-        further findings.
+        contains the first 10,000. The attribute `other_lines` of the 10,000th finding lists the line numbers
+        of all further findings.
 
     Raises:
         SourceError: the file cannot be read.
@@ -87,15 +87,15 @@ def check(
 class Examined:
     """The result of a check; `robot` is None if the text is not a URDF.
 
-    `data` has no byte order mark, and findings state positions in `data`. `silenced` contains silenced
-    findings, each with the reason in the comment.
+    `data` has no byte order mark, and findings state positions in `data`. `silenced_findings` contains
+    silenced findings, each with the reason in the comment.
     """
 
     text: Text
     data: bytes
     robot: RobotRecord | None
     findings: tuple[Finding, ...]
-    silenced: tuple[tuple[Finding, str], ...]
+    silenced_findings: tuple[tuple[Finding, str], ...]
 
 
 def examine(
@@ -105,12 +105,12 @@ def examine(
     mimic: bool | None = None,
     root_joint: str | None = None,
     fold: bool = False,
-    wanted: Callable[[Finding], bool] | None = None,
+    is_reported: Callable[[Finding], bool] | None = None,
 ) -> Examined:
     """Check a text; the function `check` documents the arguments.
 
-    `wanted` returns False for a finding that must not be reported. Such findings are removed first, and then
-    the remaining findings are combined.
+    `is_reported` returns False for a finding that must not be reported. Such findings are removed first, and
+    then the remaining findings are combined.
     """
     if mimic is None:
         mimic = text.entry is None or text.entry.mimic
@@ -118,9 +118,13 @@ def examine(
     robot = read_urdf(report, mimic=mimic, root_joint=root_joint)
     if robot is not None:
         check_meshes(report, robot.element, file_of(text))
-        check_unused(report)
+        check_unused_comments(report)
     return Examined(
-        text, report.data, robot, report.findings(fold=fold, wanted=wanted), tuple(report.silenced)
+        text,
+        report.data,
+        robot,
+        report.findings(fold=fold, is_reported=is_reported),
+        tuple(report.silenced_findings),
     )
 
 
@@ -139,7 +143,7 @@ def check_text(data: bytes, *, limits: Limits = DEFAULT_LIMITS, fold: bool = Tru
 def read_urdf(report: Reporter, *, mimic: bool = True, root_joint: str | None = None) -> RobotRecord | None:
     """Parse and check the file of `report`; return None if the file is not a URDF."""
     root = read_document(report)
-    read_comments(report, CODES)
+    apply_comments(report, CODES)
     robot = None if root is None else read_robot(report, root)
     if root is None or robot is None:
         return None
