@@ -31,7 +31,7 @@ from urdfkin.robot import Robot
 from urdfkin.system.documents import plain
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, shorten
-from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Severity, check
+from urdfkin.urdf.lint import DEFAULT_SIZE_LIMITS, Finding, Severity, check
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.pages import page as page_of
 from urdfkin.validation.accuracy import AccuracyLine, AccuracyStudy, accuracy_study
@@ -68,13 +68,13 @@ REMARKS = {
 
 #: For each option of `check`: the limit that it raises, and its unit.
 LIMITS = {
-    "--max-bytes": (DEFAULT_LIMITS.bytes, "bytes"),
-    "--max-depth": (DEFAULT_LIMITS.depth, "levels of nesting"),
-    "--max-elements": (DEFAULT_LIMITS.elements, "elements"),
-    "--max-attributes": (DEFAULT_LIMITS.attributes, "attributes of one element"),
-    "--max-name": (DEFAULT_LIMITS.name, "characters of a name"),
-    "--max-number": (DEFAULT_LIMITS.number, "characters of a number"),
-    "--max-markup": (DEFAULT_LIMITS.markup, "bytes of one tag or comment"),
+    "--max-bytes": (DEFAULT_SIZE_LIMITS.bytes, "bytes"),
+    "--max-depth": (DEFAULT_SIZE_LIMITS.depth, "levels of nesting"),
+    "--max-elements": (DEFAULT_SIZE_LIMITS.elements, "elements"),
+    "--max-attributes": (DEFAULT_SIZE_LIMITS.attributes, "attributes of one element"),
+    "--max-name": (DEFAULT_SIZE_LIMITS.name, "characters of a name"),
+    "--max-number": (DEFAULT_SIZE_LIMITS.number, "characters of a number"),
+    "--max-markup": (DEFAULT_SIZE_LIMITS.markup, "bytes of one tag or comment"),
     "": (MAX_COMPLETE_FINDINGS, "complete findings of a kind, also in JSON and SARIF"),
 }
 

@@ -379,7 +379,7 @@ def test_a_variant_is_selected(write: Write) -> None:
     assert reach(robot) == pytest.approx(5.0)
     assert codes(robot) == {}
     assert path.read_bytes() == before
-    assert "--variant gripper=long" in robot.origin.words
+    assert "--variant gripper=long" in robot.origin.command_line
     for wrong, named in (({"gripper": "lon"}, "long"), ({"griper": "long"}, "gripper")):
         with pytest.raises(InputError, match=named):
             loaded(path, variant=wrong)
@@ -788,7 +788,9 @@ DEEDS = {
 @pytest.mark.parametrize("deed", DEEDS)
 def test_the_confined_process_cannot_write_files_or_start_processes(tmp_path: Path, deed: str) -> None:
     file = tmp_path / "made"
-    words = f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit(5)\n{DEEDS[deed]}"
+    words = (
+        f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit_process(5)\n{DEEDS[deed]}"
+    )
     if os.geteuid() == 0 and deed != "write":
         pytest.skip("the kernel does not limit the processes of root")
     assert python(words, str(file), check=False, timeout=60).returncode != 0

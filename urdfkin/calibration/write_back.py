@@ -22,7 +22,7 @@ from urdfkin.system.files import Edit, edited
 from urdfkin.urdf.findings import Reporter, Severity
 from urdfkin.urdf.lint.runner import read_urdf
 from urdfkin.urdf.records import JointRecord, Vector
-from urdfkin.urdf.writer import before, numbers, with_attributes
+from urdfkin.urdf.writer import format_numbers, make_attribute_edits, make_insertion
 from urdfkin.verify.certificate import Certificate
 
 #: Number of decimals of written metres and radians: the precision of a double near 1.
@@ -57,12 +57,12 @@ def _edits(data: bytes, joint: JointRecord, T: FloatArray) -> list[Edit]:
     else:
         quaternion = quaternion_of(T[:3, :3])
         sign = math.copysign(1.0, float(quaternion @ np.asarray(joint.quaternion)))
-        values["quat_xyzw"] = numbers((sign * quaternion).round(_DECIMALS))
+        values["quat_xyzw"] = format_numbers((sign * quaternion).round(_DECIMALS))
     if joint.origin_element is not None:
-        return list(with_attributes(data, joint.origin_element, values))
+        return list(make_attribute_edits(data, joint.origin_element, values))
     written = " ".join(f'{name}="{value}"' for name, value in values.items())
     # A valid <joint> element contains at least the elements <parent> and <child>.
-    return [before(data, joint.element.children[0], f"<origin {written}/>")]
+    return [make_insertion(data, joint.element.children[0], f"<origin {written}/>")]
 
 
 def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) -> str:
@@ -70,7 +70,9 @@ def _three_numbers(joint: JointRecord, name: str, new: FloatArray, old: Vector) 
     origin = joint.origin_element
     words = (origin.attributes.get(name, "") if origin is not None else "").split() or ["0"] * 3
     return " ".join(
-        word if abs(x - was) <= max(_ROUNDING, ANGLE * EPS * abs(was)) else numbers([round(x, _DECIMALS)])
+        word
+        if abs(x - was) <= max(_ROUNDING, ANGLE * EPS * abs(was))
+        else format_numbers([round(x, _DECIMALS)])
         for word, x, was in zip(words, new.tolist(), old, strict=True)
     )
 

@@ -29,7 +29,7 @@ from urdfkin.errors import UrdfkinError, nearest
 from urdfkin.errors.display import Displayable, Table, TextDocument
 from urdfkin.errors.escape import log_line, printable
 from urdfkin.system.files import Edit, edited
-from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_LIMITS, START_TAG, Element, Limits
+from urdfkin.urdf.records import ATTRIBUTE, DEFAULT_SIZE_LIMITS, START_TAG, Element, SizeLimits
 
 #: Maximum number of characters of a file that a message quotes.
 MAX_QUOTE_LENGTH = 60
@@ -440,7 +440,7 @@ class _FindingGroup:
 class Reporter:
     file: str
     data: bytes = b""
-    limits: Limits = DEFAULT_LIMITS
+    limits: SizeLimits = DEFAULT_SIZE_LIMITS
     comments: list[Comment] = field(default_factory=list)
     silenced_findings: list[tuple[Finding, str]] = field(default_factory=list)
     comment_index: CommentIndex = field(default_factory=CommentIndex)

@@ -16,7 +16,7 @@ ORACLE_DEPTH = 498
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class SizeLimits:
     """Limits on the size of a URDF file and its content.
 
     Attributes:
@@ -38,7 +38,7 @@ class Limits:
     markup: int = 10_000_000
 
 
-DEFAULT_LIMITS = Limits()
+DEFAULT_SIZE_LIMITS = SizeLimits()
 
 
 #: A quoted attribute value in a start tag may contain '>'.

@@ -47,7 +47,7 @@ from urdfkin.model.tree import (
 )
 from urdfkin.system.files import MOST, read_start
 from urdfkin.system.lazy_import import install_remedy, installed_version
-from urdfkin.urdf.confinement import Ground
+from urdfkin.urdf.confinement import AllowedPaths
 from urdfkin.urdf.mjcf import SLIDE_LIMIT, fixed_joint, leads, resolve, unique
 from urdfkin.urdf.sources import USD_SUFFIXES
 
@@ -184,7 +184,7 @@ def library() -> Any:
 
 def files_of(pxr: Any, path: str) -> tuple[str, ...]:
     """Return the files of a stage; check each layer before OpenUSD follows its references."""
-    ground = Ground.around(Path(path), [], [])
+    allowed_paths = AllowedPaths.of_file(Path(path), [], [])
     open_, known, total = deque([(path, path)]), {path}, 0
     files: dict[str, None] = {}
     while open_:
@@ -208,7 +208,7 @@ def files_of(pxr: Any, path: str) -> tuple[str, ...]:
             raise InputError("OpenUSD does not accept this file", where=identifier)
         _refuse_clips(pxr, layer, identifier)
         for asset in layer.GetCompositionAssetDependencies():
-            address = _address(pxr, layer, asset, ground, identifier)
+            address = _address(pxr, layer, asset, allowed_paths, identifier)
             if address is None or address in known:
                 continue
             known.add(address)
@@ -233,7 +233,7 @@ def _refuse_clips(pxr: Any, layer: Any, where: str) -> None:
         raise _refused("a prim has value clips, which urdfkin does not read", where, found[0])
 
 
-def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> str | None:
+def _address(pxr: Any, layer: Any, asset: str, allowed_paths: AllowedPaths, where: str) -> str | None:
     """Return the path of an asset, or None for a missing file; refuse a forbidden reference."""
     written = asset.partition(":SDF_FORMAT_ARGS:")[0]
     if not written:
@@ -249,7 +249,7 @@ def _address(pxr: Any, layer: Any, asset: str, ground: Ground, where: str) -> st
         here = os.path.abspath(outer)  # noqa: PTH100  resolve() follows links
         beside = Path(pxr.Ar.SplitPackageRelativePathOuter(layer.realPath)[0]).parent / outer
         outer = here if os.path.exists(here) else str(beside)  # noqa: PTH110  Path.exists() can fail
-    if not ground.holds(outer):
+    if not allowed_paths.allows(outer):
         what = "a reference leads outside the folder, package and repository of the stage"
         raise _refused(what, where, written)
     if Path(inner or outer).suffix.lower() not in USD_SUFFIXES:
@@ -835,15 +835,15 @@ class _StageReader:
 
     def _tree(self, group: _Articulation) -> tuple[KinematicTree, dict[str, str]]:
         root = self._root(group)
-        around: dict[str | None, list[_Edge]] = {}
+        edges_of_body: dict[str | None, list[_Edge]] = {}
         for edge in group.edges:
             for end in edge.ends:
-                around.setdefault(end, []).append(edge)
+                edges_of_body.setdefault(end, []).append(edge)
         ordered, reached, open_ = list[tuple[_Edge, bool]](), {root}, deque([root])
         used = set[str]()
         while open_:
             here = open_.popleft()
-            for edge in around.get(here, []):
+            for edge in edges_of_body.get(here, []):
                 backwards = edge.ends[1] == here
                 there = edge.ends[0 if backwards else 1]
                 if edge.path in used:
@@ -960,9 +960,7 @@ class _StageReader:
         if not (math.isfinite(lower) and math.isfinite(upper)):
             what = f"a prismatic joint without limits gets +-{SLIDE_LIMIT:g} m, because URDF requires limits"
             self._report("unused-in-usd", edge.path, what)
-            lower, upper = (
-                x if math.isfinite(x) else math.copysign(SLIDE_LIMIT, x) for x in (lower, upper)
-            )
+            lower, upper = (x if math.isfinite(x) else math.copysign(SLIDE_LIMIT, x) for x in (lower, upper))
         return Limit(lower, upper, rate, math.inf)
 
     def _frames(self, bodies: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -27,7 +27,7 @@ import numpy as np
 from urdfkin.errors import InputError, InstallationError, OracleError, UrdfkinError
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray
-from urdfkin.urdf.confinement import MEMORY, limit
+from urdfkin.urdf.confinement import MAX_MEMORY, limit_process
 from urdfkin.urdf.mjcf import Mjcf, read_mjcf
 from urdfkin.urdf.mujoco import library
 from urdfkin.urdf.writer import to_urdf
@@ -39,7 +39,7 @@ _NAMED = 5
 #: Maximum size of the output of a process, bytes.
 MOST = 400_000_000
 
-_TOO_MUCH = f"it takes more than {MEMORY / 1024**3:g} GiB of memory"
+_TOO_MUCH = f"it takes more than {MAX_MEMORY / 1024**3:g} GiB of memory"
 
 
 def serve() -> None:
@@ -50,7 +50,7 @@ def serve() -> None:
         if request["path"] is not None and request["samples"]:
             with suppress(InstallationError):
                 pinocchio()
-        limit(request["seconds"])
+        limit_process(request["seconds"])
         for answer in answers(request):
             write_answer(answer)
     except Exception as error:

@@ -23,7 +23,7 @@ from urdfkin.kinematics.roundings import EPS, ROW, of_rows, of_rows_read_back
 from urdfkin.model.base_motion import STILL_STATE
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame
-from urdfkin.urdf.foreign import Modelled
+from urdfkin.urdf.foreign import ConvertedModel
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.comparison import compare
 from urdfkin.verify.oracle import QueryBatch
@@ -36,7 +36,7 @@ from urdfkin.verify.verifier import Verifier
 _SAMPLES = 8
 
 
-def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
+def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) -> str:
     """Compare a robot with the Pinocchio model (or RobotWrapper) from which the robot was made.
 
     Returns a line of text with the result. Raises OracleError if a placement differs by more than the bound.
@@ -65,7 +65,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     )
 
 
-def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
+def _placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
     """Return the model's placements (n, joints + frames, 4, 4)."""
     pin = pinocchio()
     data = model.createData()

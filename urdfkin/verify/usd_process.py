@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from urdfkin.urdf.confinement import limit
+from urdfkin.urdf.confinement import limit_process
 from urdfkin.urdf.usd import JointReading, Usd, library, read_usd
 from urdfkin.urdf.writer import to_urdf
 from urdfkin.verify.mjcf_process import error_answer, packed, write_answer
@@ -30,7 +30,7 @@ def serve() -> None:
     os.environ["PXR_WORK_THREAD_LIMIT"] = "1"  # A confined process cannot start threads.
     try:
         library()
-        limit(request["seconds"])
+        limit_process(request["seconds"])
         write_answer(answer_of(request))
     except Exception as error:
         write_answer(error_answer(error, "OpenUSD cannot read this stage"))

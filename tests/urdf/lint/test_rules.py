@@ -16,7 +16,7 @@ from tests.urdf.lint.others import ask
 from urdfkin.errors import UnknownNameError
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.urdf.findings import MAX_COMPLETE_FINDINGS, Rule
-from urdfkin.urdf.lint import DEFAULT_LIMITS, Finding, Limits, Severity, check, rules
+from urdfkin.urdf.lint import DEFAULT_SIZE_LIMITS, Finding, Severity, SizeLimits, check, rules
 from urdfkin.urdf.lint.pages import RULES, TOPICS, Page, explain, find_rule, page, page_files, topic_pages
 
 HERE = Path(rules.__file__).parent
@@ -25,10 +25,10 @@ EVERY_RULE = pytest.mark.parametrize("rule", RULES.values(), ids=lambda rule: ru
 
 #: Limits with which the examples of some rules are checked.
 _LIMITS = {
-    "too-deep-for-pinocchio": Limits(depth=5_000),
-    "too-large": Limits(bytes=100),
-    "too-many-elements": Limits(elements=10),
-    "markup-too-long": Limits(markup=100),
+    "too-deep-for-pinocchio": SizeLimits(depth=5_000),
+    "too-large": SizeLimits(bytes=100),
+    "too-many-elements": SizeLimits(elements=10),
+    "markup-too-long": SizeLimits(markup=100),
 }
 
 
@@ -42,7 +42,7 @@ def document(example: str) -> str:
 
 
 def findings_of(rule: Rule, example: str) -> list[Finding]:
-    return check(document(example).encode(), limits=_LIMITS.get(rule.slug, DEFAULT_LIMITS))
+    return check(document(example).encode(), limits=_LIMITS.get(rule.slug, DEFAULT_SIZE_LIMITS))
 
 
 @EVERY_RULE
@@ -56,7 +56,7 @@ def test_the_bad_example_has_the_finding_and_an_error_only_if_the_rule_is_an_err
 
 @EVERY_RULE
 def test_the_corrected_example_has_no_error_and_not_the_finding(rule: Rule) -> None:
-    findings = findings_of(rule, page(rule.id).cure)
+    findings = findings_of(rule, page(rule.id).correction)
     assert not [f for f in findings if f.severity is Severity.ERROR or f.code == rule.id], findings
 
 
@@ -72,7 +72,7 @@ def test_codes_and_texts_of_rules_have_the_required_form_and_pages_fit_a_termina
     assert page(rule.id).why.endswith(".")
     assert re.match(
         r"Pinocchio (reads|refuses) the example\b.*; yourdfpy (reads|refuses) the example\b.*\.$",
-        page(rule.id).others,
+        page(rule.id).other_readers,
     )
 
 
@@ -81,7 +81,12 @@ def test_a_file_of_pages_has_a_page_for_each_rule_in_order_and_no_other_content(
     assert list(topic_pages(topic)) == [rule.id for rule in TOPICS[topic]]
     data = tomllib.loads(page_files()[topic].read_text("utf-8"))
     known = {field.name for field in fields(Page)} | {"parts"}
-    assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {"cure", "others", "parts", "question"}
+    assert data.keys() - {rule.id for rule in TOPICS[topic]} <= {
+        "correction",
+        "other_readers",
+        "parts",
+        "question",
+    }
     assert all(data[rule.id].keys() <= known for rule in TOPICS[topic])
 
 
@@ -111,7 +116,9 @@ def verdicts() -> dict[str, dict[str, str]]:
 def test_pinocchio_and_yourdfpy_read_the_bad_example_if_the_page_says_so(
     rule: Rule, verdicts: dict[str, dict[str, str]]
 ) -> None:
-    pinocchio, yourdfpy = re.findall(r"(?:Pinocchio|; yourdfpy) (reads|refuses) the ex", page(rule.id).others)
+    pinocchio, yourdfpy = re.findall(
+        r"(?:Pinocchio|; yourdfpy) (reads|refuses) the ex", page(rule.id).other_readers
+    )
     assert verdicts[rule.id] == {"pinocchio": pinocchio, "yourdfpy": yourdfpy}
 
 

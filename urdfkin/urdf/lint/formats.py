@@ -16,9 +16,9 @@ from typing import Any
 from urllib.parse import quote
 
 from urdfkin.urdf.findings import Finding, Fix, Rule, Severity, count_by_severity, format_counts
-from urdfkin.urdf.lint.pages import OF_OTHERS, RULES, find_rule, page
+from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, RULES, find_rule, page
 
-SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
 
 def as_sarif(
@@ -26,7 +26,7 @@ def as_sarif(
 ) -> str:
     """Return a SARIF document with all rules about URDF files, and a result for each finding."""
     codes = {finding.code for finding in findings}
-    rules = RULES | {code: rule for code, rule in OF_OTHERS.items() if code in codes}
+    rules = RULES | {code: rule for code, rule in MJCF_AND_USD_RULES.items() if code in codes}
     index = {code: number for number, code in enumerate(rules)}
     results = [_result(finding, index[finding.code]) for finding in findings]
     for finding, reason in silenced_findings:
@@ -34,7 +34,7 @@ def as_sarif(
         results.append(_result(finding, index[finding.code]) | {"suppressions": [suppression]})
     driver = {"name": "urdfkin", "version": version, "rules": [_rule(rule) for rule in rules.values()]}
     run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
-    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
+    return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
 
 def _rule(rule: Rule) -> dict[str, Any]:
@@ -44,7 +44,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "name": "".join(word.capitalize() for word in rule.slug.split("-")),
         "shortDescription": {"text": content.title},
         "fullDescription": {"text": content.why},
-        "help": {"text": f"{content.why}\n\n{content.others}"},
+        "help": {"text": f"{content.why}\n\n{content.other_readers}"},
         "defaultConfiguration": {"level": rule.severity.value},
     }
 

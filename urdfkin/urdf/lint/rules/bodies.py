@@ -52,12 +52,12 @@ def _check_inertial(report: Reporter, inertial: Element, numbers: NumberReader) 
         report.add(INERTIAL_INCOMPLETE, message, inertial, found=f"no {', '.join(missing)}", remedy=remedy)
     lever = None
     if origin is not None:
-        lever = numbers.vector(origin, "xyz")
-        numbers.vector(origin, "rpy")
-    mass = None if mass_element is None else numbers.scalar(mass_element, "value")
+        lever = numbers.read_vector(origin, "xyz")
+        numbers.read_vector(origin, "rpy")
+    mass = None if mass_element is None else numbers.read_scalar(mass_element, "value")
     _check_mass(report, inertial, mass, lever)
     if tensor is not None:
-        read = (numbers.scalar(tensor, name) for name in _MOMENTS)
+        read = (numbers.read_scalar(tensor, name) for name in _MOMENTS)
         moments = [moment for moment in read if moment is not None]
         if len(moments) == len(_MOMENTS):
             _check_moments(report, tensor, moments, mass)
@@ -152,8 +152,8 @@ def _check_geometry(
 ) -> None:
     origin, geometry = owner.find("origin"), owner.find("geometry")
     if origin is not None:
-        numbers.vector(origin, "xyz")
-        numbers.vector(origin, "rpy")
+        numbers.read_vector(origin, "xyz")
+        numbers.read_vector(origin, "rpy")
     capsule = None if geometry is None else geometry.find("capsule")
     if capsule is not None and version < (1, 1):  # URDF readers skip capsules in files before version 1.1.
         message = 'a capsule needs version="1.1" and is ignored'
@@ -172,18 +172,18 @@ def _check_geometry(
     for attribute, count, required in _SHAPES[shape.tag]:
         if attribute not in shape.attributes:
             if required:
-                _missing(report, owner, shape, attribute)
+                _report_missing(report, owner, shape, attribute)
         elif count == 1:
-            numbers.scalar(shape, attribute)
+            numbers.read_scalar(shape, attribute)
         else:
-            numbers.vector(shape, attribute, count)
+            numbers.read_vector(shape, attribute, count)
     if shape.tag == "mesh" and not shape.attributes.get("filename", "").strip():
-        _missing(report, owner, shape, "filename")
+        _report_missing(report, owner, shape, "filename")
     elif shape.tag == "mesh":
         check_address(report, shape)
 
 
-def _missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
+def _report_missing(report: Reporter, owner: Element, shape: Element, attribute: str) -> None:
     message = f"the {shape.tag} of a {owner.tag} has no {attribute}"
     report.add(GEOMETRY, message, shape, remedy=f'write <{shape.tag} {attribute}="..."/>')
 
@@ -235,11 +235,11 @@ MESH_MISSING = Rule("URDF706", "mesh-missing", WARNING)
 MESH_REMOTE = Rule("URDF707", "mesh-remote", WARNING)
 
 
-def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
+def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> None:
     """Report missing meshes and packages.
 
-    `beside` is the path of the URDF file. If `beside` is None, only `package://` and `model://` meshes are
-    checked.
+    `urdf_path` is the path of the URDF file. If `urdf_path` is None, only `package://` and `model://` meshes
+    are checked.
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
@@ -249,13 +249,13 @@ def check_meshes(report: Reporter, root: Element, beside: Path | None) -> None:
         if parts is not None:
             package, path = parts
             if package not in packages:
-                packages[package] = find_package(package, beside)
+                packages[package] = find_package(package, urdf_path)
             folder = packages[package]
             if folder is None:
                 missing.setdefault(package, []).append(mesh)
             elif not _exists(folder / path):
                 _report_file(report, mesh, filename)
-        elif _is_missing_file(filename, beside):
+        elif _is_missing_file(filename, urdf_path):
             _report_file(report, mesh, filename)
     for package, meshes in missing.items():
         report.add(
@@ -286,11 +286,11 @@ def _meshes(root: Element) -> Iterator[Element]:
                 yield from geometry.find_all("mesh")
 
 
-def _is_missing_file(filename: str, beside: Path | None) -> bool:
+def _is_missing_file(filename: str, urdf_path: Path | None) -> bool:
     local = filename and ("://" not in filename or filename.startswith("file://"))
-    if beside is None or not local:
+    if urdf_path is None or not local:
         return False
-    return not _exists(beside.absolute().parent / filename.removeprefix("file://"))
+    return not _exists(urdf_path.absolute().parent / filename.removeprefix("file://"))
 
 
 def _exists(path: Path) -> bool:

@@ -39,12 +39,12 @@ CYCLE = Rule("URDF412", "cycle", ERROR)
 
 
 def check_structure(report: Reporter, robot: RobotRecord) -> bool:
-    edges = [joint for joint in robot.joints if _ends_exist(report, robot, joint)]
-    sound = len(edges) == len(robot.joints) and _have_one_parent(report, robot, edges)
-    return _one_root(report, robot) and sound and bool(robot.links)
+    edges = [joint for joint in robot.joints if _check_ends(report, robot, joint)]
+    is_tree = len(edges) == len(robot.joints) and _check_parents(report, robot, edges)
+    return _check_root(report, robot) and is_tree and bool(robot.links)
 
 
-def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
+def _check_ends(report: Reporter, robot: RobotRecord, joint: JointRecord) -> bool:
     for tag, link in (("parent", joint.parent), ("child", joint.child)):
         if link is not None and link not in robot.links:
             nearest = ", ".join(report.nearest(link, robot.links))
@@ -59,13 +59,13 @@ def _ends_exist(report: Reporter, robot: RobotRecord, joint: JointRecord) -> boo
     return joint.parent in robot.links and joint.child in robot.links
 
 
-def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
+def _check_parents(report: Reporter, robot: RobotRecord, edges: list[JointRecord]) -> bool:
     """Report loops and additional parent joints of a link; return True if there are none."""
     below = _joints_by_parent(edges)
     children = {joint.child for joint in edges}
     first: dict[str, JointRecord] = {}
     visited: set[str] = set()
-    sound = True
+    is_tree = True
     for start in [link for link in robot.links if link not in children] + list(robot.links):
         if start in visited:
             continue
@@ -81,13 +81,13 @@ def _have_one_parent(report: Reporter, robot: RobotRecord, edges: list[JointReco
             child = joint.child or ""
             if child in visited:
                 _report_repeat(report, joint, first.get(child), loop=child in path)
-                sound = False
+                is_tree = False
                 continue
             visited.add(child)
             first[child] = joint
             path.add(child)
             stack.append((child, iter(below.get(child, ()))))
-    return sound
+    return is_tree
 
 
 def _joints_by_parent(joints: Iterable[JointRecord]) -> dict[str, list[JointRecord]]:
@@ -110,7 +110,7 @@ def _report_repeat(report: Reporter, joint: JointRecord, first: JointRecord | No
     report.add(rule, message, at, attribute="link", found=found, remedy=remedy)
 
 
-def _one_root(report: Reporter, robot: RobotRecord) -> bool:
+def _check_root(report: Reporter, robot: RobotRecord) -> bool:
     """Return whether exactly one link has no parent; report all further links without a parent."""
     children = {joint.child for joint in robot.joints}
     roots = [link for link in robot.links if link not in children]
@@ -162,7 +162,7 @@ def check_axes(report: Reporter, robot: RobotRecord) -> None:
             _check_planar(report, joint)
 
 
-def _written(joint: JointRecord) -> str:
+def _axis_text(joint: JointRecord) -> str:
     axis = joint.axis_element
     return f"xyz={quote(axis.attributes.get('xyz', ''))}" if axis is not None else 'the default "1 0 0"'
 
@@ -175,7 +175,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
         what = "is zero" if length == 0.0 else f"has no usable length ({length:.3g})"
         message = f"the axis {what}"
         remedy = 'write a unit vector, such as xyz="0 0 1"'
-        found = _written(joint)
+        found = _axis_text(joint)
         report.add(NO_DIRECTION, message, joint.axis_element, attribute="xyz", found=found, remedy=remedy)
     elif abs(length - 1.0) > _UNIT_LENGTH_TOLERANCE:
         unit = unit_vector(joint.axis)
@@ -186,7 +186,7 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
             f"the axis has length {length:.9g} and is normalised",
             element,
             attribute="xyz",
-            found=_written(joint),
+            found=_axis_text(joint),
             remedy=f'write xyz="{written}"',
             fix=lambda: None if _snap(unit) else report.make_value_fix(element, "xyz", written),
             severity=Severity.NOTE if abs(length - 1.0) < NOTE_LENGTH_ERROR else None,
@@ -211,11 +211,11 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
         remedy = f'write xyz="{written}", or double all three numbers: Pinocchio then keeps the tilt'
         report.add(
             NEARLY_COORDINATE_AXIS, message, element,
-            attribute="xyz", found=_written(joint), remedy=remedy, weight=tilt,
+            attribute="xyz", found=_axis_text(joint), remedy=remedy, weight=tilt,
         )  # fmt: skip
 
 
-def tilts(robot: RobotRecord) -> dict[str, float]:
+def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
     """For each joint whose axis Pinocchio changes, return the angle (rad) of this change."""
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
     return {joint.name: snapped[1] for joint in axial if (snapped := _snap(joint.axis))}
@@ -246,7 +246,7 @@ def _check_planar(report: Reporter, joint: JointRecord) -> None:
     at = joint.axis_element or joint.element
     message = "a planar joint moves in the XY plane of its frame, independent of <axis>"
     remedy = 'rotate the origin until its z axis is the normal of the plane, and write <axis xyz="0 0 1"/>'
-    report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_written(joint), remedy=remedy)
+    report.add(PLANAR_AXIS, message, at, attribute="xyz", found=_axis_text(joint), remedy=remedy)
 
 
 INVERTED_LIMIT = Rule("URDF507", "inverted-limit", ERROR)
@@ -302,7 +302,7 @@ def _check_continuous(report: Reporter, limit: LimitRecord) -> None:
             "a continuous joint has no position limits; the limits are ignored",
             limit.element,
             attribute=written[0],
-            found=_written_bounds(limit),
+            found=_bounds_text(limit),
             remedy='remove the limits, or write type="revolute"',
             fix=lambda: report.make_removal_fix(limit.element, *written),
         )
@@ -369,7 +369,7 @@ class _MimicChecker:
             return
         leader = self.joints.get(mimic.leader)
         if leader is None:
-            self.unknown(mimic)
+            self.report_unknown(mimic)
         elif joint.name in self.in_loops:
             itself = leader is joint
             message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
@@ -379,16 +379,16 @@ class _MimicChecker:
             message = f"the mimicked joint is {leader.kind} and has {count}"
             self.add(MIMIC_LEADER, message, mimic, "joint", "name a joint with one coordinate")
         else:
-            self.check_sound(joint, mimic, leader)
+            self.check_rule(joint, mimic, leader)
 
-    def unknown(self, mimic: MimicRecord) -> None:
+    def report_unknown(self, mimic: MimicRecord) -> None:
         nearest = self.report.nearest(mimic.leader, self.joints)
         remedy = f"did you mean {', '.join(nearest)}?" if nearest else "name a joint of the robot"
         if self.enabled:
             remedy += " (with mimic=False, --no-mimic, the joint moves freely)"
         self.add(MIMIC_UNKNOWN, "the mimicked joint does not exist", mimic, "joint", remedy)
 
-    def check_sound(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
+    def check_rule(self, joint: JointRecord, mimic: MimicRecord, leader: JointRecord) -> None:
         if mimic.multiplier == 0.0:
             message = f"the multiplier is zero: the joint stays at {mimic.offset:g}"
             remedy = "write a multiplier other than zero, or make the joint fixed"
@@ -411,7 +411,7 @@ class _MimicChecker:
         from urdfkin.model.configuration import allowed_range, range_words
         from urdfkin.model.tree import Limit
 
-        rule, leader = self.resolved(mimic)
+        rule, leader = self.resolve_chain(mimic)
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
@@ -432,7 +432,7 @@ class _MimicChecker:
             severity=None if self.enabled else Severity.NOTE,
         )
 
-    def resolved(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
+    def resolve_chain(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
         """Return the combined rule of a mimic chain, and the last joint (None if missing or in a circle)."""
         from urdfkin.model.tree import Mimic
 
@@ -505,16 +505,16 @@ _PI_MULTIPLES = [(Fraction(k, 2), 2) for k in range(1, 5)] + [
 ]
 
 
-def check_suspicious(report: Reporter, robot: RobotRecord, *, sound: bool) -> None:
-    """Report legal values that are probably mistakes. `sound` is True if the joints form a tree."""
-    reach = _reach(robot) if sound else {}
+def check_suspicious(report: Reporter, robot: RobotRecord, *, is_tree: bool) -> None:
+    """Report legal values that are probably mistakes. `is_tree` is True if the joints form a tree."""
+    reach = _reach(robot) if is_tree else {}
     for joint in robot.joints:
         _check_angles(report, joint, reach)
         _check_lengths(report, joint)
         _check_neutral(report, joint)
-    _check_places(report, robot)
-    if sound:
-        _check_sums(report, robot, reach)
+    _check_equal_axes(report, robot)
+    if is_tree:
+        _check_total_length(report, robot, reach)
 
 
 def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float]) -> None:
@@ -532,7 +532,7 @@ def _check_angles(report: Reporter, joint: JointRecord, reach: dict[str, float])
         if any(
             SUSPICIOUS_LIMIT <= abs(bound) < PLACEHOLDER_LIMIT and bound == round(bound) for bound in bounds
         ):
-            found = _written_bounds(limit)
+            found = _bounds_text(limit)
             _report_degrees(report, "the limits look like degrees", limit.element, "lower", found)
 
 
@@ -540,7 +540,7 @@ def _report_degrees(report: Reporter, message: str, at: Element, attribute: str,
     report.add(DEGREES, message, at, attribute=attribute, found=found, remedy="write angles in radians")
 
 
-def _written_bounds(limit: LimitRecord) -> str:
+def _bounds_text(limit: LimitRecord) -> str:
     written = limit.element.attributes
     return " ".join(f"{name}={quote(written[name])}" for name in ("lower", "upper") if name in written)
 
@@ -550,7 +550,7 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
     off, text, multiple, meant, turns = 0.0, "", Fraction(0), 0.0, 0.0
     exact = list(written)
     for k, (word, angle) in enumerate(zip(written, joint.rpy, strict=True)):
-        found = rounded_pi(word, angle)
+        found = find_rounded_pi(word, angle)
         if found is None:
             continue
         exact[k], turns = repr(found[1]), turns + abs(angle - found[1])
@@ -559,14 +559,14 @@ def _check_rounded(report: Reporter, joint: JointRecord, written: list[str], rea
     if not off or joint.origin_element is None:
         return
     origin = joint.origin_element
-    moves = f", which moves the links below by up to {_metres(off * reach)}" if reach > 0.0 else ""
+    moves = f", which moves the links below by up to {_length_text(off * reach)}" if reach > 0.0 else ""
     report.add(
         ROUNDED_PI,
-        f"rpy contains a rounded {_as_pi(multiple)}, off by {off:.1e} rad{moves}",
+        f"rpy contains a rounded {_pi_text(multiple)}, off by {off:.1e} rad{moves}",
         origin,
         attribute="rpy",
         found=quote(text),
-        remedy=f"write {meant!r} if you mean {_as_pi(multiple)}; urdfkin uses the value in the file",
+        remedy=f"write {meant!r} if you mean {_pi_text(multiple)}; urdfkin uses the value in the file",
         severity=Severity.WARNING if off * reach > NOTICEABLE_DISPLACEMENT else None,
         weight=off * reach,
         fix=lambda: report.make_value_fix(
@@ -582,7 +582,7 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
     return "".join(blank + word for blank, word in zip(blanks, [*words, ""], strict=True))
 
 
-def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
+def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
     """If a decimal number is a rounded multiple of pi, return the multiple and its value, else None.
 
     >>> rounded_pi("1.5708", 1.5708)
@@ -601,12 +601,12 @@ def rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
     return None
 
 
-def _as_pi(multiple: Fraction) -> str:
+def _pi_text(multiple: Fraction) -> str:
     top = "pi" if multiple.numerator == 1 else f"{multiple.numerator} pi"
     return top if multiple.denominator == 1 else f"{top}/{multiple.denominator}"
 
 
-def _metres(length: float) -> str:
+def _length_text(length: float) -> str:
     units = ((1.0, "m"), (1e3, "mm"), (1e6, "um"))
     factor, unit = next((pair for pair in units if length * pair[0] >= 1.0), (1e9, "nm"))
     # The format `:.2g` would write 120 as 1.2e+02.
@@ -650,7 +650,7 @@ def _check_neutral(report: Reporter, joint: JointRecord) -> None:
         )
 
 
-def _check_places(report: Reporter, robot: RobotRecord) -> None:
+def _check_equal_axes(report: Reporter, robot: RobotRecord) -> None:
     places: dict[tuple[object, ...], JointRecord] = {}
     for joint in robot.joints:
         if joint.kind not in AXIAL_TYPES:
@@ -676,7 +676,7 @@ def _reach(robot: RobotRecord) -> dict[str, float]:
     return reach
 
 
-def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -> None:
+def _check_total_length(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -> None:
     whole = max(reach.values(), default=0.0)
     if math.isinf(whole):
         far = max(robot.joints, key=lambda joint: max(abs(x) for x in joint.xyz))
@@ -685,5 +685,5 @@ def _check_sums(report: Reporter, robot: RobotRecord, reach: dict[str, float]) -
         found = quote(element.attributes.get("xyz", ""))
         report.add(OVERFLOW, message, element, attribute="xyz", found=found, remedy="check the exponent")
     elif 0.0 < whole < SUSPICIOUS_ROBOT_SIZE:
-        message = f"the sum of all lengths of the robot is {_metres(whole)}"
+        message = f"the sum of all lengths of the robot is {_length_text(whole)}"
         report.add(TINY_ROBOT, message, robot.element, remedy="write lengths in metres")
