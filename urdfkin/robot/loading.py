@@ -214,7 +214,7 @@ def _load_mjcf(
 ) -> Robot:
     import hashlib
 
-    from urdfkin.urdf.mjcf import name_of
+    from urdfkin.urdf.mjcf import source_name
     from urdfkin.verify.mjcf_check import check_mjcf_source, read_mjcf
 
     _refuse_arguments(xacro_args, "MJCF")
@@ -223,7 +223,11 @@ def _load_mjcf(
     digest = hashlib.sha256(data).hexdigest()
     read = read_mjcf(source, check=wanted)
     name = (
-        unambiguous_path(Path(read.path)) if read.path else streamed.source if streamed else name_of(source)
+        unambiguous_path(Path(read.path))
+        if read.path
+        else streamed.source
+        if streamed
+        else source_name(source)
     )
     text = UrdfText(read.urdf.encode(), f"{name} (as a URDF)", name, sha256=digest)
     listed = make_mjcf_findings(read.listed, name, data.removeprefix(codecs.BOM_UTF8))

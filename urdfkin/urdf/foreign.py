@@ -19,7 +19,7 @@ from urdfkin.errors.validators import safe_repr
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, build_tree, inverse
 from urdfkin.urdf.findings import Finding, Severity
-from urdfkin.urdf.mjcf import SLIDE_LIMIT, fixed_joint, unique
+from urdfkin.urdf.mjcf import SLIDE_LIMIT, make_fixed_joint, make_unique
 from urdfkin.urdf.parser import QUATERNION
 from urdfkin.urdf.reader import find_root_link, make_joint_rows
 from urdfkin.urdf.records import Element, JointRecord, LimitRecord, MimicRecord
@@ -180,7 +180,7 @@ class _ModelReader:
         default = {j: f"{model.names[j]}_link" if j else "universe" for j in joints}
         names = {j: self.frames[bodies[j]].name if j in bodies else default[j] for j in joints}
         #: Name of the link that each joint moves, by the joint's index.
-        self.links_of_joints = {j: unique(name, self.used_link_names) for j, name in names.items()}
+        self.links_of_joints = {j: make_unique(name, self.used_link_names) for j, name in names.items()}
         #: Name of the link of each converted frame, by the frame's index.
         self.links: dict[int, str] = {}
         self.rows: list[tuple[Joint, str, str]] = []
@@ -239,11 +239,11 @@ class _ModelReader:
         link, T = self._attachment(frame, joint, self.placements[i])
         if kind == "FIXED_JOINT":
             body = next((f for f in self.frames[i + 1 :] if int(f.parentFrame) == i), None)
-            child = unique(frame.name if body is None else body.name, self.used_link_names)
+            child = make_unique(frame.name if body is None else body.name, self.used_link_names)
             name = frame.name
         else:
-            child, name = unique(frame.name, self.used_link_names), f"{frame.name}_fixed"
-        self.rows.append((fixed_joint(unique(name, self.used_joint_names), T), link, child))
+            child, name = make_unique(frame.name, self.used_link_names), f"{frame.name}_fixed"
+        self.rows.append((make_fixed_joint(make_unique(name, self.used_joint_names), T), link, child))
         self.links[i] = child
 
     def _make_joint(self, j: int, T: FloatArray) -> Joint:

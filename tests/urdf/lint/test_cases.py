@@ -237,7 +237,8 @@ def test_suggestions_for_5000_unknown_links_take_a_limited_time() -> None:
     ("limits", "code"),
     [
         (SizeLimits(bytes=10), "URDF108"), (SizeLimits(elements=1), "URDF114"),
-        (SizeLimits(depth=1), "URDF115"), (SizeLimits(attributes=0), "URDF116"), (SizeLimits(name=2), "URDF117"),
+        (SizeLimits(depth=1), "URDF115"), (SizeLimits(attributes=0), "URDF116"),
+        (SizeLimits(name=2), "URDF117"),
     ],
 )  # fmt: skip
 def test_the_message_about_each_limit_names_the_option_that_raises_it(limits: SizeLimits, code: str) -> None:

@@ -18,8 +18,8 @@ from urdfkin.urdf.records import ATTRIBUTE, START_TAG
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from urdfkin.urdf.mjcf import Listed
-    from urdfkin.urdf.usd import Remark
+    from urdfkin.urdf.mjcf import MjcfRemark
+    from urdfkin.urdf.usd import UsdRemark
 
 LEFT_OUT_MOTION = Rule("MJCF101", "left-out-motion", WARNING)
 LEFT_OUT = Rule("MJCF102", "left-out", NOTE)
@@ -62,7 +62,7 @@ _SKIPPED_TEXT = {
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
-def make_mjcf_findings(listed: Iterable[Listed], file: str, data: bytes) -> tuple[Finding, ...]:
+def make_mjcf_findings(listed: Iterable[MjcfRemark], file: str, data: bytes) -> tuple[Finding, ...]:
     parts = tuple(listed)
     places = _find_positions(data, _find_elements) if any(part.where for part in parts) else {}
     found = []
@@ -73,7 +73,7 @@ def make_mjcf_findings(listed: Iterable[Listed], file: str, data: bytes) -> tupl
     return tuple(found)
 
 
-def make_usd_findings(remarks: Iterable[Remark], file: str, data: bytes) -> tuple[Finding, ...]:
+def make_usd_findings(remarks: Iterable[UsdRemark], file: str, data: bytes) -> tuple[Finding, ...]:
     found = tuple(remarks)
     rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
     is_text = data.startswith(b"#usda") and any(one.where for one in found)
@@ -85,7 +85,12 @@ def make_usd_findings(remarks: Iterable[Remark], file: str, data: bytes) -> tupl
 
 
 def _make_finding(
-    rule: Rule, one: Listed | Remark, file: str, element: str | None, name: str | None, places: _Positions
+    rule: Rule,
+    one: MjcfRemark | UsdRemark,
+    file: str,
+    element: str | None,
+    name: str | None,
+    places: _Positions,
 ) -> Finding:
     line, column, width = places.get((element, name), (1, 1, 0))
     return Finding(
