@@ -36,8 +36,7 @@ from urdfkin.system.lazy_import import installed_version
 from urdfkin.urdf.findings import ExcerptFormatter, UrdfError, UrdfWarning
 from urdfkin.urdf.lint import Finding, Severity, SizeLimits
 from urdfkin.urdf.lint.autofix import fix_text, make_patch
-from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
-from urdfkin.urdf.lint.formats import statistics as statistics_lines
+from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, format_statistics, format_summary
 from urdfkin.urdf.lint.pages import MJCF_AND_USD_RULES, RULES, page
 from urdfkin.urdf.lint.runner import Examination, examine, find_local_path
 from urdfkin.urdf.lint.settings import (
@@ -101,7 +100,7 @@ def print_outcome(outcome: CheckOutcome, style: str, *, statistics: bool) -> Non
         if findings:
             command_lines(as_github(findings))
     elif statistics:
-        for line in statistics_lines(outcome.findings):
+        for line in format_statistics(outcome.findings):
             say(line)
         _print_summary(outcome)
     elif outcome.files or outcome.unchanged:
@@ -139,7 +138,7 @@ def _print_summary(outcome: CheckOutcome) -> None:
         (outcome.gone, "listed in the baseline but no longer found: {}; write the baseline again"),
     ]
     details = ", ".join(text.format(count) for count, text in counts if count)
-    say(summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
+    say(format_summary(outcome.findings, len(outcome.files)) + (f" ({details})" if details else ""))
 
 
 def _say_fixed(file: str, fixed: Sequence[Finding]) -> None:

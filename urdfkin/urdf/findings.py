@@ -535,11 +535,13 @@ class Reporter:
             pairs.sort(key=lambda pair: _sort_key(pair[0]))
             pairs = [pair for pair in pairs if is_reported(pair[0])]
         reported = {id(pair) for pair in pairs}
-        found: list[Finding] = []
+        findings: list[Finding] = []
         for group in self._groups.values():
-            if own := [pair for pair in group.pairs if id(pair) in reported]:
-                found += _combine(_FindingGroup(group.severity, own, group.further_lines), fold=fold)
-        return tuple(sorted(found, key=_sort_key))
+            if pairs_of_group := [pair for pair in group.pairs if id(pair) in reported]:
+                findings += _combine(
+                    _FindingGroup(group.severity, pairs_of_group, group.further_lines), fold=fold
+                )
+        return tuple(sorted(findings, key=_sort_key))
 
     @property
     def has_raw_blanks(self) -> bool:
@@ -645,14 +647,16 @@ def _combine(group: _FindingGroup, *, fold: bool) -> list[Finding]:
     In the last returned finding, `other_lines` has the line numbers of the findings that are not returned.
     """
     group.pairs.sort(key=lambda pair: _sort_key(pair[0]))
-    found = [finding for finding, _ in group.pairs]
+    findings = [finding for finding, _ in group.pairs]
     into_one = fold and group.severity is not Severity.ERROR
-    if into_one and len(found) >= (MIN_FOLDED_EXTRAS if found[0].code.startswith("URDF7") else MIN_FOLDED):
-        best = max(range(len(found)), key=lambda i: group.pairs[i][1])
-        complete, rest = [found.pop(best)], found
+    if into_one and len(findings) >= (
+        MIN_FOLDED_EXTRAS if findings[0].code.startswith("URDF7") else MIN_FOLDED
+    ):
+        best = max(range(len(findings)), key=lambda i: group.pairs[i][1])
+        complete, rest = [findings.pop(best)], findings
     else:
-        most = MAX_ERRORS_PER_CODE if fold else len(found)
-        complete, rest = found[:most], found[most:]
+        most = MAX_ERRORS_PER_CODE if fold else len(findings)
+        complete, rest = findings[:most], findings[most:]
     lines = sorted([*(finding.line for finding in rest), *group.further_lines])
     if lines:
         complete[-1] = replace(complete[-1], other_lines=tuple(lines))

@@ -400,10 +400,10 @@ class _StageReader:
             self._report("missing-layer", "", f"OpenUSD cannot compose a part of this stage: {words}")
         prims = self._find_prims()
         self._read_bodies_and_joints(prims)
-        found = self._find_articulations()
-        chosen = self._choose_articulation(found, articulation)
+        articulations = self._find_articulations()
+        chosen = self._choose_articulation(articulations, articulation)
         tree, links = self._make_tree(chosen)
-        self._report_loose_bodies(chosen, found)
+        self._report_loose_bodies(chosen, articulations)
         rest = np.array([self._world_pose(stage.GetPrimAtPath(path))[0] for path in links.values()])
         rest_q = self._find_rest_configuration(tree, chosen, links, rest)
         self._report_unit_and_up_axis(rest)
@@ -791,12 +791,12 @@ class _StageReader:
                 continue  # A single body that is fixed to the world is not a robot.
             self._set_path(group)
             merged.setdefault(self._find_root(group) or group.path, []).append(group)
-        found = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
-        paths = Counter(group.path for group in found)
-        for group in found:
+        articulations = [own[0] if len(own) == 1 else self._merge(own, path) for path, own in merged.items()]
+        paths = Counter(group.path for group in articulations)
+        for group in articulations:
             if paths[group.path] > 1:
                 group.path = self._find_root(group) or group.bodies[0]
-        return found
+        return articulations
 
     def _set_path(self, group: _Articulation) -> None:
         for edge in group.edges:
@@ -804,29 +804,33 @@ class _StageReader:
                 group.path = edge.path
         group.path = group.path or self._find_root(group) or group.bodies[0]
 
-    def _choose_articulation(self, found: list[_Articulation], articulation: str | None) -> _Articulation:
+    def _choose_articulation(
+        self, articulations: list[_Articulation], articulation: str | None
+    ) -> _Articulation:
         """Return the articulation with a path or name, or all articulations below another prim."""
-        if not found:
+        if not articulations:
             message = "this stage has no joint between bodies"
             remedy = "apply PhysicsRigidBodyAPI to the links, and connect them with UsdPhysics joints"
             raise InputError(message, where=self.source, found=f"{len(self._bodies)} bodies", remedy=remedy)
-        paths = [group.path for group in found]
+        paths = [group.path for group in articulations]
         if articulation is None:
-            if len(found) > 1:
-                message = f"this stage has {len(found)} articulations"
+            if len(articulations) > 1:
+                message = f"this stage has {len(articulations)} articulations"
                 remedy = (
                     "choose one with --articulation PATH; the PATH of an ancestor chooses all articulations"
                     " below it"
                 )
                 raise InputError(message, where=self.source, found=", ".join(paths[:8]), remedy=remedy)
-            return found[0]
+            return articulations[0]
         if not articulation:
             raise UnknownNameError("articulation", articulation, paths, where=self.source)
-        own = [group for group in found if articulation in (group.path, group.path.rpartition("/")[2])]
-        if len(own) == 1:
-            return own[0]
-        below = [group for group in found if group.path.startswith(articulation.rstrip("/") + "/")]
-        if own or not below:
+        matching = [
+            group for group in articulations if articulation in (group.path, group.path.rpartition("/")[2])
+        ]
+        if len(matching) == 1:
+            return matching[0]
+        below = [group for group in articulations if group.path.startswith(articulation.rstrip("/") + "/")]
+        if matching or not below:
             raise UnknownNameError("articulation", articulation, paths, where=self.source)
         return self._merge(below, articulation.rstrip("/") or "/")
 
@@ -1067,8 +1071,8 @@ class _StageReader:
 
     # -- the whole stage -----------------------------------------------------------------------------
 
-    def _report_loose_bodies(self, chosen: _Articulation, found: Sequence[_Articulation]) -> None:
-        joined = {path for group in found for path in group.bodies}
+    def _report_loose_bodies(self, chosen: _Articulation, articulations: Sequence[_Articulation]) -> None:
+        joined = {path for group in articulations for path in group.bodies}
         top = f"/{chosen.path.split('/')[1]}/".replace("//", "/")
         for path in self._bodies:
             if path not in joined and (path + "/").startswith(top):

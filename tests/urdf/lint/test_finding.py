@@ -12,7 +12,7 @@ from tests.urdfs import joint, robot
 from urdfkin.errors import UrdfkinError
 from urdfkin.urdf.findings import Reporter
 from urdfkin.urdf.lint import Finding, Severity, UrdfError, check, check_text
-from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, summary
+from urdfkin.urdf.lint.formats import as_github, as_json, as_sarif, format_summary
 from urdfkin.urdf.lint.pages import RULES
 from urdfkin.urdf.lint.runner import read_urdf
 
@@ -121,4 +121,6 @@ def test_each_github_command_is_one_escaped_line(findings: list[Finding]) -> Non
 
 def test_the_summary_counts_all_findings_that_a_finding_represents() -> None:
     folded = Finding("URDF601", Severity.NOTE, "m", other_lines=(3, 4))
-    assert summary([folded, Finding("URDF101", Severity.ERROR, "m")], 2) == "1 error, 3 notes in 2 files"
+    assert (
+        format_summary([folded, Finding("URDF101", Severity.ERROR, "m")], 2) == "1 error, 3 notes in 2 files"
+    )

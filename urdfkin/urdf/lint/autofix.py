@@ -127,8 +127,8 @@ def _find_difference(a: JointRecord, b: JointRecord, max_rotation: float) -> str
         "origin": (a.xyz, a.quaternion) == (b.xyz, b.quaternion),
         "orientation": rotation <= Fraction(max_rotation) * _SLACK,
         "axis": a.kind not in AXIAL_TYPES or _same_direction(a.axis, b.axis),
-        "limit": _limits(a) == _limits(b),
-        "mimic": a.kind == "fixed" or _rule(a) == _rule(b),
+        "limit": _effective_limits(a) == _effective_limits(b),
+        "mimic": a.kind == "fixed" or _mimic_rule(a) == _mimic_rule(b),
     }
     return next((what for what, same in equal.items() if not same), None)
 
@@ -147,14 +147,14 @@ def _same_direction(a: tuple[float, ...] | None, b: tuple[float, ...] | None) ->
     return ax * bx + ay * by + az * bz > 0 and cross <= MAX_AXIS_TILT**2 * lengths
 
 
-def _limits(joint: JointRecord) -> tuple[float | None, ...]:
+def _effective_limits(joint: JointRecord) -> tuple[float | None, ...]:
     if joint.limit is None:
         return ()
     bounded = ("lower", "upper") if joint.kind in ("revolute", "prismatic") else ()
     return tuple(getattr(joint.limit, name) for name in (*bounded, "effort", "velocity", *FURTHER_LIMITS))
 
 
-def _rule(joint: JointRecord) -> tuple[str, float, float] | None:
+def _mimic_rule(joint: JointRecord) -> tuple[str, float, float] | None:
     rule = joint.mimic
     return None if rule is None else (rule.leader, rule.multiplier, rule.offset)
 

@@ -100,11 +100,11 @@ def _uri(file: str) -> str:
 JSON_VERSION = 1
 
 
-def summary(findings: Sequence[Finding], files: int) -> str:
+def format_summary(findings: Sequence[Finding], files: int) -> str:
     return f"{format_counts(findings)} in {files} file" + ("" if files == 1 else "s")
 
 
-def statistics(findings: Sequence[Finding]) -> Iterator[str]:
+def format_statistics(findings: Sequence[Finding]) -> Iterator[str]:
     """Yield a line for each code, the most frequent first; `[*]` marks codes with fixes."""
     counts, worst, fixable = Counter[str](), dict[str, Severity](), set[str]()
     for finding in findings:

@@ -277,14 +277,14 @@ def find_known_findings(
         # urdfkin cannot expand the older xacro file. If a file has changed that the xacro file could include,
         # every finding is new.
         return Baseline(Counter()) if version.changed(_INCLUDABLE_SUFFIXES) else None
-    same = version.holds(text.data)
-    old = text.data if same else version.read(path)
-    found = () if old is None else examine(replace(text, data=old)).findings
+    is_unchanged = version.holds(text.data)
+    old_data = text.data if is_unchanged else version.read(path)
+    findings = () if old_data is None else examine(replace(text, data=old_data)).findings
     if any(os.fsencode(name) in text.data for name in version.gone):
-        found = tuple(finding for finding in found if finding.code != MESH_MISSING.id)
-    elif same:
+        findings = tuple(finding for finding in findings if finding.code != MESH_MISSING.id)
+    elif is_unchanged:
         return None
-    return Baseline(Counter(key_of(finding, relative_path(finding.file, Path())) for finding in found))
+    return Baseline(Counter(key_of(finding, relative_path(finding.file, Path())) for finding in findings))
 
 
 #: ROS's build tools and urdfkin skip a folder that contains a file with one of these names.

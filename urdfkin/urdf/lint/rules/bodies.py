@@ -193,13 +193,13 @@ MATERIAL_TWICE = Rule("URDF709", "material-twice", ERROR)
 
 
 def check_materials(report: Reporter, robot: RobotRecord) -> None:
-    defined = _materials(report, robot)
+    defined = _find_defined_materials(report, robot)
     for link in robot.links.values():
         for visual in link.find_all("visual"):
             _check_material(report, visual, defined)
 
 
-def _materials(report: Reporter, robot: RobotRecord) -> set[str]:
+def _find_defined_materials(report: Reporter, robot: RobotRecord) -> set[str]:
     defined: dict[str, Element] = {}
     for material in robot.element.find_all("material"):
         name = material.attributes.get("name", "")
@@ -243,7 +243,7 @@ def check_meshes(report: Reporter, root: Element, urdf_path: Path | None) -> Non
     """
     packages: dict[str, Path | None] = {}
     missing: dict[str, list[Element]] = {}
-    for mesh in _meshes(root):
+    for mesh in _find_meshes(root):
         filename = mesh.attributes.get("filename", "").strip()
         parts = split_uri(filename)
         if parts is not None:
@@ -278,7 +278,7 @@ def check_address(report: Reporter, mesh: Element) -> None:
         report.add(MESH_REMOTE, message, mesh, attribute="filename", found=quote(filename), remedy=remedy)
 
 
-def _meshes(root: Element) -> Iterator[Element]:
+def _find_meshes(root: Element) -> Iterator[Element]:
     for link in root.find_all("link"):
         for shape in link.children:
             geometry = shape.find("geometry") if shape.tag in ("visual", "collision") else None

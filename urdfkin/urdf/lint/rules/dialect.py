@@ -387,14 +387,14 @@ def check_names(report: Reporter, robot: RobotRecord, root_joint: str | None) ->
     links = list(robot.links.items())
     joints = [(joint.name, joint.element) for joint in robot.joints if joint.name]
     for name, element in (*links, *joints):
-        _check_odd(report, name, element)
+        _check_odd_name(report, name, element)
         _check_blanks(report, element)
         _check_reserved(report, name, element, root_joint)
     for kind in (links, joints):
         _check_lookalikes(report, kind)
 
 
-def _check_odd(report: Reporter, name: str, element: Element) -> None:
+def _check_odd_name(report: Reporter, name: str, element: Element) -> None:
     reasons = {
         "the name contains characters that cannot be printed": not name.isprintable(),
         "the name begins or ends with a space": name != name.strip(),
@@ -432,9 +432,9 @@ def _check_reserved(report: Reporter, name: str, element: Element, root_joint: s
         )
 
 
-def _check_lookalikes(report: Reporter, named: list[tuple[str, Element]]) -> None:
+def _check_lookalikes(report: Reporter, named_elements: list[tuple[str, Element]]) -> None:
     seen: dict[str, str] = {}
-    for name, element in named:
+    for name, element in named_elements:
         if name.isascii() or len(name) > MAX_NAME_LENGTH:
             continue  # Long names are slow to compare, and URDF405 already reports long names.
         key = unicodedata.normalize("NFKC", name)

@@ -188,11 +188,11 @@ def _check_axis(report: Reporter, joint: JointRecord) -> None:
             attribute="xyz",
             found=_axis_text(joint),
             remedy=f'write xyz="{written}"',
-            fix=lambda: None if _snap(unit) else report.make_value_fix(element, "xyz", written),
+            fix=lambda: None if _find_snapped_axis(unit) else report.make_value_fix(element, "xyz", written),
             severity=Severity.NOTE if abs(length - 1.0) < NOTE_LENGTH_ERROR else None,
             weight=abs(length - 1.0),
         )
-    _check_snapped(report, joint, joint.axis, joint.axis_element)
+    _check_snapped_axis(report, joint, joint.axis, joint.axis_element)
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
@@ -203,8 +203,10 @@ def unit_vector(vector: Sequence[float]) -> tuple[float, ...]:
         return tuple(float(x / length) + 0.0 for x in numbers)  # Adding 0.0 turns -0.0 into 0.0.
 
 
-def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element) -> None:
-    if snapped := _snap(axis):
+def _check_snapped_axis(
+    report: Reporter, joint: JointRecord, axis: Sequence[float], element: Element
+) -> None:
+    if snapped := _find_snapped_axis(axis):
         unit, tilt = snapped
         written = " ".join(f"{x:g}" for x in unit)
         message = f"the axis differs from {written} by {tilt:.2g} rad, and Pinocchio uses {written}"
@@ -218,10 +220,10 @@ def _check_snapped(report: Reporter, joint: JointRecord, axis: Sequence[float], 
 def find_axis_tilts(robot: RobotRecord) -> dict[str, float]:
     """For each joint whose axis Pinocchio changes, return the angle (rad) of this change."""
     axial = (joint for joint in robot.joints if joint.kind in AXIAL_TYPES)
-    return {joint.name: snapped[1] for joint in axial if (snapped := _snap(joint.axis))}
+    return {joint.name: snapped[1] for joint in axial if (snapped := _find_snapped_axis(joint.axis))}
 
 
-def _snap(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
+def _find_snapped_axis(axis: Sequence[float] | None) -> tuple[tuple[float, ...], float] | None:
     """Return the coordinate axis that Pinocchio uses instead of `axis`, and the angle (rad) between them."""
     if axis is None:
         return None

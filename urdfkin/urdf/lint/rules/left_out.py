@@ -62,31 +62,33 @@ _SKIPPED_TEXT = {
 _Positions = Mapping[tuple[str | None, str | None], tuple[int, int, int]]
 
 
-def make_mjcf_findings(listed: Iterable[MjcfRemark], file: str, data: bytes) -> tuple[Finding, ...]:
-    parts = tuple(listed)
-    places = _find_positions(data, _find_elements) if any(part.where for part in parts) else {}
-    found = []
-    for part in parts:
-        tag, _, name = (part.where or "").partition(" ")
-        rule = LEFT_OUT_MOTION if part.moves else LEFT_OUT if part.remedy is None else ANGLE_UNIT
-        found.append(_make_finding(rule, part, file, tag or None, name or None, places))
-    return tuple(found)
+def make_mjcf_findings(remarks: Iterable[MjcfRemark], file: str, data: bytes) -> tuple[Finding, ...]:
+    remarks = tuple(remarks)
+    places = _find_positions(data, _find_elements) if any(remark.where for remark in remarks) else {}
+    findings = []
+    for remark in remarks:
+        tag, _, name = (remark.where or "").partition(" ")
+        rule = LEFT_OUT_MOTION if remark.moves else LEFT_OUT if remark.remedy is None else ANGLE_UNIT
+        findings.append(_make_finding(rule, remark, file, tag or None, name or None, places))
+    return tuple(findings)
 
 
 def make_usd_findings(remarks: Iterable[UsdRemark], file: str, data: bytes) -> tuple[Finding, ...]:
-    found = tuple(remarks)
+    remarks = tuple(remarks)
     rules = {rule.slug: rule for rule in globals().values() if isinstance(rule, Rule)}
-    is_text = data.startswith(b"#usda") and any(one.where for one in found)
+    is_text = data.startswith(b"#usda") and any(remark.where for remark in remarks)
     places = _find_positions(data, _find_prims) if is_text else {}
     return tuple(
-        _make_finding(rules[one.kind], one, file, "prim" if one.where else None, one.where or None, places)
-        for one in found
+        _make_finding(
+            rules[remark.kind], remark, file, "prim" if remark.where else None, remark.where or None, places
+        )
+        for remark in remarks
     )
 
 
 def _make_finding(
     rule: Rule,
-    one: MjcfRemark | UsdRemark,
+    remark: MjcfRemark | UsdRemark,
     file: str,
     element: str | None,
     name: str | None,
@@ -94,7 +96,17 @@ def _make_finding(
 ) -> Finding:
     line, column, width = places.get((element, name), (1, 1, 0))
     return Finding(
-        rule.id, rule.severity, one.what, None, one.remedy, file, line, column, element, name, width=width
+        rule.id,
+        rule.severity,
+        remark.what,
+        None,
+        remark.remedy,
+        file,
+        line,
+        column,
+        element,
+        name,
+        width=width,
     )
 
 
@@ -135,9 +147,9 @@ def _find_elements(data: bytes) -> Iterator[tuple[str, str | None, int, int]]:
         else:
             word = tag[0][1:].split(None, 1)[0].rstrip(b"/>").decode("utf-8", "replace")
             last, name = at + 1 + len(word.encode()), None
-            for one in ATTRIBUTE.finditer(data, last, tag.end()):
-                if one[1] == b"name":
-                    name, last = unescape(one[2][1:-1].decode("utf-8", "replace")), one.end()
+            for match in ATTRIBUTE.finditer(data, last, tag.end()):
+                if match[1] == b"name":
+                    name, last = unescape(match[2][1:-1].decode("utf-8", "replace")), match.end()
             includes = includes or word == "include"
             if "worldbody" in above and word in ("body", "joint", "freejoint") and name is not None:
                 yield word.removeprefix("free"), name, at, last
