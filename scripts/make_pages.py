@@ -91,7 +91,7 @@ def findings() -> dict[str, str]:
                 rule.slug,
                 rule.severity.value,
                 _cell(shorten(page_of(rule.id).title, 200)),
-                f"*{rule.oracle.value}*" if rule.oracle else "",
+                f"*{rule.pinocchio_reading.value}*" if rule.pinocchio_reading else "",
             )
             for rule in RULES.values()
             if rule.id[4] == digit

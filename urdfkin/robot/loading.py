@@ -386,6 +386,7 @@ def _unverifiable(findings: tuple[Finding, ...]) -> str | None:
         PinocchioReading.DIFFERS: "Pinocchio reads another robot",
     }
     for finding in findings:
-        if finding.oracle in problems:
-            return f"{problems[finding.oracle]} ({finding.code}, line {finding.line}: {finding.message})"
+        if finding.pinocchio_reading in problems:
+            place = f"{finding.code}, line {finding.line}"
+            return f"{problems[finding.pinocchio_reading]} ({place}: {finding.message})"
     return None

@@ -161,8 +161,8 @@ class Finding:
         column: Column number in characters, from 1.
         element: The tag of the element (`joint`, `link`, `origin`, ...); None for the whole file.
         name: The name of the link, joint or material, or None.
-        oracle: If this value is not None, Pinocchio refuses the file or reads the content differently, so
-            urdfkin cannot verify any result of the robot with Pinocchio.
+        pinocchio_reading: If this value is not None, Pinocchio refuses the file or reads the content
+            differently, so urdfkin cannot verify any result of the robot with Pinocchio.
         other_lines: Line numbers of further findings with the same code that are combined into this finding.
         width: Number of characters to underline, starting at `column`; 0 if nothing is underlined.
         fix: The automatic fix, or None.
@@ -183,7 +183,7 @@ class Finding:
     column: int = 1
     element: str | None = None
     name: str | None = None
-    oracle: PinocchioReading | None = None
+    pinocchio_reading: PinocchioReading | None = None
     other_lines: tuple[int, ...] = ()
     width: int = 0
     fix: Fix | None = None
@@ -255,7 +255,7 @@ class Finding:
         data = asdict(self)
         del data["width"], data["fix"]
         data["severity"] = self.severity.value
-        data["oracle"] = self.oracle.value if self.oracle else None
+        data["pinocchio_reading"] = self.pinocchio_reading.value if self.pinocchio_reading else None
         data["other_lines"] = list(self.other_lines)
         return data
 
@@ -342,7 +342,7 @@ class Rule:
     id: str
     slug: str
     severity: Severity
-    oracle: PinocchioReading | None = None
+    pinocchio_reading: PinocchioReading | None = None
 
 
 #: First word of a comment with an instruction for urdfkin.
@@ -490,8 +490,8 @@ class Reporter:
             subject = element if misplaced else element.top_element
             tag, name = subject.tag, subject.attributes.get("name") if element.parent is not None else None
         finding = Finding(
-            rule.id, severity, message, found, remedy, self.file, line, column, tag, name, rule.oracle,
-            width=width, fix=None if fix is None or reason is not None else fix(),
+            rule.id, severity, message, found, remedy, self.file, line, column, tag, name,
+            rule.pinocchio_reading, width=width, fix=None if fix is None or reason is not None else fix(),
         )  # fmt: skip
         if reason is None:
             group.pairs.append((finding, weight))

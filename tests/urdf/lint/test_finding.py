@@ -108,7 +108,7 @@ def test_json_contains_every_field(findings: list[Finding]) -> None:
     document = json.loads(as_json(findings, ["<text>"], "1.2.3"))
     assert (document["schema"], document["version"], document["files"]) == ("urdfkin-findings", 1, ["<text>"])
     assert len(document["findings"]) == len(findings) == sum(document["counts"].values())
-    names = {"code", "severity", "line", "column", "element", "name", "found", "remedy", "oracle"}
+    names = {"code", "severity", "line", "column", "element", "name", "found", "remedy", "pinocchio_reading"}
     assert names <= document["findings"][0].keys()
 
 

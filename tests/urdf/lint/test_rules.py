@@ -48,7 +48,7 @@ def findings_of(rule: Rule, example: str) -> list[Finding]:
 @EVERY_RULE
 def test_the_bad_example_has_the_finding_and_an_error_only_if_the_rule_is_an_error(rule: Rule) -> None:
     findings = findings_of(rule, page(rule.id).example)
-    assert {f.oracle for f in findings if f.code == rule.id} == {rule.oracle}, findings
+    assert {f.pinocchio_reading for f in findings if f.code == rule.id} == {rule.pinocchio_reading}, findings
     assert any(f.severity is Severity.ERROR for f in findings) == (
         rule.severity is Severity.ERROR or rule.slug == "stray-text"
     ), findings
@@ -128,7 +128,11 @@ def test_pinocchio_and_yourdfpy_read_the_bad_example_if_the_page_says_so(
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", catalogue())
 def test_no_robot_of_the_catalogue_has_an_error_or_cannot_be_verified(robot: str) -> None:
-    wrong = [str(one) for one in check(robot) if one.severity is Severity.ERROR or one.oracle is not None]
+    wrong = [
+        str(one)
+        for one in check(robot)
+        if one.severity is Severity.ERROR or one.pinocchio_reading is not None
+    ]
     assert wrong == []
 
 

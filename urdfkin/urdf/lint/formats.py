@@ -57,8 +57,8 @@ def _result(finding: Finding, rule: int) -> dict[str, Any]:
         "message": {"text": finding.sentence},
         "locations": [_location(finding)],
     }
-    if finding.oracle is not None:
-        result["properties"] = {"pinocchio": finding.oracle.value}
+    if finding.pinocchio_reading is not None:
+        result["properties"] = {"pinocchio": finding.pinocchio_reading.value}
     if finding.fix is not None:
         result["fixes"] = [_fix(finding, finding.fix)]
     return result

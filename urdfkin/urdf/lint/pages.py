@@ -148,7 +148,7 @@ def explain(rule: Rule) -> str:
         "Better:\n\n" + _example(content.correction),
         textwrap.fill(content.other_readers, PROSE_WIDTH),
     ]
-    if rule.oracle is not None:
+    if rule.pinocchio_reading is not None:
         paragraphs.append(
             "Pinocchio cannot check the results of a robot that has this finding.\n"
             "urdfkin reports these results as not verified."
