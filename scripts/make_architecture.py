@@ -62,8 +62,8 @@ def named(text: str) -> Iterator[str]:
 
     >>> list(named("if TYPE_CHECKING: from urdfkin.errors import InputError"))
     ['urdfkin.errors.InputError']
-    >>> list(named("COMMANDS = {'plot': 'urdfkin.cli.plot'}"))
-    ['urdfkin.cli.plot.*']
+    >>> list(named("COMMANDS = {'plot': 'urdfkin.cli.view'}"))
+    ['urdfkin.cli.view.*']
     """
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):

@@ -61,7 +61,7 @@ REMARKS = {
     "URDF508": "Both limits are zero; missing limits count as zero. Samples do not move the joint.",
     "URDF510": "The value has no effect, as expected.",
     "URDF527": "The multiplier is -1, but both joints have equal limits; kinematics applies the mimic rule.",
-    "URDF702": "No body can have these moments of inertia; kinematics does not use moments of inertia.",
+    "URDF702": "No body can have this mass and these moments of inertia; kinematics uses neither.",
     "URDF706": "The address of the mesh is wrong, or is a path on another machine; kinematics needs no mesh.",
     "URDF708": "Only a colour is missing.",
 }

@@ -22,10 +22,9 @@ from urdfkin.urdf.catalogue import example_robots
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import Cut, run_chunk
 from urdfkin.validation.cluster import connected
-from urdfkin.validation.manifest import Manifest
 from urdfkin.validation.results import ValidationReport
 from urdfkin.validation.robot_input import subject
-from urdfkin.validation.store import open_store
+from urdfkin.validation.store import Manifest, open_store
 
 
 def store(*robots: Any, **how: Any) -> ValidationReport:

@@ -79,7 +79,7 @@ register_hook("code in a language", lazy_import("urdfkin.export:write"))
 register_hook("a report as a page", lazy_import("urdfkin.report.html:as_html"))
 register_hook("a report as a comment", lazy_import("urdfkin.report.markdown:as_markdown"))
 register_hook("a comparison as a document", lazy_import("urdfkin.report.same:as_document"))
-register_hook("a robot in a cell", lazy_import("urdfkin.report.notebook:NotebookView"))
+register_hook("a robot in a cell", lazy_import("urdfkin.report.html:NotebookView"))
 
 __all__ = [
     "BaseMotion",

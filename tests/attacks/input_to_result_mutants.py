@@ -49,7 +49,7 @@ from urdfkin.urdf.sources import Origin
 MODULES = (
     "verify.oracle", "verify.call", "model.chain", "model.configuration", "model.mimic",
     "dh.convert", "model.configuration_like",
-    "verify.model_check", "kinematics.bodies", "verify.pinocchio", "model.base_motion",
+    "verify.conversions", "kinematics.bodies", "verify.pinocchio", "model.base_motion",
     "compiled.evaluate", "compiled.plan", "model.reference", "robot",
     "kinematics.rotation", "kinematics.inputs",
     "model.path", "model.tree", "urdf.reader", "urdf.writer",

@@ -16,8 +16,8 @@ from tests.random_chains import rotation, shift
 from tests.reading import present
 from tests.urdfs import joint, limit, mimic, robot
 from urdfkin.dh import DHTable, Units, dh_table, export
+from urdfkin.dh.export.text import printed
 from urdfkin.dh.parse_table import reference_path
-from urdfkin.dh.printed import printed
 from urdfkin.dh.snapping import noisy_cells
 from urdfkin.dh.units import Angles, Lengths
 from urdfkin.errors import UnknownNameError

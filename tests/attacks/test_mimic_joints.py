@@ -234,7 +234,7 @@ def test_info_data_and_report_state_the_narrowed_range_of_a_mimicked_joint() -> 
     kept = [joint["kept"] for joint in describe(robot)["joints"]]
     assert kept == [{"lower": pytest.approx(-0.005), "upper": pytest.approx(0.005), "by": ["f1"]}, None]
     (none,) = narrowed_ranges(gripper("prismatic", (0.0, 1.0), (1.0, 0.0, 3.0, 4.0)).tree)
-    assert str(none).endswith("no value keeps all its mimic joints within their limits (f1)")
+    assert str(none).endswith("at most one value keeps all its mimic joints within their limits (f1)")
     document = json.loads(json.dumps(validate([robot], samples=8).as_dict()))
     jsonschema.validate(document, VALIDATION.schema())
     page = as_html(document)

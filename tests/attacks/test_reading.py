@@ -27,9 +27,8 @@ from urdfkin.system.files import MOST, read_bytes, read_if_there, read_start
 from urdfkin.system.git import version_before
 from urdfkin.urdf import mjcf, xacro
 from urdfkin.urdf.catalogue import find_package
-from urdfkin.validation.accuracy_store import AccuracyResult
 from urdfkin.validation.campaign import StoreWarning, validate
-from urdfkin.validation.store import Store
+from urdfkin.validation.store import AccuracyResult, Store
 from urdfkin.view import scene
 from urdfkin.view.scene import shapes
 

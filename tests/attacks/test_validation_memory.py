@@ -9,16 +9,17 @@ from typing import Any
 import pytest
 
 import urdfkin
+from tests.attacks.test_validation_runs import chunks
 from tests.cli.running import python
 from tests.urdfs import chain, joint, limit
 from urdfkin.compiled import evaluate
 from urdfkin.compiled.plan import compile_tree
 from urdfkin.errors import OracleError
 from urdfkin.validation import chunk as chunk_module
-from urdfkin.validation import comparison, memory
+from urdfkin.validation import memory
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import chunks, run_chunk
-from urdfkin.validation.outcome import ValidationVerdict
+from urdfkin.validation.chunk import run_chunk
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.robot_input import subject
 from urdfkin.verify.pinocchio import PinocchioOracle
 
@@ -28,9 +29,9 @@ GB = 10**9
 def test_blocks_contain_each_item_once_and_processes_share_half_of_the_free_memory(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(comparison, "BLOCK_BYTES", 1000)
+    monkeypatch.setattr(memory, "BLOCK_BYTES", 1000)
     for count, size, most in ((10, 300, 3), (9, 300, 3), (1, 300, 1), (5, 2000, 1), (0, 300, 0)):
-        found = list(comparison.blocks(count, size))
+        found = list(memory.blocks(count, size))
         assert [i for block in found for i in range(count)[block]] == list(range(count))
         assert max(block.stop - block.start for block in found) == most
     monkeypatch.setattr(memory, "_free", lambda: iter([12 * GB, 8 * GB]))
@@ -48,7 +49,7 @@ def test_comparing_in_blocks_changes_no_number(
 ) -> None:
     (chunk,) = chunks(subject(source, None, root_joint), 5, 3)
     whole = run_chunk(chunk)
-    monkeypatch.setattr(comparison, "BLOCK_BYTES", 2 * comparison.frame_bytes(8, len(whole.joints)))
+    monkeypatch.setattr(memory, "BLOCK_BYTES", 2 * memory.frame_bytes(8, len(whole.joints)))
     parts = run_chunk(chunk)
     assert parts.tallies == whole.tallies
     assert list(parts.tallies) == list(whole.tallies)
@@ -69,7 +70,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
     for name in ("placements", "velocities", "accelerations", "jacobians", "jacobian_rates"):
         for where in (evaluate, PinocchioOracle):
             monkeypatch.setattr(where, name, recorded(getattr(where, name)))
-    monkeypatch.setattr(comparison, "BLOCK_BYTES", 100_000)
+    monkeypatch.setattr(memory, "BLOCK_BYTES", 100_000)
     (chunk,) = chunks(subject("talos"), 5, 3)
     run_chunk(chunk)
     assert len(sizes) > 100

@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -17,15 +17,20 @@ from tests.validation import faulty_worker
 from urdfkin.errors import UrdfkinError
 from urdfkin.validation import answer, engines, worker_processes
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Chunk, ChunkResult, chunks, run_chunk
+from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, run_chunk
+from urdfkin.validation.document import ValidationVerdict, outcome
 from urdfkin.validation.engines import ExecutorEngine, SerialEngine, Task
-from urdfkin.validation.outcome import ValidationVerdict, outcome
 from urdfkin.validation.results import ValidationReport
-from urdfkin.validation.robot_input import subject
+from urdfkin.validation.robot_input import RobotInput, subject
 
 ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]
 run = partial(subprocess.run, capture_output=True, text=True, check=False)
+
+
+def chunks(robot: RobotInput, samples: int, seed: int) -> Iterator[Chunk]:
+    cut = Cut(samples)
+    return (cut.chunk(robot, seed, index) for index in range(len(cut)))
 
 
 def verdicts(report: ValidationReport) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import urdfkin
-from urdfkin.cli.view import command
+from urdfkin.cli.view import view_command
 from urdfkin.errors import InputError
 from urdfkin.view import server as module
 from urdfkin.view.server import LOOPBACK, RequestFilter, UnguardedError, new_server
@@ -70,7 +70,7 @@ def connect(server: Any, path: str = "/KEY", **headers: str | None) -> int:
 def test_the_viewer_listens_only_on_the_loopback_address_by_default(server: Any) -> None:
     assert LOOPBACK == "127.0.0.1"
     assert inspect.signature(new_server).parameters["host"].default == "127.0.0.1"
-    assert next(option for option in command.params if option.name == "host").default == "127.0.0.1"
+    assert next(option for option in view_command.params if option.name == "host").default == "127.0.0.1"
     assert server.get_host() == "127.0.0.1"
     sockets = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     listening = {line[1] for line in sockets if line[3] == "0A"}

@@ -152,8 +152,16 @@ def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_re
     expanded: Expand, secret: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     inside = '<xacro:arg name="file" default=""/>' + link("${xacro.load_yaml('$(arg file)')['password']}")
+    message = refused(expanded, inside.replace('default=""', f'default="{secret}"'))
+    for words in (
+        "and the files and folders that an argument names",
+        "set arguments with --xacro-arg NAME:=VALUE; a file or folder that VALUE names may be read",
+    ):
+        assert words in message
     assert SECRET in expanded(inside, file=str(secret))
-    refused(expanded, inside.replace('default=""', f'default="{secret}"'))
+    fixed = '<xacro:arg name="folder" default=""/>' + link(f"${{xacro.load_yaml('{secret}')['password']}}")
+    refused(expanded, fixed)
+    assert SECRET in expanded(fixed, folder=str(secret.parent))
     inside = '<xacro:include filename="$(find neighbour)/secret.xacro"/>'
     assert "package 'neighbour' is not found" in refused(expanded, inside)
     refused(expanded, '<xacro:include filename="$(find etc)/passwd"/>')
@@ -162,6 +170,13 @@ def test_a_file_that_the_user_names_or_that_is_in_a_package_or_search_path_is_re
     monkeypatch.delenv("ROS_PACKAGE_PATH")
     (secret.parent / "package.xml").write_text("<package><name>neighbour</name></package>")
     assert SECRET in expanded(inside)
+
+
+def test_the_package_xml_of_another_folder_is_not_read(expanded: Expand, secret: Path) -> None:
+    manifest = secret.parent / ".hidden" / "package.xml"
+    manifest.parent.mkdir()
+    manifest.write_text(f'<robot xmlns:xacro="http://www.ros.org/wiki/xacro">{link(SECRET)}</robot>')
+    refused(expanded, f'<xacro:include filename="{manifest}"/>')
 
 
 def test_hidden_files_and_entities_are_not_read(expanded: Expand, tmp_path: Path, secret: Path) -> None:

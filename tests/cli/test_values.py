@@ -1,5 +1,6 @@
 """Commands read q, v and a in every form, and print results to the last digit in every format."""
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -298,6 +299,51 @@ def test_json_states_the_file_the_locked_joints_and_the_motion_of_the_base(words
         assert data["sha256"] == library.load("panda").sha256
     if "--base-velocity" in words:
         assert data["base_velocity"] == [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+
+
+#: Commands about a path; `dh --all` writes a list of documents.
+ABOUT_PATHS = (
+    "chain", "dh", "dh --all", "dh --tree", "screws", "structure",
+)  # fmt: skip
+LOCKS = "panda_joint1=0.3"
+
+
+@pytest.mark.parametrize("words", ABOUT_PATHS)
+def test_the_output_about_a_path_states_the_locked_joints(words: str) -> None:
+    command, *options = words.split()
+    line = (command, "panda", *options, "--lock", LOCKS, "--lock", "panda_finger_joint1=0.04")
+    found = urdfkin(*line, "--format", "json").data
+    for document in found if isinstance(found, list) else [found]:
+        assert document["lock"] == {"panda_joint1": 0.3, "panda_finger_joint1": 0.04}
+    expected = "locked: panda_joint1 at 0.3 rad, panda_finger_joint1 at 0.04 m"
+    assert expected in urdfkin(*line).text
+    assert "panda\\_joint1 at 0.3 rad" in urdfkin(*line, "--format", "markdown").text
+    free = urdfkin(command, "panda", *options, "--format", "json").data
+    assert all("lock" not in document for document in (free if isinstance(free, list) else [free]))
+    assert "locked" not in urdfkin(command, "panda", *options).text
+
+
+@pytest.mark.parametrize("command", ["dh", "screws"])
+def test_a_written_file_with_locked_joints_is_read_as_the_same_robot(command: str, tmp_path: Path) -> None:
+    path = tmp_path / "panda.json"
+    good(command, "panda", "--lock", LOCKS, "-o", str(path))
+    assert json.loads(path.read_text())["lock"] == {"panda_joint1": 0.3}
+    read, locked = library.load(path), library.load("panda", lock={"panda_joint1": 0.3})
+    q = locked.sample(1, 1)[0][:6]
+    tip = "panda_hand_tcp"
+    assert np.allclose(read.placement(q, tip), locked.placement([*q, 0.0], tip), 0, 1e-14)
+
+
+def test_a_comparison_with_a_published_table_states_the_locked_joints() -> None:
+    line = "dh panda --compare panda --lock panda_finger_joint1=0.04"
+    assert good(f"{line} --format json").data["lock"] == {"panda_finger_joint1": 0.04}
+    assert "locked: panda_finger_joint1 at 0.04 m" in good(line).text
+
+
+def test_a_table_with_a_locked_joint_is_derived_again() -> None:
+    table = good("dh robots/dh/ur5.toml --lock shoulder_pan_joint=0.3 --format json").data
+    assert table["rows"][0]["joint"] == "shoulder_lift_joint"
+    assert table["lock"] == {"shoulder_pan_joint": 0.3}
 
 
 def test_locked_joints_have_no_coordinate_and_no_column() -> None:

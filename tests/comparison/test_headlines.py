@@ -173,6 +173,16 @@ def test_the_exit_code_and_text_of_same_depend_on_the_option_within(tmp_path: Pa
     assert "within their limits only for values from -0.005 to 0.005" in done.text
 
 
+def test_strict_allows_no_difference_in_limits_or_links(tmp_path: Path) -> None:
+    link = '<joint name="extra" type="fixed"><parent link="lower"/><child link="camera"/></joint>'
+    texts = arm(), arm(limits=(-1.0, 0.5)), arm().replace("</robot>", f'<link name="camera"/>{link}</robot>')
+    a, *others = files_of(tmp_path, *texts)
+    assert run("same", a, a, "--strict").code == 0
+    for other in others:
+        assert run("same", a, other).code == 0
+        assert run("same", a, other, "--strict").code == 1
+
+
 def test_the_page_shows_the_verdict_within_the_distance_and_the_origin_of_the_models(tmp_path: Path) -> None:
     arms = arm(tool='<origin xyz="0 0 0.15"/>'), arm()
     a, b, *both = files_of(tmp_path, finger(-1.0), finger(-1.01), *arms)

@@ -16,10 +16,11 @@ from tests.dh.arms import CONVENTIONS, arm, disguised, elbow, published, with_ce
 from tests.random_chains import configurations, rotation, shift, trees
 from urdfkin.dh import DHTable, dh_table, table_from_rows, units_of
 from urdfkin.dh.compare import TableComparison, compare, document
-from urdfkin.dh.convert import to_convention, to_tree
+from urdfkin.dh.convert import serial_tree, to_convention, to_tree
 from urdfkin.dh.parse_table import reference_path, references
 from urdfkin.errors import InputError, RangeError
 from urdfkin.model.chain import chain
+from urdfkin.model.configuration import WIDEST
 from urdfkin.model.tree import FloatArray, KinematicTree, Limit
 
 pytestmark = pytest.mark.slow
@@ -57,7 +58,37 @@ def test_the_proven_bound_names_prismatic_joints_without_limits() -> None:
     path = replace(endless, joints=(replace(first, limit=limit), *others))
     texts = [document(compare(one, dh_table(tree, "tip")), units_of()).text() for one in (path, endless)]
     assert "proven bound for all joint values within limits: " in texts[0]
-    assert "within limits, with j1 within 0.5 m of zero: " in texts[1]
+    assert "within limits, with j1 within 10 m of zero: " in texts[1]
+
+
+@pytest.mark.parametrize("limit", [None, Limit(0.0, 0.0, 1.0, 1.0)])
+def test_the_proven_bound_covers_the_assumed_travel_of_a_joint_without_a_range(limit: Limit | None) -> None:
+    tree = elbow("RPRRRR")
+    first, second, *others = chain(tree, "tip").joints
+    path = replace(chain(tree, "tip"), joints=(first, replace(second, limit=limit), *others))
+    wrong = with_cells(dh_table(tree, "tip"), 0, alpha=dh_table(tree, "tip").rows[0].alpha + 1e-3)
+    found = compare(path, wrong, fit=False)
+    assert found.condition == f"j2 within {WIDEST:g} m of zero"
+    values = np.zeros((2, 6))
+    values[:, 1] = -WIDEST, WIDEST
+    apart = path.placement(values)[:, :3, 3] - found.reference.placement(values)[:, :3, 3]
+    assert 0.009 < np.linalg.norm(apart, axis=-1).max() <= found.most_metres
+
+
+def test_rounding_at_the_assumed_travel_is_no_difference_on_a_path_of_millimetres() -> None:
+    """The displacement of j6 is up to 10 m, so its rounding error exceeds that of the path's lengths."""
+    tree = elbow("RRRRRP")
+    joints = [replace(joint, T_parent_joint=shrunk(joint.T_parent_joint)) for joint in tree.joints]
+    small = serial_tree("arm", tree.links, joints)
+    found = compare(chain(small, "tip"), dh_table(small, "tip"))
+    assert found.as_written
+    assert found.exact
+    assert found.written_metres > found.rounding * found.reach
+
+
+def shrunk(T: FloatArray) -> FloatArray:
+    """Return a pose whose translation is a thousand times shorter."""
+    return np.vstack([np.hstack([T[:3, :3], T[:3, 3:] / 1000.0]), T[3:]])
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -324,6 +355,15 @@ def test_a_wrong_sign_is_named_despite_a_smaller_difference() -> None:
     assert not found.agrees
     assert [one[:2] for one in named(found)] == [(3, "a")]
     assert 5e-4 < found.mistakes[0].metres < 2e-3
+
+
+def test_without_a_fit_wrong_units_are_named_only_if_a_fit_does_not_suffice(tmp_path: Path) -> None:
+    text, file = reference_path("ur5").read_text(), tmp_path / "table.toml"
+    file.write_text(text.replace("d = 0.089159", "d = 0.099159"))
+    lower = run("ur5", "--compare", str(file), "--no-fit")
+    assert (lower.code, "hint:" in lower.text) == (1, False)
+    file.write_text('lengths = "millimetres"\n' + text)
+    assert "when it is read as metres" in run("ur5", "--compare", str(file), "--no-fit").text
 
 
 def test_the_command_exits_with_1_for_a_wrong_sign_and_names_the_correction(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from urdfkin.kinematics.rotation import exp_rotation
 from urdfkin.model.chain import chain
 from urdfkin.model.tree import FloatArray, KinematicTree
 from urdfkin.robot.loading import load
-from urdfkin.verify.chain_checks import check_screws
+from urdfkin.verify.conversions import check_screws
 from urdfkin.verify.tables import TableError
 
 #: Lynch and Park, Modern Robotics, example 4.5: a UR5 with W1 = 109 mm, W2 = 82, L1 = 425, L2 = 392, H1 = 89,

@@ -13,10 +13,14 @@ from tests.dh.arms import CONVENTIONS, EPS, arm
 from tests.random_chains import configurations, rotation, shift, trees, z_joint
 from tests.reading import present
 from urdfkin.dh import DHTable, dh_table
+from urdfkin.dh.export import export
+from urdfkin.dh.export.text import printed
 from urdfkin.dh.snapping import _change, _snap_pose, rotation_angle, row_of_constant
 from urdfkin.dh.table import SnapChange, SnapReport
+from urdfkin.dh.units import Units
 from urdfkin.model.chain import chain
-from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, build_tree
+from urdfkin.model.configuration import WIDEST
+from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Limit, Mimic, build_tree
 
 
 def nearly_round(seed: int, noise: float, joints: int = 5, slides: bool = True) -> KinematicTree:
@@ -146,13 +150,54 @@ def sliding(limit: Limit | None, tilt: float = OFF) -> KinematicTree:
 
 
 @pytest.mark.parametrize(
-    ("limit", "travel"), [(None, 1.0), (Limit(-0.5, 3.0, 1.0, 1.0), 3.0), (Limit(-4.0, 3.0, 1.0, 1.0), 4.0)]
+    ("limit", "travel"),
+    [
+        (None, WIDEST),
+        (Limit(-math.inf, 3.0, 1.0, 1.0), WIDEST),
+        (Limit(-0.5, 3.0, 1.0, 1.0), 3.0),
+        (Limit(-4.0, 3.0, 1.0, 1.0), 4.0),
+    ],
 )
 def test_the_travel_of_a_prismatic_joint_lengthens_the_lever(limit: Limit | None, travel: float) -> None:
     snap = present(dh_table(sliding(limit), "tip", snap=10 * OFF).snap)
     assert snap.per_metre == {"b": pytest.approx(OFF, rel=1e-9)}
     assert snap.metres == pytest.approx(OFF * (2.0 + travel), rel=1e-9)
+    assert 0.0 < snap.measured_metres <= snap.metres
     assert snap.bound({"b": np.array([0.0, -5.0])}) == pytest.approx([2.0 * OFF, 7.0 * OFF], rel=1e-9)
+
+
+@pytest.mark.parametrize("form", ["terminal", "markdown", "latex", "sympy", "json", "toml"])
+def test_each_format_with_the_bound_states_the_assumed_travel_of_a_joint_without_limits(form: str) -> None:
+    endless, limited = (
+        export(dh_table(sliding(limit), "tip", snap=10 * OFF), form)
+        for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
+    )
+    condition = f"joints without limits travel at most {WIDEST:g} m"
+    assert condition in " ".join(endless.split())
+    assert condition not in " ".join(limited.split())
+
+
+def test_the_error_of_printed_digits_states_the_assumed_travel_of_a_joint_without_limits() -> None:
+    endless, limited = (
+        printed(dh_table(sliding(limit, 0.1), "tip"), Units(digits=3))
+        for limit in (None, Limit(-1.0, 1.0, 1.0, 1.0))
+    )
+    assert str(endless).endswith(f"m; this holds if joints without limits travel at most {WIDEST:g} m")
+    assert "travel" not in str(limited)
+    assert limited.metres < endless.metres <= present(endless.bound)
+
+
+@pytest.mark.parametrize("base", ["base", "a"])
+def test_the_bound_of_printed_digits_covers_a_small_multiplier_of_a_mimic_rule(base: str) -> None:
+    # The printed multiplier has 10 digits. Its error is multiplied by the value of the mimicked joint.
+    rule, ahead = Mimic("big", 1.0 / 29.0, 0.0), shift(1.0, 0.0, 0.0)
+    joints = [
+        (z_joint("big", limit=Limit(-3.0, 3.0, 1.0, 1.0)), "base", "a"),
+        (z_joint("small", ahead, limit=Limit(-0.11, 0.11, 1.0, 1.0), mimic=rule), "a", "b"),
+        (z_joint("end", ahead, JointKind.FIXED), "b", "tip"),
+    ]
+    found = printed(dh_table(build_tree("arm", "base", joints), "tip", base), Units(digits=15))
+    assert 0.0 < found.metres <= present(found.bound)
 
 
 def test_a_snap_report_sums_the_bounds_of_all_changes() -> None:

@@ -16,9 +16,10 @@ from tests.export.writing import code, file, module
 from tests.laws.subjects import robot_of, state
 from tests.reading import module_of
 from tests.urdfs import joint, limit, loaded, mimic
-from urdfkin.export import proof, single
+from urdfkin.export import function as export_function
+from urdfkin.export import proof
 from urdfkin.export.expression import Graph, Node
-from urdfkin.export.function import Function
+from urdfkin.export.function import Function, single_bounds
 from urdfkin.kinematics.roundings import SINGLE_EPS, SINGLE_OPERATION
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray
@@ -80,7 +81,7 @@ def worst(made: Made, scale: float = 1.0) -> float:
     of, q = function(made), inputs(scale)
     true = of.values((q,))[of.results[0]]
     with np.errstate(all="ignore"):
-        error, bound = np.abs(in_single(of, q) - true), SINGLE_EPS * single.single_bounds(of, (q,))[:, 0]
+        error, bound = np.abs(in_single(of, q) - true), SINGLE_EPS * single_bounds(of, (q,))[:, 0]
         return float(np.where(error > 0.0, error / bound, 0.0).max())
 
 
@@ -98,7 +99,7 @@ def test_the_bound_of_an_operation_holds_and_fails_without_the_term_of_the_opera
 ) -> None:
     assert (0.9 if op in ("sin", "cos") else 0.2) < worst(OPERATIONS[op]) <= 1.0
     monkeypatch.setitem(SINGLE_OPERATION, op, 0.0)
-    monkeypatch.setattr(single, "SINGLE_POLYNOMIAL", 0.0)
+    monkeypatch.setattr(export_function, "SINGLE_POLYNOMIAL", 0.0)
     assert worst(OPERATIONS[op]) > 1.0
 
 
@@ -126,7 +127,7 @@ PASSED: dict[tuple[str, int], Made] = {
 def test_the_bound_includes_the_propagated_error_of_each_operand(
     op: str, operand: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made, right = PASSED[op, operand], single._SLOPES[op]
+    made, right = PASSED[op, operand], export_function._SLOPES[op]
     node = function(made).results[0]
     assert node.op == op
     assert node.of[operand].op != "q"
@@ -135,7 +136,7 @@ def test_the_bound_includes_the_propagated_error_of_each_operand(
     def without(*given: Any) -> tuple[Any, ...]:
         return tuple(0.0 * s if k == operand else s for k, s in enumerate(right(*given)))
 
-    monkeypatch.setitem(single._SLOPES, op, without)
+    monkeypatch.setitem(export_function._SLOPES, op, without)
     assert worst(made) > 1.0
 
 
@@ -144,21 +145,21 @@ def test_the_bound_of_a_product_includes_the_propagated_error_of_the_first_opera
 ) -> None:
     made: Made = lambda g, x, y, z: inexact(x, y) * (z * z)  # noqa: E731
     assert worst(made) <= 1.0
-    monkeypatch.setitem(single._SLOPES, "*", lambda value, x, y: (0.0 * y, x))
+    monkeypatch.setitem(export_function._SLOPES, "*", lambda value, x, y: (0.0 * y, x))
     assert worst(made) > 1.0
 
 
 def test_the_bound_includes_the_underflow_error_of_numbers_near_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     made: Made = lambda g, x, y, z: x * y  # noqa: E731
     assert 0.0 < worst(made, 2.0**-68) <= 1.0
-    monkeypatch.setattr(single, "SINGLE_SMALLEST", 0.0)
+    monkeypatch.setattr(export_function, "SINGLE_SMALLEST", 0.0)
     assert worst(made, 2.0**-68) > 1.0
 
 
 def test_a_number_that_overflows_in_single_precision_has_an_infinite_bound() -> None:
     of = function(lambda g, x, y, z: x * y)
-    assert np.all(np.isinf(single.single_bounds(of, (inputs(2.0**65),))))
-    assert np.all(np.isfinite(single.single_bounds(of, (inputs(2.0**60),))))
+    assert np.all(np.isinf(single_bounds(of, (inputs(2.0**65),))))
+    assert np.all(np.isfinite(single_bounds(of, (inputs(2.0**60),))))
 
 
 # -- in files -----------------------------------------------------------------------------------------------
@@ -178,7 +179,7 @@ def test_the_bounds_of_a_file_include_the_rounding_of_constants(
 ) -> None:
     text = _FIXED.format("0.1 0 0", "0 0 0")
     assert shares(text, tmp_path)["placement", "float32"] <= 1.0
-    monkeypatch.setattr(single, "_constant", lambda x: 0.0)
+    monkeypatch.setattr(export_function, "_constant_error", lambda x: 0.0)
     assert shares(text, tmp_path)["placement", "float32"] > 1.0
     assert shares(text, tmp_path)["placement", "float64"] <= 1.0
 
@@ -281,6 +282,6 @@ def test_bounds_in_single_precision_hold_and_are_at_most_20_times_the_largest_er
         found = getattr(own, of.name)(*(x.astype(np.float32) for x in used))
         assert found.dtype == np.float32
         error = np.abs(found - of.evaluated(used)).reshape(200, -1)
-        bound = SINGLE_EPS * single.single_bounds(of, used)
+        bound = SINGLE_EPS * single_bounds(of, used)
         assert np.all(error <= bound)
         assert float((error[bound > 0.0] / bound[bound > 0.0]).max()) > 0.05

@@ -16,7 +16,7 @@ from urdfkin.kinematics.rotation import exp_rotation, log_rotation
 from urdfkin.model.chain import chain
 from urdfkin.model.path import ElementaryMotion, Path, elementary
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic, build_tree, pose
-from urdfkin.verify.chain_checks import check_chain
+from urdfkin.verify.conversions import check_chain
 from urdfkin.verify.oracle import QueryBatch
 from urdfkin.verify.pinocchio import PinocchioOracle
 from urdfkin.verify.tables import TableError

@@ -21,7 +21,7 @@ from urdfkin.model.tree import FloatArray, JointKind
 from urdfkin.robot import Robot
 from urdfkin.system.resources import example_robots_dir
 from urdfkin.urdf.catalogue import catalogue, example_robots
-from urdfkin.validation.outcome import ValidationVerdict
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.verify.quantities import QUANTITIES
 
 #: Robots of which Pinocchio 4.1 builds no model with mimic=True, because it does not find the mimicked

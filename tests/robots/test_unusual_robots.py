@@ -14,7 +14,7 @@ from tests.robots.odd_urdfs import NAMES, random_tree, urdf_of
 from tests.urdfs import loaded
 from urdfkin.model.reference import Reference
 from urdfkin.robot import Robot
-from urdfkin.validation.outcome import ValidationVerdict
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.verify.quantities import QUANTITIES
 

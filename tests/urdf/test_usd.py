@@ -24,7 +24,7 @@ from tests.cli.running import urdfkin as command
 from tests.reading import present
 from tests.urdfs import loaded
 from urdfkin.comparison.certificate import certificate, recheck
-from urdfkin.comparison.result import Sameness, SameQuestion
+from urdfkin.comparison.result import Sameness, SameQuestion, Verdict
 from urdfkin.errors import InputError, OracleError, SourceError
 from urdfkin.kinematics.rotation import quaternion_of, rotation_about, rotation_from_rpy, rotation_of
 from urdfkin.kinematics.roundings import SINGLE
@@ -688,7 +688,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("arc", LOOPS)
-def test_layers_that_refer_to_each_other_in_a_circle_are_a_finding(write: Write, arc: str) -> None:
+def test_layers_that_refer_to_each_other_in_a_cycle_are_a_finding(write: Write, arc: str) -> None:
     arm, files = stage(ARM).partition(")\n")[2], []
     for own, other in ("ab", "bc", "ca"):
         head, x = (part.format(other) for part in LOOPS[arc])
@@ -1328,6 +1328,69 @@ def test_only_the_rounding_of_a_number_explains_a_difference_in_either_order_of_
 ) -> None:
     found = in_both_orders(loaded(models[0]), read(models[1]))
     assert [one.up_to_single for one in found] == [explained] * 2
+
+
+def with_a_link_between(x: float, *, in_the_stage: bool) -> tuple[str, str]:
+    """Write a URDF and a stage with two joints; one of the files has a link of its own between the joints.
+
+    `x` is a number of the second joint: 0.25 is exact in single precision, and 0.1 is rounded. The common
+    link `b` has the pose of the link between the joints.
+    """
+    mount = urdfs.joint("mount", "fixed", "between", "b")
+    other = joint("mount", "Fixed", "between", "b", localPos0=(0, 0, 0))
+    ours, theirs = ("b", "between") if in_the_stage else ("between", "b")
+    urdf = urdfs.robot(
+        urdfs.joint("first", "continuous", "base", ours, 'xyz="0 0 0.5"'),
+        urdfs.joint("second", "continuous", ours, "tip", f'xyz="{x} 0 0.5"'),
+        "" if in_the_stage else mount,
+    )
+    links = BASE + body("b") + body("tip") + (body("between") + other if in_the_stage else "")
+    joints = turn("first", "base", theirs, (0, 0, 0.5)) + turn("second", theirs, "tip", (x, 0, 0.5))
+    return urdf, links + joints
+
+
+def test_two_joints_of_a_stage_without_a_common_link_between_them_may_not_be_rounded(read: Read) -> None:
+    urdf, content = with_a_link_between(0.25, in_the_stage=True)
+    for found in in_both_orders(loaded(urdf), read(content)):
+        assert found.verdict is Verdict.SAME
+        assert not found.unexplained
+    urdf, content = with_a_link_between(0.1, in_the_stage=True)
+    why = "the joints between this link and the nearest common link cannot be compared"
+    for found in in_both_orders(loaded(urdf), read(content)):
+        assert found.verdict is Verdict.DIFFERS
+        assert [(one.place, one.what) for one in found.differences] == [("joint second", "axis")]
+        assert [str(one) for one in found.unexplained] == [f"link tip: {why}"]
+    # If only the URDF has a link between the joints, the common link `b` is between the joints of the stage.
+    urdf, content = with_a_link_between(0.1, in_the_stage=False)
+    for found in in_both_orders(loaded(urdf), read(content)):
+        assert found.up_to_single, found.unexplained
+
+
+@pytest.mark.parametrize("names", [("hand", "camera"), ("hand.0", "camera.0")])
+@pytest.mark.parametrize("x", [0.25, 0.1])
+def test_a_joint_that_moves_no_common_link_is_a_difference_with_and_without_rounding(
+    read: Read, x: float, names: tuple[str, str]
+) -> None:
+    hand, camera = map(transcoded, names)
+    urdf = urdfs.robot(
+        urdfs.joint("first", "continuous", "base", "b", 'xyz="0 0 0.5"'),
+        urdfs.joint("second", "continuous", "b", names[0], f'xyz="{x} 0 0.5"'),
+        urdfs.joint("mount", "fixed", "base", names[1], 'xyz="1 0 0"'),
+    )
+
+    def content(moved: str, fixed: str) -> str:
+        joints = turn("first", "base", "b", (0, 0, 0.5)) + turn("second", "b", moved, (x, 0, 0.5))
+        mount = joint("mount", "Fixed", "base", fixed, localPos0=(1, 0, 0))
+        return BASE + body("b") + body(hand) + body(camera) + joints + mount
+
+    for found in in_both_orders(loaded(urdf), read(content(hand, camera))):
+        assert found.verdict is (Verdict.SAME if x == 0.25 else Verdict.UP_TO_SINGLE)
+    for found in in_both_orders(loaded(urdf), read(content(camera, hand))):
+        assert found.verdict is Verdict.DIFFERS
+        assert {one.what for one in found.differences} >= {"carried by"}
+        assert [str(one) for one in found.unexplained] == [
+            "joint second: carries no link that both models have"
+        ]
 
 
 @pytest.mark.parametrize("lock", [{"slide": 0.3}, {"elbow": 0.7}, {"slide": -0.2, "wrist": 1.1}])

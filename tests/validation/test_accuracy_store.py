@@ -14,9 +14,8 @@ from urdfkin.robot import Robot
 from urdfkin.robot.loading import load
 from urdfkin.validation import accuracy
 from urdfkin.validation.accuracy import AccuracyStudy
-from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy, StudySettings
 from urdfkin.validation.campaign import StoreWarning, stored, validate
-from urdfkin.validation.store import Store, open_store
+from urdfkin.validation.store import AccuracyResult, FailedStudy, Store, StudySettings, open_store
 
 ROBOTS = ["planar_two_link", "no such robot", "double_pendulum"]
 STUDIED = ["planar_two_link", "double_pendulum"]

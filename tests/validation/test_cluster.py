@@ -40,7 +40,7 @@ from urdfkin.validation.answer import CRASHED_TWICE
 from urdfkin.validation.campaign import stored, validate
 from urdfkin.validation.cluster import Cluster, ClusterError, connected
 from urdfkin.validation.collector import CampaignProgress
-from urdfkin.validation.outcome import ValidationVerdict
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.results import provenance
 from urdfkin.validation.robot_input import RobotInput, subject
 

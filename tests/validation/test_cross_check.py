@@ -15,7 +15,7 @@ from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
 from urdfkin.report.reading import checked, contradictions
-from urdfkin.validation import comparison
+from urdfkin.validation import chunk
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
 from urdfkin.validation.error_stats import CrossCheck, OraclePair, cross_check, plus, tally
@@ -108,8 +108,8 @@ def test_each_pair_of_libraries_has_its_own_bound(monkeypatch: pytest.MonkeyPatc
         bounds.append(bound)
         return tally(ours, theirs, bound, *others)
 
-    monkeypatch.setattr(comparison, "cross_check", record_pairs)
-    monkeypatch.setattr(comparison, "tally", record_bounds)
+    monkeypatch.setattr(chunk, "cross_check", record_pairs)
+    monkeypatch.setattr(chunk, "tally", record_bounds)
     assert validate(arm(), samples=0, oracle="mujoco").passed
     assert len(pairs) == len(bounds) - 1 > 10  # only Pinocchio has data.J
     for (first, second), bound in zip(pairs, bounds, strict=False):

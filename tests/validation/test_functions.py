@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,12 +19,14 @@ from tests.cli.running import good, refused
 from tests.cli.running import urdfkin as run
 from tests.report.test_texts import junit_of
 from tests.robots.odd_urdfs import random_tree
-from tests.urdfs import joint
+from tests.urdfs import built, joint
 from tests.urdfs import robot as robot_text
+from urdfkin.model.conventions import find_convention
 from urdfkin.report.junit import functions_as_junit
 from urdfkin.robot import Robot
 from urdfkin.validation.diagnosis import _HALVES
 from urdfkin.validation.functions import FunctionCheck, verify_function
+from urdfkin.validation.programs import Program, ProgramError
 from urdfkin.verify.quantities import recursive_quantities
 
 #: Robots with a frame: arms, a quadruped, and grippers with mimic joints.
@@ -311,13 +314,23 @@ def test_a_function_in_a_convention_agrees_and_exchanged_rows_are_named(
     how: dict[str, Any] = {"frame": "FL_foot", "samples": 20, "convention": convention}
     moving = not tool.conversion.is_constant and quantity in ("jacobian rate", "hessian")
     if moving:
-        with pytest.raises(urdfkin.InputError, match="has other axes or another reference point"):
+        with pytest.raises(urdfkin.InputError, match="floating or planar joint has other axes"):
             verify_function(right, robot, quantity, **how)
         return
     assert verify_function(right, robot, quantity, **how).agrees
     if quantity != "placement":
         found = verify_function(lambda *i: right(*i)[_HALVES], robot, quantity, **how)
         check_diagnosis(found, "rows come first")
+
+
+@pytest.mark.parametrize("quantity", ["jacobian rate", "hessian"])
+def test_a_function_for_the_centre_of_mass_in_the_axes_of_the_body_is_checked(quantity: str) -> None:
+    robot = urdfkin.load("go2", root_joint="floating")
+    convention = replace(find_convention("urdfkin"), name="centre", point="centre of mass")
+    right = computed(robot.with_convention(convention), quantity, "FL_foot")  # type: ignore[arg-type]
+    how: dict[str, Any] = {"frame": "FL_foot", "samples": 20, "convention": convention}
+    assert verify_function(right, robot, quantity, **how).agrees
+    assert not verify_function(computed(robot, quantity, "FL_foot"), robot, quantity, **how).agrees
 
 
 def test_a_function_is_compared_without_an_oracle_and_the_result_says_so() -> None:
@@ -352,6 +365,28 @@ def test_a_result_that_is_no_array_of_real_numbers_is_an_error(result: Any, word
     found = check("ur5", "jacobian", lambda q: result(ur5_jacobian(q)))
     assert not found.agrees
     assert words in found.first_errors[0].message
+
+
+def test_a_mistake_that_leaves_two_percent_of_the_difference_is_not_reported() -> None:
+    fixed = [joint(f"to_{x}", "fixed", "arm", f"at_{x}", f'xyz="{x} 0 0"', "") for x in ("0.02", "1")]
+    robot = built(joint("j", "continuous", "base", "arm"), *fixed)
+
+    def at_the_arm(q: np.ndarray) -> np.ndarray:
+        T = robot.placement(q, "arm")
+        T[0, 3] += 5e-4
+        return T
+
+    found = verify_function(at_the_arm, robot, "placement", frame="at_1")
+    assert found.diagnoses == ("the function returns the result of the frame 'arm' instead of 'at_1'",)
+
+
+def test_a_function_that_only_raises_exceptions_has_no_diagnosis() -> None:
+    def refuses_zero(q: np.ndarray) -> np.ndarray:
+        assert q.any(), "zero"
+        return ur5_jacobian(q)
+
+    found = check("ur5", "jacobian", refuses_zero)
+    assert (found.agrees, found.errors, found.diagnoses) == (False, 1, ())
 
 
 def test_a_robot_without_moving_joints_is_compared_and_a_missing_column_of_a_locked_robot_is_named() -> None:
@@ -408,6 +443,30 @@ def test_a_fault_of_a_program_is_reported_and_the_check_continues(fault: str, tm
     else:
         assert words in data["first_errors"][0]["message"]
     assert data["compared"] >= 10 - 3
+
+
+@pytest.mark.slow
+def test_a_late_line_of_a_program_is_not_the_answer_to_the_next_request(tmp_path: Path) -> None:
+    adapter = tmp_path / "adapter.py"
+    answer = "print(json.dumps(dict(result=robot.jacobian(request['q'], 'tip').tolist())), flush=True)"
+    late = f"if k == 3: print('debug', flush=True); time.sleep(0.5); {answer}; continue"
+    adapter.write_text(ADAPTER.format(fault=late))
+    done = run(
+        *("verify", f"{sys.executable} {adapter}", "planar_two_link", "--program", "--samples", "3"),
+        *("--timeout", "60", "--format", "json"),
+    )
+    assert (done.data["compared"], done.data["errors"]) == (5, 1)
+    assert done.data["share"] <= 1.0
+
+
+def test_a_program_that_answers_with_errors_gets_all_requests() -> None:
+    arm = urdfkin.load("planar_two_link")
+    command = ["sed", "-u", r's/.*"q": *\[ *0.0,.*/{"error": "singular"}/; t; s/.*/{"result": [1]}/']
+    with Program(command, arm, "jacobian", "tip", "local_world_aligned") as program:
+        for _ in range(4):
+            with pytest.raises(ProgramError, match="singular"):
+                program(np.zeros(2))
+        assert program(np.ones(2)) == [1]
 
 
 def test_a_file_named_like_a_library_does_not_replace_the_library_and_requests_have_locked_joints(

@@ -20,9 +20,9 @@ from urdfkin.dh import dh_table
 from urdfkin.robot import Robot
 from urdfkin.validation import robot_summary
 from urdfkin.validation.campaign import validate
+from urdfkin.validation.chunk import Timings
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_summary import MOST, chains_of
-from urdfkin.validation.timings import Timings
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 pytestmark = pytest.mark.filterwarnings("ignore::urdfkin.UrdfWarning")

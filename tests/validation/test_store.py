@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.attacks.test_validation_runs import Refusing
+from tests.attacks.test_validation_runs import Refusing, chunks
 from tests.cli.running import urdfkin as run
 from urdfkin.errors import InputError, SourceError
-from urdfkin.validation import answer, manifest, results
+from urdfkin.validation import answer, results
 from urdfkin.validation.answer import (
     Answer,
     DamagedError,
@@ -32,10 +32,10 @@ from urdfkin.validation.answer import (
     unpack,
 )
 from urdfkin.validation.campaign import StoreWarning, chunks_of_shard, stored, validate
-from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, chunks, run_chunk
+from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, run_chunk
 from urdfkin.validation.collector import CampaignProgress, ResultCollector
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import subject
 from urdfkin.validation.store import Store
 
@@ -123,7 +123,7 @@ def test_changed_code_reuses_no_result_and_the_digest_covers_all_code_that_compu
     interrupt(tmp_path)
     before = Store.reading(tmp_path, pytest.fail).manifest
     changed = results.provenance() | {"code": "0" * 64}
-    monkeypatch.setattr(manifest, "provenance", lambda: changed)
+    monkeypatch.setattr("urdfkin.validation.store.provenance", lambda: changed)
     with pytest.raises(InputError, match=r"code \w{12} and 000000000000"):
         run_all(tmp_path)
     after = replace(before, provenance=changed)

@@ -25,7 +25,7 @@ from urdfkin.model.configuration import draw_base
 from urdfkin.model.reference import Reference
 from urdfkin.urdf.catalogue import catalogue
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.outcome import ValidationVerdict
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.verify import oracles, second_reader
 from urdfkin.verify.mujoco import MujocoOracle
 from urdfkin.verify.pinocchio import pinocchio, version

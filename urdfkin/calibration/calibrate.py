@@ -49,7 +49,7 @@ from urdfkin.kinematics.rotation import polar_factor, rotation_of
 from urdfkin.model.configuration import checked
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load
+from urdfkin.robot.loading import as_robot, load
 from urdfkin.robot.trajectory import read_arrays, read_columns
 from urdfkin.system.files import MOST_DATA, read_text
 from urdfkin.urdf.sources import Source
@@ -284,7 +284,7 @@ def fitted_model(
     check: bool = True,
 ) -> Calibration:
     """Fit as `calibrate` does, but also return implausible fits."""
-    robot = source if isinstance(source, Robot) else load(source)
+    robot = as_robot(source)
     names = tuple(as_str(name, "each of fit") for name in as_names(fit, "fit"))
     model = (
         table_model(source, names)

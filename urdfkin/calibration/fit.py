@@ -63,6 +63,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urdfkin.calibration.parameters import CalibrationModel
+from urdfkin.comparison.result import angle, length
 from urdfkin.errors import InputError
 from urdfkin.kinematics.least_squares import least_squares
 from urdfkin.kinematics.rotation import euler_of, log_rotation
@@ -265,6 +266,11 @@ class Fit:
         """Return the root mean square of the position errors (m) and of the orientation errors (rad)."""
         position, rotation = (np.sqrt((x**2).sum(axis=1).mean()) for x in np.hsplit(self.errors, [3]))
         return float(position), float(rotation) if self.errors.shape[1] == 6 else None
+
+    @property
+    def rms_words(self) -> str:
+        metres, radians = self.rms()
+        return length(metres) if radians is None else f"{length(metres)}, {angle(radians)}"
 
 
 def errors(model: CalibrationModel, measured: Measured, at: FloatArray) -> FloatArray:

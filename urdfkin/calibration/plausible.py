@@ -199,10 +199,10 @@ def check_plausibility(fit: FitWithData, *, radians: bool) -> Plausibility:
     if not objections:
         half = f"a joint zero changed by half a turn, joint {_list(zeros)}; " if zeros else ""
         objections = [
-            f"{half}an rms error of {_rms(fit.fitted)}, but only {_rms(better.fit.fitted)} with a"
+            f"{half}an rms error of {fit.fitted.rms_words}, but only {better.fit.fitted.rms_words} with a"
             " correction of the data"
         ]
-    corrected = f"after this correction the rms error is {_rms(better.fit.fitted)}"
+    corrected = f"after this correction the rms error is {better.fit.fitted.rms_words}"
     return Plausibility(tuple(objections), f"{better.correction.reason} ({corrected})", in_degrees)
 
 
@@ -350,8 +350,3 @@ class _Trial:
 def _norm(residuals: FloatArray, reach: float) -> float:
     """Return the norm (m) of residuals (s, 6) or (s, 3); angles are multiplied by the reach."""
     return float(np.linalg.norm(residuals * ([1.0] * 3 + [reach] * (residuals.shape[1] - 3))))
-
-
-def _rms(fit: Fit) -> str:
-    metres, radians = fit.rms()
-    return length(metres) if radians is None else f"{length(metres)}, {angle(radians)}"

@@ -33,7 +33,7 @@ from urdfkin.model.chain import FrameChain, chain
 from urdfkin.model.configuration import values_within
 from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, build_tree, pose
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load
+from urdfkin.robot.loading import as_robot
 from urdfkin.system.files import read_text
 from urdfkin.urdf.sources import Source
 from urdfkin.verify.certificate import Certificate
@@ -112,7 +112,7 @@ def universal_robots(robot: Robot | Source, path: Path, order: str = "driver") -
     replace the joint origins of the URDF. In other URDFs, such as the older ROS description, the joint
     origins are fitted. After the fit, the poses of `tool0` in `base` are those of the calibrated arm.
     """
-    robot = robot if isinstance(robot, Robot) else load(robot)
+    robot = as_robot(robot)
     origins = read_calibration(path, order)
     prefix = _prefix(robot)
     calibrated = chain(calibrated_tree(origins), "tool0", "base")

@@ -24,15 +24,15 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 #: For each heading of the help page: the commands, each with its module in `urdfkin.cli` and its summary.
-#: A command is the function `command` of its module, or `NAME_command` if the module has several commands.
+#: A command is the function `NAME_command` of its module. `command_of` makes the commands of quantities.
 _COMPUTE = "Compute"
 _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
     "Look at a robot": {
         "robots": ("robots", "List the robots of the catalogue, which are loaded by name."),
         "info": ("robots", "Show the whole robot: links, joints, limits, frames and coordinates."),
-        "order": ("order", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
+        "order": ("robots", "Show the order of the joints in MuJoCo, Drake, Isaac Lab and more."),
         "view": ("view", "Show a robot in a browser, with a slider for each joint and verified results."),
-        "plot": ("plot", "Plot a frame's motion along a trajectory."),
+        "plot": ("view", "Plot a frame's motion along a trajectory."),
     },
     _COMPUTE: {
         "analytical-jacobian": (
@@ -73,10 +73,10 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
             "Compare the results of your function or program with those of urdfkin and Pinocchio.",
         ),
         "readers": (
-            "readers",
+            "models",
             "Compare how MuJoCo, yourdfpy and other installed libraries read a robot file.",
         ),
-        "vectors": ("vectors", "Write test vectors for other programs: robots and results at 50 digits."),
+        "vectors": ("export", "Write test vectors for other programs: robots and results at 50 digits."),
         "report": ("reports", "Show, convert, compare or merge the results of validations."),
     },
     "Check files": {
@@ -84,15 +84,14 @@ _GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "explain": ("explain", "Explain the code of a finding, an equation, or a common question."),
     },
     "Shell": {
-        "completion": ("completion", "Print a completion script for bash, zsh or fish."),
-        "warm": ("warm", "Compile all kernels in advance, for container images and CI."),
+        "completion": ("shell", "Print a completion script for bash, zsh or fish."),
+        "warm": ("shell", "Compile all kernels in advance, for container images and CI."),
     },
 }
-_QUANTITY = "quantity"
 
 
 def groups() -> dict[str, dict[str, tuple[str, str]]]:
-    rows = {name: (_QUANTITY, f"Compute the {row.summary}.") for name, row in by_command().items()}
+    rows = {name: ("quantity", f"Compute the {row.summary}.") for name, row in by_command().items()}
     return _GROUPS | {_COMPUTE: rows | _GROUPS[_COMPUTE]}
 
 
@@ -169,10 +168,7 @@ class LazyGroup(click.Group):
         module_name, _ = commands()[cmd_name]
         module = importlib.import_module(f"urdfkin.cli.{module_name}")
         command = getattr(module, f"{cmd_name.replace('-', '_')}_command", None)
-        if command is None:
-            is_quantity = module_name == _QUANTITY
-            command = module.command_of(by_command()[cmd_name]) if is_quantity else module.command
-        return cast("click.Command", command)
+        return cast("click.Command", command or module.command_of(by_command()[cmd_name]))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

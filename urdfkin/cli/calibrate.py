@@ -98,7 +98,7 @@ _FORMS = (*TEXTS, "json")
     help="Write the calibrated URDF or table (TOML) to this file.",
 )
 @click.pass_context
-def command(
+def calibrate_command(
     context: click.Context,
     /,
     robot: str,

@@ -204,7 +204,7 @@ def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) 
         return
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted
-    from urdfkin.validation.accuracy_store import AccuracyResult
+    from urdfkin.validation.store import AccuracyResult
 
     if (results := AccuracyResult.of(store)) is not None:
         say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')} done")
@@ -242,8 +242,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
     the accuracy study are copied too. Each file is read and checked; damaged files are reported and skipped.
     DIR is made if it does not exist.
     """
-    from urdfkin.validation.accuracy_store import AccuracyResult
-    from urdfkin.validation.store import Store, open_store
+    from urdfkin.validation.store import AccuracyResult, Store, open_store
 
     others = [Store.reading(store, warn) for store in stores]
     with open_store(folder, others[0].manifest, warn) as whole:

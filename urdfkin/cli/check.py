@@ -16,7 +16,6 @@ from typing import Any
 
 import click
 
-from urdfkin.cli.completion import complete_code, complete_file
 from urdfkin.cli.options import (
     FILE,
     WholeNumber,
@@ -28,6 +27,7 @@ from urdfkin.cli.options import (
     source_options,
 )
 from urdfkin.cli.output import counted, write_output
+from urdfkin.cli.shell import complete_code, complete_file
 from urdfkin.cli.streams import command_lines, harmless, say, say_styled
 from urdfkin.errors import SourceError, UnknownNameError, UrdfkinError
 from urdfkin.system.files import demand_regular, read_bytes, read_start, write_file
@@ -272,7 +272,7 @@ limit_options = combine(
 @settings_options
 @limit_options
 @click.pass_context
-def command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
+def check_command(context: click.Context, /, files: Sequence[str], **options: Any) -> None:
     """Check URDF files and print the findings, each with its code, line, cause and remedy.
 
     A FILE is the path of a URDF, USD or MJCF file, a name that `urdfkin robots` lists, or - for standard

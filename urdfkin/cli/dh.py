@@ -9,7 +9,6 @@ from typing import Any
 
 import click
 
-from urdfkin.cli.completion import complete_table
 from urdfkin.cli.options import (
     FiniteNumber,
     combine,
@@ -22,6 +21,7 @@ from urdfkin.cli.options import (
     verify_option,
 )
 from urdfkin.cli.output import Answer, report_compilation, writes_answer
+from urdfkin.cli.shell import complete_table
 
 #: Copy of `urdfkin.dh.export.FORMATS`; the import of that module would slow --help down
 FORMATS = (
@@ -158,7 +158,7 @@ form_options = combine(
 _SIGNS = ("last", "parallel_offset", "flip", "first", "sign")
 _CHOICES = ("convention", "near_parallel", "snap", "slide", "like", *_SIGNS)
 #: If ROBOT is a Denavit-Hartenberg table, the command derives a new table only with one of these options.
-_DERIVING = ("base", "tip", "all_", *_CHOICES[1:])
+_DERIVING = ("base", "tip", "all_", "lock", "joints", *_CHOICES[1:])
 _UNITS = ("degrees", "millimetres", "digits", "columns")
 
 
@@ -187,7 +187,7 @@ def _reject_unused(context: click.Context, is_table: bool, options: dict[str, An
 @form_options
 @verify_option
 @writes_answer(*FORMATS, suffixes=_SUFFIXES)
-def command(robot: str, verify: bool, **options: Any) -> Answer:
+def dh_command(robot: str, verify: bool, **options: Any) -> Answer:
     """Write the Denavit-Hartenberg table of the path between two frames. Pinocchio checks the table.
 
     The path may go down or up the tree of links, or first up and then down. The table has the file's angles

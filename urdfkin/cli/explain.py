@@ -7,7 +7,7 @@ import textwrap
 
 import click
 
-from urdfkin.cli.completion import complete_topic
+from urdfkin.cli.shell import complete_topic
 from urdfkin.errors import UnknownNameError
 from urdfkin.kinematics.registry import explain as explain_equation
 from urdfkin.system.files import read_text
@@ -61,7 +61,7 @@ def _indent(code: str) -> str:
 
 @click.command("explain")
 @click.argument("topic", metavar="CODE|EQUATION|QUESTION", required=False, shell_complete=complete_topic)
-def command(topic: str | None) -> None:
+def explain_command(topic: str | None) -> None:
     """Explain the code of a finding, an equation, or a common question.
 
     CODE is a finding's code or its short name. Its page has the reason, a bad and a good example, and the

@@ -1,32 +1,37 @@
-"""`urdfkin same` and `urdfkin diff`: compare two robot models."""
+"""`urdfkin same`, `diff`: compare robot models. `readers`: compare how libraries read a file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.options import (
     FILE,
     NumberInRange,
     WholeNumber,
+    load_robot,
     load_several,
     markdown_option,
     reject_unused_options,
+    robot_argument,
+    samples_option,
     schema_option,
+    seed_option,
     source_options,
 )
 from urdfkin.cli.output import TEXTS, Answer, check_writable, report_compilation, writes_answer
+from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
-from urdfkin.errors.display import TextDocument
+from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_value, json_text
 from urdfkin.system.files import write_file
 
 if TYPE_CHECKING:
+    from urdfkin.comparison.readers import LibraryReading
     from urdfkin.comparison.result import SameQuestion
     from urdfkin.robot import Robot
 
@@ -48,7 +53,8 @@ _OF_TWO = ("pairs", "certificate", "write_map", "recheck", "markdown", "html", "
 @click.option(
     "--strict",
     is_flag=True,
-    help="Also exit 1 if the models are equivalent but not the same, or if their joint limits differ.",
+    help="Also exit 1 if the models are equivalent but not the same, or have differences without effect on"
+    " motion, such as limits, or links that only one model has.",
 )
 @click.option(
     "--within",
@@ -113,9 +119,9 @@ def same_command(
     rounding of its numbers to single precision.
 
     Exit 0: the models are the same, the same up to single precision, or equivalent after the printed changes.
-    1: the models are different. With --strict, also 1 if the models are equivalent but not the same, or if
-    their joint limits differ. 2: bad input. With --within, the command does not change B before the
-    comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
+    1: the models are different. With --strict, also 1 if the models are equivalent but not the same, or have
+    differences without effect on motion, such as limits. 2: bad input. With --within, the command does not
+    change B before the comparison. Exit 0: all frames are within the given distance. 1: a frame is not.
     """
     from urdfkin.comparison.bounds import MOST_BOXES
     from urdfkin.comparison.certificate import certificate
@@ -242,3 +248,68 @@ def diff_command(a: str, b: str, more: tuple[str, ...], effects: bool, markdown:
         return Answer(lambda: pairs_document(found), data, code=code)
     lines = TextDocument("", lines_of(found[0]))
     return Answer(lambda: document(found[0]), data, code=code, fitted=lambda _: lines)
+
+
+@click.command("readers", epilog="Example: urdfkin readers ur5 --with mujoco,yourdfpy")
+@robot_argument
+@click.option(
+    "--with",
+    "libraries",
+    metavar="NAMES",
+    help="Libraries to compare, separated by commas.",
+    show_default="all installed libraries",
+)
+@samples_option(5, "Number of random configurations, in addition to q = 0.")
+@seed_option
+@writes_answer()
+def readers_command(robot: str, libraries: str | None, samples: int, seed: int) -> Answer:
+    """Compare how other libraries read ROBOT: joints, their order, and the poses of all links.
+
+    The libraries for URDF are Pinocchio, MuJoCo, Drake, iDynTree, yourdfpy, urchin, kinpy, ikpy, the Robotics
+    Toolbox and scikit-robot. Pinocchio and MuJoCo also read MJCF files, and Newton reads USD files. Each
+    library reads the file in its own process. The command compares the poses of all links with urdfkin's
+    poses. If a library reads a joint differently, the command names the element of the file that causes the
+    difference, for example the joint's `axis`.
+
+    Exit 0: all libraries agree. 1: a library differs or refuses the file. 2: bad input.
+    """
+    from urdfkin.comparison.readers import compare_readers
+
+    loaded = load_robot(robot, verify=False)
+    names = None if libraries is None else [name.strip() for name in libraries.split(",")]
+    found = compare_readers(loaded, names, samples=samples, seed=seed)
+
+    def lines() -> Iterator[list[object]]:
+        yield ["library", "version", "joint", "element", "difference", "size"]
+        for reading in found:
+            if reading.refused is not None:
+                yield [reading.library, reading.version, "", "", csv_value(reading.refused), ""]
+            for difference in reading.differences:
+                words = map(csv_value, (difference.joint, difference.element, difference.words))
+                yield [reading.library, reading.version, *words, repr(difference.size)]
+
+    data = {"robot": loaded.name, "readers": [reading.as_dict() for reading in found]}
+    code = int(not all(reading.agrees for reading in found))
+    return Answer(lambda: _readings(loaded.name, found), {"json": lambda: data, "csv": lines}, code=code)
+
+
+def _readings(name: str, found: tuple[LibraryReading, ...]) -> TextDocument:
+    rows = [(f"{reading.library} {reading.version}", *_cells(reading)) for reading in found]
+    parts: list[Table | str] = [Table(("library", "poses", "joints"), rows, left=3)]
+    differences = [
+        (one.joint, one.element, one.words, f"{one.size:.2g}")
+        for reading in found
+        for one in reading.differences
+    ]
+    if differences:
+        parts.append(Table(("joint", "element", "difference", "size"), differences, left=3, names=(0,)))
+    parts += [f"{x.library} refuses the file: {x.refused}" for x in found if x.refused is not None]
+    parts += [f"{x.library} merges links: {', '.join(x.missing)}" for x in found if x.missing]
+    return TextDocument(f"{name}: how other libraries read the file", parts)
+
+
+def _cells(reading: LibraryReading) -> tuple[str, str]:
+    if reading.refused is not None:
+        return "refused", "-"
+    poses = "the same" if reading.agrees else f"off by {reading.worst:.2g}"
+    return poses, f"{len(reading.joints)}, in {'the same' if reading.same_order else 'another'} order"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from urdfkin.cli.completion import complete_frame, complete_robot
+from urdfkin.cli.shell import complete_frame, complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, QuestionsSection, SourceError
 from urdfkin.errors.numbers import parse_float, parse_int, remedy
@@ -337,6 +337,13 @@ def warn_of_limits(robot: Robot, q: FloatArray) -> None:
 
 def locked_joints(robot: Robot) -> dict[str, Any]:
     return {"lock": dict(robot.origin.lock)} if robot.origin.lock else {}
+
+
+def locked_line(robot: Robot) -> str:
+    """Return one line with the value of each locked joint, or "" if no joint is locked."""
+    units = {name: "rad" if robot.joints[name].unlocked.kind.turns else "m" for name, _ in robot.origin.lock}
+    values = ", ".join(f"{name} at {value:.6g} {units[name]}" for name, value in robot.origin.lock)
+    return f"locked: {values}" if values else ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -388,7 +388,7 @@ def _short_poses(x: Inputs, T: FloatArray, written: str, *, verify: bool) -> Flo
     R = T[:, :3, :3]
     orientation = np.asarray(rpy_of(R) if written == "rpy" else quaternion_of(R))
     if verify and x.robot.certificate().verified:
-        from urdfkin.verify.orientation import check_orientations
+        from urdfkin.verify.conversions import check_orientations
 
         check_orientations(orientation, R, x.frame, lambda k: _replay_command(x, k, written))
     if written == "wxyz":

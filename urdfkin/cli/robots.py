@@ -1,11 +1,14 @@
-"""`urdfkin robots`: list the robots of the catalogue. `urdfkin info`: show one robot."""
+"""`urdfkin robots`: list the robots of the catalogue. `urdfkin info`: show one robot.
+
+`urdfkin order`: print the joint order of each tool, and code that converts one convention to another.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,6 +21,9 @@ from urdfkin.urdf.catalogue import CatalogueEntry, catalogue
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from urdfkin.model.conventions import Conversion
+    from urdfkin.robot import Robot
 
 _FAMILIES = sorted({entry.family for entry in catalogue().values()})
 
@@ -100,3 +106,129 @@ def _rows(document: TextDocument, links: Sequence[str]) -> Iterator[list[str]]:
             yield list(part.heads)
             for link, (_, *cells) in zip(links, part.rows, strict=True):
                 yield [csv_cell(link), *(csv_value(str(cell)) for cell in cells)]
+
+
+_NO_ORDER = (
+    "The joint order of idyntree follows no known rule; pass it as robot.convention('idyntree', joints=[...])"
+)
+
+
+@click.command("order", epilog="Example: urdfkin order a1 --from isaaclab --to mujoco")
+@robot_argument
+@click.option(
+    "--from", "start", metavar="NAME|FILE", help="Convention to convert from.", show_default="urdfkin"
+)
+@click.option("--to", "end", metavar="NAME|FILE", help="Convention to convert to.", show_default="urdfkin")
+@writes_answer()
+def order_command(robot: str, start: str | None, end: str | None) -> Answer:
+    """Show the order of the joints in Pinocchio, MuJoCo, Drake, Isaac Lab and other tools.
+
+    For each joint and tool, the table contains the joint's index in q, or both indices if the index in v
+    differs: 7/6 means q[7] and v[6]. Tools with the same indices share a column. With --from or --to, the
+    command prints NumPy code that converts q and v. NAME is a tool from the table; FILE is a TOML file with
+    your own order, signs, units and motor zeros (docs/conventions.md).
+    """
+    loaded = load_robot(robot, verify=False)
+    if start is None and end is None:
+        return _orders(loaded)
+    return _conversion_code(loaded.convention(start or "urdfkin"), loaded.convention(end or "urdfkin"))
+
+
+def _orders(robot: Robot) -> Answer:
+    from urdfkin.model.conventions import BUILT_IN, find_convention
+
+    found = {name: robot.convention(name) for name in BUILT_IN if find_convention(name).order != "given"}
+    cells = {name: _cells(robot, conversion) for name, conversion in found.items()}
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for name, column in cells.items():
+        groups.setdefault(column, []).append(name)
+
+    def document() -> TextDocument:
+        heads = ("joint", *(first for first, *_ in groups.values()))
+        rows = list(zip(robot.joint_names, *groups, strict=True))
+        also = [f"{first}: also {', '.join(others)}" for first, *others in groups.values() if others]
+        title = f"{robot.name}: index of each joint in q, or q/v if its index in v differs"
+        return TextDocument(title, [Table(heads, rows, names=(0,)), *also, _NO_ORDER])
+
+    def lines() -> Iterator[list[object]]:
+        yield ["joint", *cells]
+        for name, *row in zip(robot.joint_names, *cells.values(), strict=True):
+            yield [csv_cell(name), *row]
+
+    conventions = {name: _convention_data(conversion) for name, conversion in found.items()}
+    return Answer(document, {"json": lambda: {"robot": robot.name, "conventions": conventions}, "csv": lines})
+
+
+def _cells(robot: Robot, conversion: Conversion) -> tuple[str, ...]:
+    """Return a text for each joint: its index in q, for example "7", or its range of indices, "7-13".
+
+    The text is "7/6" if the index in v is 6. The text is "-" if the convention has no index for the joint.
+    """
+    indices = conversion.q_and_v_indices
+
+    def span(found: list[int]) -> str:
+        return str(found[0]) if len(found) == 1 else f"{found[0]}-{found[-1]}"
+
+    def cell(name: str) -> str:
+        if name not in indices:
+            return "-"
+        q, v = map(span, indices[name])
+        return q if q == v else f"{q}/{v}"
+
+    return tuple(map(cell, robot.joint_names))
+
+
+def _convention_data(conversion: Conversion) -> dict[str, Any]:
+    convention = conversion.convention
+    return {
+        "title": convention.title,
+        "joints": list(conversion.joint_names),
+        "q": list(conversion.coordinate_names),
+        "v": list(conversion.rate_names),
+        "quaternion": convention.quaternion,
+        "six_vectors": convention.six,
+        "evidence": convention.evidence,
+        "sources": list(convention.sources),
+        "note": convention.note,
+    }
+
+
+def _conversion_code(start: Conversion, end: Conversion) -> Answer:
+    from urdfkin.model.conventions import reordering
+
+    a, b = start.convention.name, end.convention.name
+    found = {letter: reordering(letter, start, end) for letter in "qv"}
+    names = {"q": end.coordinate_names, "v": end.rate_names}
+
+    def code() -> Iterator[str]:
+        for letter, one in found.items():
+            if one is not None:
+                yield one.code(f"{letter}_to", f"{letter}_from")
+                continue
+            old, new, star = (
+                ("q_from", "q_to", "") if letter == "q" else ("q_from, v_from", "q_to, v_to", "*")
+            )
+            yield f"# {letter}: this conversion changes more than order, factors and zeros; use urdfkin:"
+            yield f"{new} = robot.convention({b!r}).to({star}robot.convention({a!r}).from_({old}))"
+        if start.angular_first != end.angular_first:
+            yield "six_to = six_from[..., [3, 4, 5, 0, 1, 2]]"
+        if note := end.convention.note:
+            yield f"# {b}: {note}"
+
+    def data() -> dict[str, Any]:
+        document: dict[str, Any] = {"from": a, "to": b, "joints": list(end.joint_names)}
+        for letter, one in found.items():
+            entry = None
+            if one is not None:
+                entry = {"index": list(one.index), "factor": list(one.factor), "zero": list(one.zero)}
+            document[letter] = {"names": list(names[letter]), "reordering": entry}
+        return document
+
+    def lines() -> Iterator[list[object]]:
+        yield ["what", "name", "index", "factor", "zero"]
+        for letter, one in found.items():
+            if one is not None:
+                cells = zip(names[letter], one.index, map(repr, one.factor), map(repr, one.zero), strict=True)
+                yield from ([letter, csv_cell(name), *more] for name, *more in cells)
+
+    return Answer(lambda: TextDocument("", list(code())), {"json": data, "csv": lines})

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from urdfkin.cli.campaign import progress, warn
-from urdfkin.cli.completion import complete_robot
 from urdfkin.cli.exit import stoppable
 from urdfkin.cli.options import (
     WholeNumber,
@@ -25,6 +24,7 @@ from urdfkin.cli.options import (
 )
 from urdfkin.cli.output import check_writable, console, report_compilation
 from urdfkin.cli.reports import FILES, report_options, say_written, write_reports
+from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.lazy_import import install_remedy
@@ -34,9 +34,9 @@ from urdfkin.verify.quantities import compared, not_compared
 if TYPE_CHECKING:
     from urdfkin.robot import Robot
     from urdfkin.validation.accuracy import AccuracyStudy
-    from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy, StudySettings
     from urdfkin.validation.engines import Engine
     from urdfkin.validation.results import ValidationReport
+    from urdfkin.validation.store import AccuracyResult, FailedStudy, StudySettings
 
 
 def study_all(
@@ -55,9 +55,9 @@ def study_all(
     `shard` is a part of the validation, for example "1/4". With `shard`, only robots whose first samples
     belong to this part are studied. An interrupt skips the remaining robots.
     """
-    from urdfkin.validation.accuracy_store import FailedStudy
     from urdfkin.validation.campaign import chunks_of_shard
     from urdfkin.validation.chunk import Cut
+    from urdfkin.validation.store import FailedStudy
 
     parts = chunks_of_shard(len(given), Cut(report.samples), shard)
     here = [i for i, part in enumerate(parts) if part]
@@ -89,8 +89,7 @@ def _open_results(
     if folder is None:
         yield None
         return
-    from urdfkin.validation.accuracy_store import AccuracyResult
-    from urdfkin.validation.store import Store, open_store
+    from urdfkin.validation.store import AccuracyResult, Store, open_store
 
     with open_store(folder, Store.reading(folder, warn).manifest, warn, shard=shard) as store:
         results = AccuracyResult(store, settings)
@@ -109,8 +108,8 @@ def _study(
 
     from urdfkin.model.configuration import draw_base
     from urdfkin.validation.accuracy import accuracy_study
-    from urdfkin.validation.accuracy_store import FailedStudy
     from urdfkin.validation.robot_input import subject
+    from urdfkin.validation.store import FailedStudy
 
     is_same = True
     try:
@@ -185,7 +184,7 @@ def _with_quantities(command: _T) -> _T:
 )
 @report_options
 @click.pass_context
-def command(
+def validate_command(
     context: click.Context,
     /,
     robots: tuple[str, ...],
@@ -232,8 +231,8 @@ def command(
         )
     from urdfkin.report.terminal import print_report
     from urdfkin.urdf.sources import is_xacro
-    from urdfkin.validation.accuracy_store import StudySettings
     from urdfkin.validation.campaign import validate
+    from urdfkin.validation.store import StudySettings
 
     check_writable(*files.values())
     how = load_options()

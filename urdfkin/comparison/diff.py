@@ -30,7 +30,7 @@ from urdfkin.kinematics.roundings import SINGLE
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load, robot_of
+from urdfkin.robot.loading import as_robot, robot_of
 from urdfkin.system.plain_xml import plain_xml
 from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
@@ -156,7 +156,7 @@ def diff(a: Robot | Source | DHTable, b: Robot | Source | DHTable, *, effects: b
         >>> print(found.changes[0])
         joint shoulder_pan_joint: limit lower -6.28318530718 -> -3.14159265359
     """
-    old, new = (source if isinstance(source, Robot) else load(source) for source in (a, b))
+    old, new = as_robot(a), as_robot(b)
     if _format(old) != _format(new):
         return _across_formats(old, new, effects=effects)
     changes = tuple(_changes(old.urdf, new.urdf))

@@ -788,23 +788,28 @@ def differences(alignment: Alignment, variables: Variables) -> tuple[Difference,
     for tree, joints, which in ((tree_a, alignment.only_a, "A"), (tree_b, alignment.only_b, "B")):
         alone = [f"joint {tree.joints[j].name}" for j in sorted(joints) if tree.joints[j].kind.nv]
         ordered += [Difference(place, f"only in {which}") for place in alone]
-    have = {tree_a.links[frame.a] for frame in alignment.frames}
-    for link in tree_a.links:
-        if link in tree_b.links and link not in have and _on_matched_bodies(alignment, link):
-            ours, theirs = (_carrier(tree, link) for tree in (tree_a, tree_b))
-            ordered.append(Difference(f"link {link}", "carried by", ours, theirs))
+    have = {frame.a for frame in alignment.frames}
+    links_of_b = {label: link for link, label in enumerate(alignment.b.labels)}
+    for link, label in enumerate(alignment.a.labels):
+        other = links_of_b.get(label)
+        if other is not None and link not in have and _on_matched_bodies(alignment, link, other):
+            ours, theirs = _carrier(tree_a, link), _carrier(tree_b, other)
+            ordered.append(Difference(f"link {tree_a.links[link]}", "carried by", ours, theirs))
     return tuple(ordered)
 
 
-def _on_matched_bodies(alignment: Alignment, link: str) -> bool:
+def _on_matched_bodies(alignment: Alignment, link: int, other: int) -> bool:
     return all(
-        mechanism.body_of[mechanism.tree.link_index(link)] not in {mechanism.body_of[j + 1] for j in only}
-        for mechanism, only in ((alignment.a, alignment.only_a), (alignment.b, alignment.only_b))
+        mechanism.body_of[index] not in {mechanism.body_of[j + 1] for j in only}
+        for mechanism, only, index in (
+            (alignment.a, alignment.only_a, link),
+            (alignment.b, alignment.only_b, other),
+        )
     )
 
 
-def _carrier(tree: KinematicTree, link: str) -> str:
-    path = [tree.joints[i] for i in tree.path(tree.link_index(link)) if tree.joints[i].kind.nv]
+def _carrier(tree: KinematicTree, link: int) -> str:
+    path = [tree.joints[i] for i in tree.path(link) if tree.joints[i].kind.nv]
     return f"joint {path[-1].name}" if path else "the base"
 
 

@@ -54,7 +54,7 @@ from urdfkin.model.mechanisms.mechanism import (
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
 from urdfkin.model.tree import FloatArray, Joint, KinematicTree, Lock, inverse
 from urdfkin.robot import Robot
-from urdfkin.robot.loading import load
+from urdfkin.robot.loading import as_robot
 from urdfkin.urdf.sources import Source, is_usd
 from urdfkin.verify.oracles import PINOCCHIO
 from urdfkin.verify.verifier import as_verify
@@ -115,7 +115,7 @@ def same(
         >>> bool(found)
         False
     """
-    robots = tuple(source if isinstance(source, Robot) else load(source) for source in (a, b))
+    robots = (as_robot(a), as_robot(b))
     joint_map = _parse_map(map)
     whole_number(boxes, "boxes", 0)
     if within is not None:

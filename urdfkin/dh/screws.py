@@ -329,7 +329,7 @@ def screws_from(
 def screws_of_mapping(data: Mapping[str, Any]) -> ProductOfExponentials:
     """Make screws from plain data with the keys M and "space" or "body"."""
     known = ("robot", "base_frame", "tip_frame", "joints", "M", "space", "body")
-    check_keys(data, known, "the table of screws")
+    check_keys([key for key in data if key != "lock"], known, "the table of screws")
     frame = next((key for key in ("space", "body") if key in data), None)
     if frame is None:
         raise InputError(

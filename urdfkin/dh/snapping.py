@@ -34,8 +34,8 @@ from urdfkin.errors.validators import real_number
 from urdfkin.kinematics.rotation import coordinate_rotation
 from urdfkin.kinematics.roundings import ANGLE, EPS, TURN
 from urdfkin.model.chain import FrameChain, chain, steps_between
-from urdfkin.model.configuration import axis_range, values_within
-from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, Limit, frozen
+from urdfkin.model.configuration import axis_range, largest_value, values_within
+from urdfkin.model.tree import FloatArray, Joint, JointKind, KinematicTree, frozen
 
 #: With a tolerance above 7.5 degrees, an angle could be within the tolerance of two multiples of 15 degrees.
 LARGEST_TOLERANCE = math.pi / 36.0
@@ -99,7 +99,7 @@ def snap_report(
     for change in changes:
         for name in change.sliders:
             per_metre[name] = per_metre.get(name, 0.0) + change.angle
-    travels = {row.joint: travel(row.limit) for row in table.rows}
+    travels = {row.joint: largest_value(row.limit) for row in table.rows}
     metres = sum((change.tip for change in changes), 0.0)
     metres += sum(rate * travels[name] for name, rate in per_metre.items())
     q = samples_within_limits(table)
@@ -234,11 +234,6 @@ def row_of_constant(table: DHTable, k: int) -> int:
     if k == n:
         return n - 1 if is_identity(table.tool) else n
     return k - 1 if table.convention is DHConvention.STANDARD else k
-
-
-def travel(limit: Limit | None) -> float:
-    """Return the largest distance of a prismatic joint from zero (m); 1 m without limits."""
-    return 1.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
 
 
 def noisy_cells(table: DHTable) -> list[tuple[str, str, float]]:

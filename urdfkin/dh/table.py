@@ -34,7 +34,7 @@ from urdfkin.kinematics.roundings import ANGLE, EPS, of_rows
 from urdfkin.model.configuration_like import Given
 from urdfkin.model.mimic import Coupling, coupling_of
 from urdfkin.model.path import ElementaryMotion, Path
-from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen, is_rigid
+from urdfkin.model.tree import FloatArray, JointKind, Limit, Mimic, frozen, is_bounded, is_rigid
 from urdfkin.system.lazy_import import hook
 
 
@@ -273,7 +273,7 @@ class SnapReport:
         tolerance: The requested tolerance (rad).
         changes: The snapped angles, base to tip.
         metres: Guaranteed bound of the tip's displacement (metres). The bound holds if each prismatic joint
-            is within its limits, or within 1 m of zero if the joint has no limits.
+            is within its limits, or within 10 m of zero if the joint has no limits.
         radians: Guaranteed bound of the tip's rotation (radians).
         per_metre: For each prismatic joint, the increase of the bound per metre of travel (metres per metre).
         measured_metres: Largest displacement of the tip in sampled configurations (metres).
@@ -449,6 +449,16 @@ class DHTable(Displayable):
         False
         """
         return any(row.beta != 0.0 for row in self.rows)
+
+    @property
+    def unlimited(self) -> tuple[str, ...]:
+        """Names of the prismatic joints without limits. Bounds assume that these joints travel at most 10 m.
+
+        >>> import urdfkin
+        >>> urdfkin.load("planar_two_link").dh("tip", "base").unlimited
+        ()
+        """
+        return tuple(row.joint for row in self.rows if not row.kind.turns and not is_bounded(row.limit))
 
     @cached_property
     def span(self) -> float:

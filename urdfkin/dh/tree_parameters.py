@@ -15,7 +15,7 @@ kilometres (Hayati).
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -32,7 +32,7 @@ from urdfkin.dh.common_normals import (
     tilt_of,
 )
 from urdfkin.dh.derive import RIGHT_ANGLE_SLACK
-from urdfkin.dh.export.text import format_sum
+from urdfkin.dh.export.text import PrintedPrecision, format_sum
 from urdfkin.dh.table import along_axis, between_axes, cleaned_angle
 from urdfkin.dh.units import Units
 from urdfkin.errors import InputError
@@ -330,3 +330,25 @@ def as_csv(table: TreeParameters) -> str:
         cells = [csv_cell(value) if isinstance(value, str) else value for value in row.values()]
         lines.append([*cells, *T.ravel().tolist()])
     return csv_text(lines)
+
+
+def printed_tree(table: TreeParameters, units: Units, q: FloatArray) -> PrintedPrecision:
+    """Compare the link positions of a printed and an exact table at `q` (n, coordinates)."""
+    again = replace(table, rows=tuple(_printed_tree_row(row, units) for row in table.rows))
+    distances = np.linalg.norm((again.placements(q) - table.placements(q))[..., :3, 3], axis=-1)
+    return PrintedPrecision(units.digits, float(distances.max(initial=0.0)), None, len(q))
+
+
+def _printed_tree_row(row: TreeRow, units: Units) -> TreeRow:
+    theta_offset, r_offset = (row.offset if row.sigma == kind else 0.0 for kind in (0, 1))
+    return replace(
+        row,
+        gamma=units.printed_angle(row.gamma),
+        b=units.printed_length(row.b),
+        alpha=units.printed_angle(row.alpha),
+        d=units.printed_length(row.d),
+        beta=units.printed_angle(row.beta),
+        theta=units.printed_angle(row.theta + theta_offset) - theta_offset,
+        r=units.printed_length(row.r + r_offset) - r_offset,
+        multiplier=float(f"{row.multiplier:.10g}"),
+    )

@@ -76,6 +76,16 @@ class Units:
         """
         return self._number(metres if self.lengths is Lengths.METRES else metres * 1000.0)
 
+    def printed_angle(self, radians: float) -> float:
+        """Return the angle (rad) that a reader of the printed angle gets."""
+        text = self.angle(radians)
+        number = read_number(text, "printed")
+        return number if "pi" in text else cell_in_si("theta", number, self)
+
+    def printed_length(self, metres: float) -> float:
+        """Return the length (m) that a reader of the printed length gets."""
+        return cell_in_si("d", read_number(self.length(metres), "printed"), self)
+
     def _number(self, value: float) -> str:
         return f"{value:.{self.digits}g}" if value else "0"
 

@@ -6,7 +6,6 @@ import importlib
 from typing import TYPE_CHECKING, cast
 
 from urdfkin.errors import UnknownNameError
-from urdfkin.export.seal import seal
 
 if TYPE_CHECKING:
     from urdfkin.export.code import FrameCode
@@ -41,4 +40,6 @@ def write(code: FrameCode, to: str) -> str:
     """Return the text of an exported file with its digest."""
     if to not in LANGUAGES:
         raise UnknownNameError("language", to, LANGUAGES)
+    from urdfkin.export.check import seal
+
     return seal(cast("str", importlib.import_module(LANGUAGES[to][0]).write(code_in(code, to), to)))

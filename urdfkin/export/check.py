@@ -1,4 +1,7 @@
-"""Check an exported file: compile or import the file, and run its test vectors.
+"""Check an exported file: its seal, and its test vectors, which run after the file is compiled or imported.
+
+The seal is the digest of the text, in the file's header. The seal shows whether the header, the code or the
+test vectors of the file were changed. A seal is not a signature, so it does not prove who wrote the file.
 
 The check runs the file as code. Before you check a file from another person, consider whether you would run
 that person's programs. The check runs a copy of the file in a separate folder, so that the copy cannot import
@@ -7,6 +10,7 @@ other files of the original folder, such as a `math.py`, by accident.
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import subprocess
@@ -16,12 +20,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urdfkin.errors import InputError
-from urdfkin.export.seal import is_sealed
 from urdfkin.system.files import read_text
 from urdfkin.system.processes import own_python
 
 #: Text in the first lines of every exported file.
-_MARK = "straight-line code for this robot and frame"
+MARK = "straight-line code for this robot and frame"
+_ZEROS = "0" * 64
+#: Line of the header in which `seal` replaces the zeros by the digest.
+SEAL = f"Seal sha256 {_ZEROS}"
+_SEALED = re.compile(r"^([ %*]*Seal sha256 )([0-9a-f]{64})$", re.MULTILINE)
 _MAIN = re.compile(r"^#ifdef (\w+)_MAIN$", re.MULTILINE)
 _FUNCTION = re.compile(r"^function f = ([A-Za-z]\w*)\(\)", re.MULTILINE | re.ASCII)
 _STRICT = ("-Wall", "-Wextra", "-pedantic", "-Werror")
@@ -33,10 +40,27 @@ _COMPILE = {
 }
 #: Compiler and options for a CUDA file that runs on a GPU.
 _COMPILE_FOR_GPU = ("nvcc", "-Xcompiler", "-Wall,-Wextra,-Werror", "-x", "cu")
-#: Number of characters at the start of a file that are searched for `_MARK` and the word UNVERIFIED.
+#: Number of characters at the start of a file that are searched for `MARK` and the word UNVERIFIED.
 _HEAD = 2000
 #: Time limit (s) of a command; a robot with a thousand joints compiles in one minute.
 _TIME_LIMIT = 600.0
+
+
+def seal(text: str) -> str:
+    """Replace the 64 zeros in the file's header by the digest."""
+    return _SEALED.sub(lambda found: found[1] + _digest(text), text, count=1)
+
+
+def _is_sealed(text: str) -> bool | None:
+    """Return whether the file's digest is correct; None without a digest."""
+    text = text.replace("\r\n", "\n")
+    if (found := _SEALED.search(text)) is None:
+        return None
+    return _digest(_SEALED.sub(lambda line: line[1] + _ZEROS, text, count=1)) == found[2]
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +82,7 @@ def check(file: Path) -> FileCheck:
     Raise InputError if the file is not an export or does not run here, and SourceError if it cannot be read.
     """
     text = read_text(file)
-    if _MARK not in text[:_HEAD]:
+    if MARK not in text[:_HEAD]:
         raise InputError("this file was not written by `urdfkin export`", where=str(file))
     runs = {**dict.fromkeys(_COMPILE, _run_compiled), ".py": _run_imported, ".m": _run_octave}
     if (run := runs.get(file.suffix)) is None:
@@ -78,7 +102,7 @@ def check(file: Path) -> FileCheck:
 def _doubts(text: str) -> Iterator[str]:
     if "UNVERIFIED" in text[:_HEAD]:
         yield "these expressions were not compared with Pinocchio when they were written"
-    sealed = is_sealed(text)
+    sealed = _is_sealed(text)
     if sealed is None:
         yield (
             "the file has no seal (checksum), so changes of the file cannot be detected; export the file"

@@ -10,11 +10,11 @@ from urdfkin.compiled.plan import CompiledTree, StepField
 from urdfkin.errors import InputError
 from urdfkin.errors.validators import as_names, as_str
 from urdfkin.export import recursion
+from urdfkin.export.check import MARK, SEAL
 from urdfkin.export.expression import Node, Number
 from urdfkin.export.function import Function, function_of
 from urdfkin.export.naming import all_safe, comment_name, comment_text, title
 from urdfkin.export.proof import Proof, prove
-from urdfkin.export.seal import SEAL
 from urdfkin.model.configuration import coordinate_names, rate_names
 from urdfkin.model.reference import Reference
 from urdfkin.model.tree import KinematicTree
@@ -74,7 +74,7 @@ class FrameCode:
         """Lines of a file's header; the first line marks unverified code."""
         verdict, *rest = self.proof.lines
         subject = f"{self.robot}, frame {self.frame}"
-        about = f"Kinematics of {subject}: straight-line code for this robot and frame."
+        about = f"Kinematics of {subject}: {MARK}."
         verified = self.proof.certificate.verified
         lines = [
             *([about, "", verdict] if verified else [verdict, about, ""]),

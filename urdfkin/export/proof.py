@@ -17,9 +17,8 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal, localcontext
 import numpy as np
 
 from urdfkin.compiled.plan import CompiledTree
-from urdfkin.export.function import Function
+from urdfkin.export.function import Function, single_bounds
 from urdfkin.export.naming import comment_name, comment_text
-from urdfkin.export.single import single_bounds
 from urdfkin.kinematics.roundings import EPS, SINGLE_EPS, SMALLEST
 from urdfkin.model.configuration import draw
 from urdfkin.model.recursion import Number

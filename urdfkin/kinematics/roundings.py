@@ -86,7 +86,7 @@ deviation is the same as for urdfkin. If an export is compared with true values 
 at most 7.2 eps, which is within `ROUNDINGS`.
 
 **An export in single precision** has a separate bound for each number of a test vector. The unit is eps =
-2^-23. The value of each operation and of each constant has a rounding error. `urdfkin.export.single`
+2^-23. The value of each operation and of each constant has a rounding error. `urdfkin.export.function`
 multiplies each of these errors by the derivative of the result with respect to the value. The bound is the
 sum of the absolute values of all these products. The error of one operation is
 
@@ -204,7 +204,7 @@ MJCF_RULE = 8.0
 #: Rounding error (in eps) that each row of a Denavit-Hartenberg table adds.
 ROW = 8.0
 
-# Errors in exports in single precision (`urdfkin.export.single`); the module's docstring derives the errors.
+# Errors in exports in single precision (`urdfkin.export.function`); the docstring derives the errors.
 
 SINGLE_EPS = 2.0**-23
 #: The smallest normal number, and the largest number, of single precision.

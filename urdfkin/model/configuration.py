@@ -42,7 +42,11 @@ from urdfkin.model.tree import (
 
 #: Sampled ranges are cut off at +-`WIDEST` (rad or m). A missing limit is replaced by +-`WIDEST`.
 #: The range of a continuous joint is -pi to pi.
+#: All bounds assume this largest distance (m) from zero for a joint without limits that translates.
+#: Few linear axes of robots are longer. A bound for a travel of 10 m also holds for a shorter travel.
 WIDEST = 10.0
+#: The condition of a bound, as text, if a joint that translates has no limits.
+TRAVEL_CONDITION = f"joints without limits travel at most {WIDEST:g} m"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +54,8 @@ class NarrowedRange:
     """A mimicked joint's own range, and the part of this range that its mimic joints allow.
 
     Attributes:
-        allowed: The part of `own` in which all mimic joints are within their limits; None if no value is
-            allowed.
+        allowed: The part of `own` in which all mimic joints are within their limits; None if at most one
+            value is allowed.
         by: Names of the mimic joints whose limits make the range smaller.
     """
 
@@ -65,7 +69,7 @@ class NarrowedRange:
         names = ", ".join(self.by)
         own = f"joint {self.joint} ranges over {range_words(self.own)} {self.unit}"
         if self.allowed is None:
-            return f"{own}; no value keeps all its mimic joints within their limits ({names})"
+            return f"{own}; at most one value keeps all its mimic joints within their limits ({names})"
         allowed = range_words(self.allowed)
         return f"{own}; its mimic joints are within their limits only for values from {allowed} ({names})"
 
@@ -79,11 +83,16 @@ def range_words(ends: tuple[float, float]) -> str:
     return f"{ends[0]:.6g} to {ends[1]:.6g}"
 
 
-def axis_range(kind: JointKind, limit: Limit | None, slide: float = 1.0) -> tuple[float, float]:
-    """Return the ends of a joint's range; without limits, -pi to pi (rad) or -`slide` to `slide` (m)."""
+def axis_range(kind: JointKind, limit: Limit | None) -> tuple[float, float]:
+    """Return the ends of a joint's range; without limits, -pi to pi (rad) or -`WIDEST` to `WIDEST` (m)."""
     if kind is not JointKind.CONTINUOUS and is_bounded(limit):
         return limit.lower, limit.upper
-    return (-math.pi, math.pi) if kind.turns else (-slide, slide)
+    return (-math.pi, math.pi) if kind.turns else (-WIDEST, WIDEST)
+
+
+def largest_value(limit: Limit | None) -> float:
+    """Return the largest absolute value (rad or m) within limits; `WIDEST` without limits."""
+    return max(abs(limit.lower), abs(limit.upper)) if is_bounded(limit) else WIDEST
 
 
 def values_within(ranges: Sequence[tuple[float, float]], count: int, seed: int = 0) -> FloatArray:

@@ -7,7 +7,6 @@ from typing import Any, cast
 import numpy as np
 
 from urdfkin.calibration.calibrate import Calibration, doubts
-from urdfkin.calibration.fit import Fit
 from urdfkin.calibration.write_back import Rewritten
 from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
@@ -52,11 +51,13 @@ def document(found: Calibration) -> TextDocument:
     every = sum(p in found.writable for p in identification.kept)
     few = found.written_fit is not None and len(found.written_parameters) < every
     as_written = (
-        f"; with only the written parameters: {_rms(found.written_fit)}"
+        f"; with only the written parameters: {found.written_fit.rms_words}"
         if few and found.written_fit is not None
         else ""
     )
-    parts.append(f"rms error before the fit: {_rms(found.before)}; after: {_rms(found.fitted)}{as_written}")
+    parts.append(
+        f"rms error before the fit: {found.before.rms_words}; after: {found.fitted.rms_words}{as_written}"
+    )
     if few:
         parts.append(
             f"written: {len(found.written_parameters)} of {every} parameters; only these changed by more than"
@@ -88,11 +89,6 @@ def _amount(value: float, unit: str) -> str:
     if not np.isfinite(value):
         return "unknown"
     return length(value) if unit == "m" else angle(value) if unit == "rad" else f"{value:.3g}"
-
-
-def _rms(fit: Fit) -> str:
-    metres, radians = fit.rms()
-    return length(metres) if radians is None else f"{length(metres)}, {angle(radians)}"
 
 
 def _written(T: FloatArray) -> str:

@@ -2,12 +2,13 @@
 
 A change is a regression in these cases:
 
-- The run passed before and fails now.
-- A robot is missing, or its verdict is worse.
-- More results lie outside their bound.
+- The run passed before and fails now, or it was interrupted now and not before.
+- A robot is missing, its verdict is worse, or it is new and not verified.
+- More results lie outside their bound, or results of a quantity that was not compared before.
 - A quantity or a table is no longer compared, or there are fewer samples or results.
 - A bound is wider for the same joints.
-- The worst disagreement grew by more than a factor, and is above the error of a single rounding.
+- The worst disagreement grew by more than a factor, and is above the error of a single rounding; or it is
+  infinite now.
 - The ratio of the worst disagreement to the bound grew by more than a factor, and is above a tenth.
 
 A changed model is not a regression; the report only lists the changed axes, placements, limits and mimic

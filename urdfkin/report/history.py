@@ -13,7 +13,6 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypedDict, cast
 
@@ -22,11 +21,10 @@ from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.report.compare import ChangeEntry, ReportChange, by_source, compare, renamed_files
 from urdfkin.report.html import rendered, when
 from urdfkin.report.reading import checked, stored_document
-from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, worst
+from urdfkin.report.words import VERDICTS, counted, percent, share_of, units, utc, worst
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, parse_json, plain, says
 from urdfkin.system.files import MOST, is_folder, read_bytes, shortened
-from urdfkin.validation.document import VALIDATION, Document, ReportedRobot, Units
-from urdfkin.validation.outcome import OUTCOMES
+from urdfkin.validation.document import OUTCOMES, VALIDATION, Document, ReportedRobot, Units
 from urdfkin.verify.oracles import versions
 
 #: Maximum number of reports in a history, and maximum number of files in a folder.
@@ -236,11 +234,8 @@ def _start(path: Path) -> tuple[float, str]:
     """Return the start time of a run in seconds and as text; an invalid date counts as infinity."""
     data = _read(path) if is_folder(path) else parse_json(read_bytes(path, MOST), str(path))
     text = str(data.get("started", "")) if isinstance(data, dict) else ""
-    try:
-        moment = datetime.fromisoformat(text)
-        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp(), text
-    except (ValueError, OverflowError):
-        return math.inf, text
+    moment = utc(text)
+    return moment.timestamp() if moment else math.inf, text
 
 
 def _read(path: Path) -> Document:
@@ -393,7 +388,8 @@ def _share(one: ValidationRun | Point) -> str:
 
 
 def _date(run: ValidationRun) -> str:
-    return run["started"][:16].replace("T", " ")
+    moment = utc(run["started"])
+    return moment.isoformat(" ", "minutes")[:16] if moment else run["started"][:16].replace("T", " ")
 
 
 def as_html(found: History, command: str | None = None) -> str:

@@ -1,4 +1,4 @@
-"""Report as an HTML page that works offline, uses no network and escapes every name.
+"""Reports as HTML pages, and the 3D view in a notebook: they use no network and escape every name.
 
 A large report is split: the page has the summary, and each robot has a file with its details. The page loads
 a robot's file when the reader opens the robot's section. The files are scripts, because a page that is opened
@@ -11,13 +11,15 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator
-from datetime import datetime
 from functools import cache
+from html import escape
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from urdfkin.errors.escape import log_line
 from urdfkin.report import pages
 from urdfkin.report.figures import distributions, scene
+from urdfkin.report.reading import moving_names
 from urdfkin.report.words import (
     VERDICTS,
     accuracy_words,
@@ -34,19 +36,23 @@ from urdfkin.report.words import (
     share_of,
     summary,
     units,
+    utc,
     verdict_counts,
     worst,
     worst_cell,
 )
 from urdfkin.system.lazy_import import install_remedy
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
-from urdfkin.validation.robot_summary import chain_disagreement
+from urdfkin.validation.robot_summary import chain_disagreement, describe
 from urdfkin.verify.quantities import compared, not_compared
 from urdfkin.view.figure import installed
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
+
+    from urdfkin.model.tree import FloatArray
+    from urdfkin.robot import Robot
 
 #: If a page has at most this number of robots, the details of all robots are open when the page loads.
 _OPEN = 1
@@ -216,7 +222,7 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
     heads, heat = pages.heat_map(robot, model) if model and robot["checks"] else ([], [])
     return {
         "index": index,
-        "moving": sum(joint["kind"] != "fixed" for joint in model["joints"]) if model else 0,
+        "moving": len(moving_names(model)) if model else 0,
         "data": robot,
         "reason": pages.reason(robot),
         "scene": scene(model, robot["chains"]) if model else None,
@@ -260,9 +266,34 @@ def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
 
 
 def when(started: str) -> str:
-    """Format an ISO date; return other texts unchanged."""
-    try:
-        moment = datetime.fromisoformat(started)
-    except ValueError:
-        return started
-    return f"{moment.day} {moment:%B %Y, %H:%M} UTC"
+    """Format an ISO date and time, converted to UTC; return other texts unchanged."""
+    moment = utc(started)
+    return f"{moment.day} {moment:%B %Y, %H:%M} UTC" if moment else started
+
+
+class NotebookView:
+    """The 3D view of `Robot.view` in a notebook: `q` (nq,) is the first configuration, `height` is in px."""
+
+    def __init__(self, robot: Robot, q: FloatArray, height: int) -> None:
+        self._name, self._height = robot.name, height
+        self._description, self._q = describe(robot), q.tolist()
+
+    def __repr__(self) -> str:
+        return log_line(f"<a view of {self._name}, which is displayed as the last line of a notebook cell>")
+
+    def page(self) -> str:
+        data: dict[str, Any] = {"source": self._name, "joints": moving_names(self._description), "chains": []}
+        return rendered(
+            "cell.html.j2",
+            data=data,
+            robot={"index": 0, "scene": scene(self._description, []) | {"start": self._q}},
+            three=as_is(asset("three.min.js")),
+            view_script=as_is(asset("view3d.js")),
+        )
+
+    def _repr_html_(self) -> str:
+        # The HTML frame may run its own scripts but cannot access the notebook.
+        return (
+            f'<iframe sandbox="allow-scripts" title="{escape(self._name)}" srcdoc="{escape(self.page())}"'
+            f' style="width:100%;height:{self._height}px;border:0"></iframe>'
+        )

@@ -115,9 +115,8 @@ def _remaining_range(joint: ReportedJoint) -> str:
     if kept is None:
         return ""
     if kept["lower"] is None or kept["upper"] is None:
-        return (
-            f"{joint['name']}: no value keeps its mimic joints within their limits ({', '.join(kept['by'])})."
-        )
+        names = ", ".join(kept["by"])
+        return f"{joint['name']}: at most one value keeps its mimic joints within their limits ({names})."
     unit = "m" if joint["kind"] == "prismatic" else "rad"
     ends = f"{range_words((kept['lower'], kept['upper']))} {unit}"
     return f"{joint['name']}: its mimic joints are within limits only from {ends} ({', '.join(kept['by'])})."

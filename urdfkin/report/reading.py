@@ -25,10 +25,10 @@ from urdfkin.validation.document import (
     ReportedModel,
     ReportedRobot,
     Units,
+    ValidationVerdict,
     outcome_of,
 )
 from urdfkin.validation.error_stats import histogram_bin, percentile
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_summary import chain_disagreement, reader_disagreement
 
 _WITH_AXIS = ("revolute", "continuous", "prismatic")

@@ -15,7 +15,7 @@ from urdfkin.comparison.verdict import base_as_written
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.errors.escape import markdown_text
 from urdfkin.kinematics.roundings import NOT_ZERO
-from urdfkin.model.configuration import WIDEST
+from urdfkin.model.configuration import TRAVEL_CONDITION, coordinate_names, units
 from urdfkin.model.conventions.convention import spellings
 from urdfkin.model.mechanisms.mechanism import Mechanism
 from urdfkin.model.tree import FloatArray, inverse
@@ -43,7 +43,7 @@ def headline(found: Sameness, question: SameQuestion = EQUIVALENT) -> str:
     limits = sum(one.what == "limits" for one in found.remarks)
     besides = f"; limits of {counted(limits, 'joint')} differ" if limits else ""
     if found.unlimited:
-        besides += f"; this result holds if joints without limits travel at most {WIDEST:g} m"
+        besides += f"; this result holds if {TRAVEL_CONDITION}"
     if question.within is not None:
         return _within(found, question.within) + besides
     off = "the distance of the frames has no bound"
@@ -152,8 +152,6 @@ def where(found: Sameness, frame: Interval) -> str:
     The text has the nonzero coordinates of A. A joint of B that matches no independent joint of A has its own
     coordinate; the text also has these coordinates, if they are not 0.
     """
-    from urdfkin.model.configuration import coordinate_names, units
-
     a, b = found.trees
     names = [*zip(coordinate_names(a), units(a, "q"), frame.q_a, strict=False)]
     driven = {one.b for one in found.joints if (own := a.joints[a.joint_index(one.a)]).nv and not own.mimic}

@@ -1553,7 +1553,7 @@ class Robot(Displayable):
         """
         with importing:
             from urdfkin.dh.screws import screws_of
-            from urdfkin.verify.chain_checks import check_screws
+            from urdfkin.verify.conversions import check_screws
 
         found = screws_of(self.chain(tip, base))
         if self.verifier.policy_of_call(verify):

@@ -169,6 +169,11 @@ def load(  # noqa: PLR0911  (many returns): each kind of source has its own bran
     )
 
 
+def as_robot(source: Robot | Source | DHTable) -> Robot:
+    """Return a robot unchanged; load any other source."""
+    return source if isinstance(source, Robot) else load(source)
+
+
 def _load_table(
     source: DHTable | ProductOfExponentials | str | os.PathLike[str],
     xacro_args: Mapping[str, object] | None,
@@ -179,8 +184,7 @@ def _load_table(
     from urdfkin.dh.parse_table import read_table_or_screws
     from urdfkin.dh.screws import ProductOfExponentials
     from urdfkin.dh.table import DHTable
-    from urdfkin.verify.chain_checks import check_screws
-    from urdfkin.verify.model_check import check_table_source
+    from urdfkin.verify.conversions import check_screws, check_table_source
 
     _refuse_arguments(xacro_args, "a table")
     table: DHTable | ProductOfExponentials
@@ -297,7 +301,7 @@ def _bytes_of_mjcf(source: str | bytes | os.PathLike[str]) -> bytes:
 
 def _load_model(source: Any, xacro_args: Mapping[str, object] | None, **how: Unpack[LoadOptions]) -> Robot:
     from urdfkin.urdf.foreign import convert_pinocchio_model
-    from urdfkin.verify.model_check import check_model_source
+    from urdfkin.verify.conversions import check_model_source
 
     _refuse_arguments(xacro_args, "a pinocchio.Model")
     read = convert_pinocchio_model(source)

@@ -46,10 +46,13 @@ class AllowedPaths:
             The target of a symbolic link must also be one of these files, or be in one of these folders.
         package_folders: Folders with installed packages. A symbolic link in these folders may point to a
             package in any other folder. `colcon build --symlink-install` writes such links.
+        manifests: The paths of package.xml in the folders above the xacro file. The search for packages reads
+            these files.
     """
 
     roots: list[str] = field(default_factory=list)
     package_folders: list[str] = field(default_factory=list)
+    manifests: list[str] = field(default_factory=list)
 
     @classmethod
     def of_file(cls, path: Path, package_paths: list[str], arguments: list[str]) -> AllowedPaths:
@@ -62,15 +65,15 @@ class AllowedPaths:
         real = [place.resolve() for place in wide if _exists(place)]
         near = [path, path.parent, path.resolve().parent, *map(Path, package_paths)]
         roots = [*(place.resolve() for place in near), *(place for place in real if place not in everything)]
-        return cls([str(root) for root in roots], package_paths)
+        manifests = [str(folder / "package.xml") for folder in path.absolute().parents]
+        return cls([str(root) for root in roots], package_paths, manifests)
 
     def allows(self, path: str) -> bool:
         real = os.path.realpath(path)
-        # The search for packages may read every package.xml.
-        if os.path.basename(real) == "package.xml":  # noqa: PTH119
+        as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
+        if as_written in self.manifests and os.path.basename(real) == "package.xml":  # noqa: PTH119
             return True
         roots = self.roots
-        as_written = os.path.abspath(path)  # noqa: PTH100  resolve() follows links
         if any(_is_inside(root, as_written) for root in self.package_folders):
             roots = [*roots, *map(str, _nearest_folder_with("package.xml", Path(real)))]
         return any(_is_inside(root, real) for root in roots)
@@ -129,8 +132,9 @@ def confine(is_allowed: Callable[[str], bool]) -> None:
         if not isinstance(path, str | bytes | os.PathLike) or not is_allowed(os.fsdecode(path)):
             raise RefusedError(
                 f"{path!r} may not be read: the file is hidden, or outside the allowed folders. These are the"
-                " xacro file's folder, package and repository, and the packages on ROS_PACKAGE_PATH and"
-                " AMENT_PREFIX_PATH"
+                " xacro file's folder, package and repository, the folders on ROS_PACKAGE_PATH and"
+                " AMENT_PREFIX_PATH, packages beside the folders above the file that $(find) names, the"
+                " package.xml of each folder above the file, and the files and folders that an argument names"
             )
 
     sys.addaudithook(refuse_forbidden)

@@ -520,7 +520,7 @@ class _MjcfReader:
                 names = _join_names(*(self._hinges[j] for j in (m.eq_obj1id[i], m.eq_obj2id[i]) if j >= 0))
                 what = f"a constraint ({names}) that is not a linear relation of two joints"
             elif rule[0] in rules or depends_on(rules, rule[1].leader, rule[0]):
-                what = f"joint {rule[0]} has two rules, or its rules form a circle"
+                what = f"joint {rule[0]} has two rules, or its rules form a cycle"
             else:
                 rules[rule[0]] = rule[1]
                 self.mimic_equalities[i] = rule[0]

@@ -36,7 +36,7 @@ def read_tree(urdf: RobotRecord, *, mimic: bool = True, root_joint: str | None =
 def make_joint_rows(joints: Sequence[JointRecord], *, mimic: bool = True) -> list[tuple[Joint, str, str]]:
     """Return each joint with its parent link and its child link.
 
-    Raise InputError if mimic joints form a circle, and UnknownNameError if a mimicked joint does not exist.
+    Raise InputError if mimic joints form a cycle, and UnknownNameError if a mimicked joint does not exist.
     """
     rules = _mimic_rules(joints) if mimic else {}
     return [(_make_joint(one, rules.get(one.name)), str(one.parent), str(one.child)) for one in joints]
@@ -115,7 +115,7 @@ def _mimic_rules(joints: Sequence[JointRecord]) -> dict[str, Mimic]:
                 where = f"joint {name} (mimic=False, --no-mimic, lets the joint move freely)"
                 raise UnknownNameError("mimicked joint", str(rule.leader), names, where=where)
             if rule.leader in pending:
-                raise InputError("mimic joints follow each other in a circle", where=f"joint {start}")
+                raise InputError("mimic joints follow each other in a cycle", where=f"joint {start}")
             name = rule.leader
         end = resolved.get(name, Mimic(name, 1.0, 0.0))
         for name, rule in reversed(pending.items()):

@@ -21,8 +21,8 @@ from urdfkin.errors import OracleError, UrdfkinError
 from urdfkin.system.documents import as_data, typed
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.error_stats import Key, Tally
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entries_of
 

@@ -24,12 +24,11 @@ from urdfkin.validation import memory
 from urdfkin.validation.answer import Answer, Failure, failure, unexpected_failure
 from urdfkin.validation.chunk import Cut
 from urdfkin.validation.collector import Progress, ResultCollector
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Engine, ExecutorEngine, SerialEngine, Task
-from urdfkin.validation.manifest import Manifest
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport, ValidationReport
 from urdfkin.validation.robot_input import RobotInput, RobotSource, subjects
-from urdfkin.validation.store import Store, open_store
+from urdfkin.validation.store import AccuracyResult, FailedStudy, Manifest, Store, open_store
 from urdfkin.validation.worker_processes import ProcessEngine
 from urdfkin.verify.comparison import load_kernels
 from urdfkin.verify.oracles import PINOCCHIO, OracleName, oracle_library
@@ -213,10 +212,6 @@ def stored(folder: str | os.PathLike[str]) -> ValidationReport:
 
 
 def _studies(store: Store, reports: Sequence[RobotReport]) -> tuple[tuple[AccuracyStudy | None, ...], bool]:
-    if not store.has_study:
-        return (), True
-    from urdfkin.validation.accuracy_store import AccuracyResult, FailedStudy
-
     if (results := AccuracyResult.of(store)) is None:
         return (), True
     found = [results.found(i) for i, report in enumerate(reports) if report.tallies]

@@ -13,9 +13,9 @@ from operator import add
 
 from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.chunk import ChunkResult, Cut
+from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
 from urdfkin.validation.error_stats import Key, Tally, plus
-from urdfkin.validation.outcome import ValidationVerdict
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary

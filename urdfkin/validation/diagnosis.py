@@ -3,7 +3,8 @@
 Examples of mistakes are exchanged rows, a wrong reference frame, a wrong frame, degrees instead of radians,
 and joints in another order. The module applies each mistake to urdfkin's results, and compares the changed
 results with the user's results. A mistake is reported if the mistake makes the largest difference at least a
-thousand times smaller. If several mistakes lead to the same results, up to three are reported.
+thousand times smaller, or if it explains a column of a Jacobian. If several mistakes explain the results, up
+to three are reported.
 """
 
 from __future__ import annotations
@@ -99,7 +100,8 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     for found in (single, list(_columns(mistakes, case)), double):
         best = min((rest for rest, _ in found), default=np.inf)
         if best <= EXPLAINED:
-            return [words for rest, words in found if rest <= 100.0 * best + 1e-12][:_MOST]
+            most = min(EXPLAINED, 100.0 * best + 1e-12)
+            return [words for rest, words in found if rest <= most][:_MOST]
     return []
 
 

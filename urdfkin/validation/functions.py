@@ -115,7 +115,8 @@ class FunctionCheck(Displayable):
         worst: The worst result; None if no result was compared.
         errors: Number of configurations with an exception or a wrong shape.
         first_errors: The first exceptions and wrong shapes, with messages.
-        diagnoses: Possible mistakes in the function; each mistake alone explains all results.
+        diagnoses: Possible mistakes in the function. Each mistake alone explains all results, or one column
+            of a Jacobian.
 
     >>> import urdfkin
     >>> arm = urdfkin.load("planar_two_link")
@@ -498,7 +499,7 @@ class _Run:
         if not conversion.is_constant and name != "jacobian":
             raise InputError(
                 f"urdfkin has no bound for the {name}: in this convention, the velocity of a floating or"
-                " planar joint has other axes or another reference point",
+                " planar joint has other axes",
                 where=conversion.convention.name,
                 remedy="check the Jacobian in this convention, or use urdfkin's convention",
             )
@@ -550,6 +551,8 @@ class _Run:
             return
         if total.not_finite:
             yield f"{total.not_finite} results are not finite"
+            return
+        if total.share <= 1.0:  # Only exceptions or wrong shapes: no difference needs an explanation.
             return
         if total.eps_scale * EPS <= _SINGLE and math.isfinite(total.share):
             precision = "single" if total.eps_scale * EPS > 1e-9 else "double"

@@ -1,5 +1,9 @@
 """Limit the memory of a validation, and estimate the memory that a robot needs.
 
+Frames are compared in blocks, to limit the memory. The largest arrays are the Jacobians, with
+samples * frames * 6 * nv numbers. The division into blocks changes no result of a frame, and therefore does
+not change the report.
+
 All processes of a validation together use at most half of the memory that is free at the start. A robot that
 needs more memory is not verified; the reason states the needed and the allowed memory.
 """
@@ -12,8 +16,10 @@ from pathlib import Path
 
 from urdfkin.errors import OracleError
 from urdfkin.model.tree import KinematicTree
-from urdfkin.validation.comparison import BLOCK_BYTES, frame_bytes
 
+#: Maximum number of bytes of one array in a block of frames.
+#: About ten arrays of this size exist at a time.
+BLOCK_BYTES = 32 * 2**20
 #: Fraction of the free memory that a validation uses.
 _FRACTION = 0.5
 #: Pinocchio 4.1.0 needs _PER_CUBE * nv^3 bytes for the workspace, and _PER_LINK bytes for each link.
@@ -29,6 +35,21 @@ def limit(processes: int = 1) -> int | None:
     """Return how many bytes each process of a validation may use; None if the free memory is unknown."""
     free = min(_free(), default=None)
     return None if free is None else int(_FRACTION * free / processes)
+
+
+def frame_bytes(samples: int, nv: int) -> int:
+    """Return the size in bytes of one frame's largest array.
+
+    This array contains the Jacobians, or the placements if nv is at most 2.
+    """
+    return samples * 8 * max(16, 6 * nv)
+
+
+def blocks(count: int, size: int) -> Iterator[slice]:
+    """Divide `count` items of `size` bytes into slices of at most `BLOCK_BYTES`; yield at least one slice."""
+    most = max(1, BLOCK_BYTES // size)
+    for start in range(0, max(1, count), most):
+        yield slice(start, min(count, start + most))
 
 
 def needed_bytes(tree: KinematicTree, samples: int) -> int:

@@ -14,8 +14,9 @@ does not contain the locks and the root joint, because the request contains them
     {"result": [[...], ...]}    or    {"error": "a text"}
 
 The program runs with the rights of the user who starts it. If the program hangs, ends or gives an answer of
-another form, the call for this configuration raises `ProgramError`. The program is started again for the next
-configuration, but not after three consecutive failures.
+another form, the call for this configuration raises `ProgramError`. The program is stopped, and is started
+again for the next configuration, but not after three consecutive failures. An answer with an error raises
+`ProgramError` too, but the program continues to run.
 """
 
 from __future__ import annotations
@@ -136,7 +137,7 @@ class Program:
         """Return the program's result for one configuration.
 
         Raises:
-            ProgramError: the program ended, took too long, or answered with no result.
+            ProgramError: the program ended, took too long, or answered with an error or without a result.
         """
         if self._failures >= _MOST_FAILURES:
             raise ProgramError(f"not called: the program failed {_MOST_FAILURES} times in a row")
@@ -148,9 +149,12 @@ class Program:
             answer = self._read(self._ask(request.encode()))
         except ProgramError:
             self._failures += 1
+            self._stop()  # A late line of this program would be read as the answer to the next request.
             raise
         self._failures = 0
-        return answer
+        if isinstance(message := answer.get("error"), str):
+            raise ProgramError(message[:_TAIL])
+        return answer["result"]
 
     def _start(self) -> None:
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115  The file must stay open while the process runs.
@@ -219,14 +223,13 @@ class Program:
         return f"the program {how}" + (f": {message}" if message else "")
 
     @staticmethod
-    def _read(line: bytes) -> object:
+    def _read(line: bytes) -> dict[str, object]:
+        """Return an answer that has a result or the text of an error."""
         try:
             answer = json.loads(line)
         except (ValueError, RecursionError):
             shown = line[:80].decode(errors="replace").strip()
             raise ProgramError(f"the answer is not JSON: {shown!r}") from None
-        if isinstance(answer, dict) and isinstance(answer.get("error"), str):
-            raise ProgramError(answer["error"][:_TAIL])
-        if not isinstance(answer, dict) or "result" not in answer:
-            raise ProgramError('the answer has no member "result"')
-        return answer["result"]
+        if isinstance(answer, dict) and ("result" in answer or isinstance(answer.get("error"), str)):
+            return answer
+        raise ProgramError('the answer has no member "result"')

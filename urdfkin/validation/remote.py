@@ -1,9 +1,9 @@
 """Functions that run on the machines of a cluster.
 
-Dask's worker imports no computing code. A chunk runs in a separate process, so a robot can only crash this
-process and not the worker. A chunk that crashes its process is tried a second time in a new process. If the
-second process crashes too, the robot's result is "not verified" with the signal as the reason. Chunks and
-answers are transferred as bytes. The text of a robot is sent only once for all chunks of the robot.
+Dask's worker computes nothing. A chunk runs in a separate process, so a robot can only crash this process,
+not the worker. A chunk that crashes its process is tried a second time in a new process. If the second
+process crashes too, the robot's result is "not verified" with the signal as the reason. Chunks and answers
+are transferred as bytes. The text of a robot is sent only once for all chunks of the robot.
 """
 
 from __future__ import annotations

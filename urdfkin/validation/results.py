@@ -20,11 +20,10 @@ from urdfkin.system.files import read_bytes
 from urdfkin.system.lazy_import import hook
 from urdfkin.urdf.catalogue import example_robots
 from urdfkin.urdf.sources import Origin
-from urdfkin.validation.document import VALIDATION, Document
+from urdfkin.validation.chunk import Timings
+from urdfkin.validation.document import VALIDATION, Document, RunOutcome, ValidationVerdict, outcome
 from urdfkin.validation.error_stats import HISTOGRAM_EDGES, Key, Tally
-from urdfkin.validation.outcome import RunOutcome, ValidationVerdict, outcome
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
-from urdfkin.validation.timings import Timings
 from urdfkin.verify.oracles import ORACLES, version, versions
 from urdfkin.verify.quantities import QUANTITIES, replay_line
 

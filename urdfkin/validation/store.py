@@ -7,6 +7,10 @@
     DIR/chunks/4f/4f1a....accuracy result of the accuracy study of a robot
     DIR/lock                       locked by the process that writes to the store
 
+The manifest defines the robots, the samples, the versions, the chunks and the key of each chunk. The key is
+the sha256 of all data on which the chunk's numbers depend. Therefore, results of older code, texts or options
+are never reused.
+
 Files are written atomically, so a file is either complete or absent. The store reports damaged files, and
 files whose names belong to no chunk. A store that is open for writing moves these files to `damaged/`. The
 chunk of a damaged file is computed again.
@@ -17,28 +21,50 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import hashlib
 import json
 import os
 import shutil
 import socket
 import stat
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import IO, TypeVar
+from typing import IO, TYPE_CHECKING, TypeVar
 
 from urdfkin.errors import InputError, SourceError
+from urdfkin.system.documents import DocumentKind, as_data, parse_json, typed
 from urdfkin.system.files import read_bytes, read_if_there
-from urdfkin.validation.answer import Answer, DamagedError, Failure, decode_answer, encode_answer
-from urdfkin.validation.manifest import Manifest
+from urdfkin.urdf.sources import Origin
+from urdfkin.validation.answer import (
+    Answer,
+    DamagedError,
+    Failure,
+    decode_answer,
+    encode_answer,
+    pack,
+    unpack,
+)
+from urdfkin.validation.chunk import Cut
+from urdfkin.validation.results import provenance
+from urdfkin.validation.robot_input import RobotInput
+from urdfkin.verify.oracles import version, versions
 
+if TYPE_CHECKING:
+    from urdfkin.validation.accuracy import AccuracyStudy
+
+#: Name and version of the layout of a store.
+_LAYOUT = "urdfkin-campaign/1"
+#: Maximum number of differences between two campaigns that an error lists.
+_SHOWN = 4
 _MANIFEST, _LOCK, _CHUNKS, _ASIDE = "manifest.json", "lock", "chunks", "damaged"
 _WRITING = ".writing"
-#: File with the settings of the accuracy study (`urdfkin.validation.accuracy_store`).
-STUDY_FILE = "accuracy.json"
+#: File with the settings of the accuracy study.
+_STUDY_FILE = "accuracy.json"
 #: Suffix of a file with the accuracy result of a robot.
-STUDY_SUFFIX = ".accuracy"
+_STUDY_SUFFIX = ".accuracy"
 _DONE, _FAILED = ".chunk", ".failed"
 
 #: Number of attempts to acquire a lock; the attempts are 0.1 s apart.
@@ -47,6 +73,82 @@ _TRIES = 10
 _T = TypeVar("_T")
 
 Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Definition of a campaign; `started` is the start time, ISO 8601, UTC.
+
+    For each robot, `robots` contains the origin and the sha256 of the text. If the text is unreadable, the
+    sha256 is empty.
+    """
+
+    robots: tuple[tuple[Origin, str], ...]
+    samples: int
+    seed: int
+    provenance: dict[str, str]
+    versions: dict[str, str]
+    started: str
+
+    @classmethod
+    def of(cls, subjects: Sequence[RobotInput], samples: int, seed: int, started: str) -> Manifest:
+        robots = tuple((subject.origin, subject.stamp) for subject in subjects)
+        oracles = (subject.origin.oracle for subject in subjects)
+        return cls(robots, samples, seed, provenance(), versions(oracles), started)
+
+    @cached_property
+    def cut(self) -> Cut:
+        return Cut(self.samples)
+
+    def subjects(self) -> list[RobotInput]:
+        """Return the robots without their texts, which a report does not need."""
+        return [RobotInput(origin.source, origin, stamp) for origin, stamp in self.robots]
+
+    def key(self, robot: int, index: int) -> str:
+        return hashlib.sha256(f"{self._keys[robot]} {index} of {len(self.cut)}".encode()).hexdigest()
+
+    @cached_property
+    def _keys(self) -> list[str]:
+        settings = json.dumps([_LAYOUT, self.samples, self.seed, self.provenance], sort_keys=True)
+        return [
+            hashlib.sha256(f"{settings}\n{json.dumps(as_data(robot))}".encode()).hexdigest()
+            for robot in self.robots
+        ]
+
+    def as_json(self) -> bytes:
+        return (json.dumps({"schema": _LAYOUT} | as_data(self), indent=1) + "\n").encode()
+
+    @classmethod
+    def from_json(cls, content: bytes, where: str) -> Manifest:
+        layout = DocumentKind(_LAYOUT, cls, (), "urdfkin validate ROBOT --store DIR", is_open=True)
+        return layout.checked(parse_json(content, where), where)
+
+    def differences(self, other: Manifest) -> list[str]:
+        own, theirs = (
+            {"samples": m.samples, "seed": m.seed, "number of robots": len(m.robots)} | m.provenance
+            for m in (self, other)
+        )
+        lines = [
+            f"{name} {_short(own.get(name))} and {_short(theirs.get(name))}"
+            for name in own | theirs
+            if own.get(name) != theirs.get(name)
+        ]
+        lines += [
+            f"robot {i + 1} {_called(robot)} and {_called(other_robot)}"
+            for i, (robot, other_robot) in enumerate(zip(self.robots, other.robots, strict=False))
+            if robot != other_robot
+        ]
+        return [*lines[:_SHOWN], f"{len(lines) - _SHOWN} more"] if len(lines) > _SHOWN + 1 else lines
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text[:12] if len(text) == 64 else text
+
+
+def _called(robot: tuple[Origin, str]) -> str:
+    origin, stamp = robot
+    return f"{origin.command_line} (sha256 {stamp[:12] or 'unknown'})"
 
 
 @dataclass(frozen=True)
@@ -89,7 +191,7 @@ class Store:
 
     @property
     def has_study(self) -> bool:
-        return (self.folder / STUDY_FILE).exists()
+        return (self.folder / _STUDY_FILE).exists()
 
     def write_entry(self, key: str, kind: str, data: bytes) -> None:
         self._write(self._place(key, kind), data)
@@ -107,7 +209,7 @@ class Store:
         )
         expected = {self._place(key, kind) for key in keys for kind in (_DONE, _FAILED)}
         for place in sorted((self.folder / _CHUNKS).glob("*/*")):
-            if place not in expected and place.suffix != STUDY_SUFFIX:
+            if place not in expected and place.suffix != _STUDY_SUFFIX:
                 self._quarantine(place, "is not used: no chunk of this campaign has this name")
 
     def counts(self) -> dict[int, tuple[int, bool]]:
@@ -322,3 +424,104 @@ def _holder(file: IO[bytes]) -> str:
         return f"process {int(data['process'])} on {data['host']}"
     except (OSError, ValueError, KeyError, TypeError):
         return "an unknown process"
+
+
+# -- results of the accuracy study ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class FailedStudy:
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class StudySettings:
+    """Settings of the accuracy study; `moving_base` gives each root link a random motion."""
+
+    samples: int
+    seed: int
+    moving_base: bool
+
+    @property
+    def options(self) -> str:
+        moving = " --accuracy-moving-base" if self.moving_base else ""
+        return f"--accuracy-samples {self.samples} --seed {self.seed}{moving}"
+
+
+class AccuracyResult:
+    def __init__(self, store: Store, settings: StudySettings) -> None:
+        self._store, self._settings = store, settings
+
+    @classmethod
+    def merge(cls, store: Store, others: Sequence[Store]) -> None:
+        theirs = [results for results in map(cls.of, others) if results is not None]
+        if not theirs:
+            return
+        own = cls.of(store) or cls(store, theirs[0]._settings)
+        for results in theirs:
+            own._check_same(results)
+        own.begin()
+        for results in theirs:
+            for robot in range(len(store.manifest.robots)):
+                if own.found(robot) is None and (found := results.found(robot)) is not None:
+                    own.keep(robot, found)
+
+    @classmethod
+    def of(cls, store: Store) -> AccuracyResult | None:
+        """Return the results in a store; None if there are none, or the settings are unreadable."""
+        try:
+            if (content := read_if_there(store.folder / _STUDY_FILE)) is None:
+                return None
+            settings = typed(json.loads(content), StudySettings)
+        except (OSError, ValueError, RecursionError) as error:
+            store.tell(
+                f"{store.folder / _STUDY_FILE} cannot be read ({type(error).__name__}): the report has no"
+                " accuracy results"
+            )
+            return None
+        return cls(store, settings)
+
+    def begin(self) -> None:
+        self._store.write(_STUDY_FILE, (json.dumps(asdict(self._settings)) + "\n").encode())
+
+    def found(self, robot: int) -> AccuracyStudy | FailedStudy | None:
+        return self._store.entry(self._key(robot), _STUDY_SUFFIX, _decode)
+
+    def has(self, robot: int) -> bool:
+        return self._store.has(self._key(robot), _STUDY_SUFFIX)
+
+    def keep(self, robot: int, found: AccuracyStudy | FailedStudy) -> None:
+        key = self._key(robot)
+        self._store.write_entry(key, _STUDY_SUFFIX, pack(key, {"accuracy": found}))
+
+    def stamp(self, robot: int) -> str:
+        """Return the sha256 of the robot's text."""
+        return self._store.manifest.robots[robot][1]
+
+    def _check_same(self, other: AccuracyResult) -> None:
+        if other._settings != self._settings:
+            raise InputError(
+                "the accuracy results in the two folders were computed with different options",
+                where=str(other._store.folder),
+                found=f"{other._settings.options}, and {self._settings.options} in {self._store.folder}",
+                remedy="run the accuracy study with the same options for both folders",
+            )
+
+    def _key(self, robot: int) -> str:
+        manifest = self._store.manifest
+        origin, stamp = manifest.robots[robot]
+        origin = replace(origin, oracle=None)  # The study uses no second oracle.
+        parts = [manifest.provenance, version("python-flint"), asdict(self._settings), asdict(origin), stamp]
+        return hashlib.sha256(json.dumps([_LAYOUT, "accuracy", *parts], sort_keys=True).encode()).hexdigest()
+
+
+def _decode(key: str, content: bytes) -> AccuracyStudy | FailedStudy:
+    from urdfkin.validation.accuracy import AccuracyStudy
+
+    data = unpack(key, content).get("accuracy")
+    try:
+        if isinstance(data, dict) and "reason" in data:
+            return typed(data, FailedStudy)
+        return typed(data, AccuracyStudy)
+    except ValueError as error:
+        raise DamagedError(f"not an accuracy result of urdfkin ({error})") from error

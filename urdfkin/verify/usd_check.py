@@ -29,15 +29,13 @@ from urdfkin.errors import InputError, OracleError
 from urdfkin.kinematics.rotation import rotation_of
 from urdfkin.kinematics.roundings import SINGLE
 from urdfkin.model.base_motion import STILL_STATE
-from urdfkin.model.configuration import WIDEST
+from urdfkin.model.configuration import largest_value
 from urdfkin.model.tree import (
     FloatArray,
-    Joint,
     JointKind,
     KinematicTree,
     LinkFrame,
     inverse,
-    is_bounded,
     pose,
 )
 from urdfkin.system.files import at_home, read_bytes
@@ -225,18 +223,14 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
         length = max(joint.length, size)
         slides = joint.kind is JointKind.PRISMATIC
         if slides:
-            length += _largest(joint)
+            length += largest_value(joint.limit)
         if joint.mimic is not None:
             rule, leader = joint.mimic, tree.joints[tree.joint_index(joint.mimic.leader)]
-            off = share * (abs(rule.multiplier) * _largest(leader) + abs(rule.offset))
+            off = share * (abs(rule.multiplier) * largest_value(leader.limit) + abs(rule.offset))
             way, angle = (way + off, angle) if slides else (way, angle + off)
         parent_way, parent_angle = of_links[joint.parent]
         of_links[i + 1] = parent_way + way + (parent_angle + angle) * length, parent_angle + angle
     return SinglePrecision(of_links, of_joints)
-
-
-def _largest(joint: Joint) -> float:
-    return max(abs(joint.limit.lower), abs(joint.limit.upper)) if is_bounded(joint.limit) else WIDEST
 
 
 def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:

@@ -126,6 +126,28 @@ def test_a_robot_in_a_convention_satisfies_the_kinematic_identities(
         assert np.allclose(other.placement(q, frame), robot.placement(ours[0], frame), 0, 1e-13)
 
 
+def test_a_matrix_depends_on_q_only_if_the_axes_of_a_free_joints_velocity_differ(
+    cart: Robot, convention: Convention
+) -> None:
+    dog = urdfkin.load("go2", root_joint="floating", verify=False)  # the base has its mass beside the origin
+    for robot, differ in (
+        (dog, "parent" in (convention.linear, convention.angular)),
+        (cart, convention.planar == "parent"),
+    ):
+        conversion = robot.convention(convention)
+        q, v, _ = _values(robot)
+        assert conversion.is_constant == (not differ)
+        if differ:
+            with pytest.raises(InputError, match="depends on q"):
+                conversion.matrix()
+            continue
+        M, inverse = conversion.matrix(), conversion.inverse_matrix()
+        assert not conversion.matrix_rate(q, v).any()
+        assert np.allclose(v @ M.T, conversion.to(q, v)[1], 0, 1e-15)
+        assert np.allclose(conversion.to(q, v)[1] @ inverse.T, v, 0, 1e-15)
+        assert np.array_equal(conversion.matrix(q[0]), M)
+
+
 def test_several_frames_at_once_equal_single_frames(dog: Robot) -> None:
     other = dog.with_convention("drake")
     q, v, _ = other.conversion.to(*_values(dog))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdfkin
-from urdfkin.cli.plot import PANELS as OFFERED
+from urdfkin.cli.view import PANELS as OFFERED
 from urdfkin.errors import InputError, UnknownNameError
 from urdfkin.robot import Robot
 from urdfkin.robot.frame_motion import FrameMotion, frame_motion

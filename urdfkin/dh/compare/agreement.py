@@ -21,7 +21,6 @@ from urdfkin.dh.compare.fit import (
 from urdfkin.dh.compare.mistakes import MistakeSearch
 from urdfkin.dh.compare.result import (
     EXPLAINED,
-    TRAVEL,
     AbsorbedOffset,
     CellDifference,
     TableComparison,
@@ -32,7 +31,7 @@ from urdfkin.dh.snapping import rotation_angle
 from urdfkin.dh.table import DHConvention, DHTable, angle_difference
 from urdfkin.errors import InputError
 from urdfkin.model.chain import LEAST_SIZE, FrameChain
-from urdfkin.model.configuration import values_within
+from urdfkin.model.configuration import axis_range, values_within
 from urdfkin.model.mechanisms.matcher import align
 from urdfkin.model.mechanisms.mechanism import AS_WRITTEN, Mechanism, tolerance_of, variables_of
 from urdfkin.model.mechanisms.upper_bound import FINE, upper_bounds
@@ -85,6 +84,7 @@ def compare(
     comparison = TableComparison(
         reference=table,
         reach=targets.scale,
+        travel=sum(max(map(abs, ends)) for ends in _travels(chain).values()),
         fitted=fit,
         senses=tuple(int(s) * row.sense for s, row in zip(fitted.senses, standard.rows, strict=True)),
         offsets=_offsets(standard, fitted),
@@ -173,10 +173,10 @@ def _samples(chain: FrameChain, count: int, seed: int) -> tuple[FloatArray, Floa
 
 def _travels(chain: FrameChain) -> dict[str, tuple[float, float]]:
     """Return the range (m) of each prismatic joint."""
-    limits = {joint.name: joint.limit for joint in chain.joints if not joint.kind.turns}
     return {
-        name: (limit.lower, limit.upper) if has_range(limit) else (-TRAVEL, TRAVEL)
-        for name, limit in limits.items()
+        joint.name: axis_range(joint.kind, joint.limit if has_range(joint.limit) else None)
+        for joint in chain.joints
+        if not joint.kind.turns
     }
 
 
@@ -280,7 +280,7 @@ def max_tip_error_bound(path: FrameChain, table: DHTable) -> tuple[float, float]
     """Return an upper bound of a table's tip error (metres, radians) for all joint values.
 
     The bound does not include rounding errors, and mimic rules are ignored. Prismatic joints are within their
-    limits, or within `TRAVEL` of zero if they have no limits.
+    limits, or within `WIDEST` of zero if `has_range` is false.
     """
     mechanisms = Mechanism(_free(path, table)), Mechanism(free_tree(table))
     pair = align(*mechanisms, {row.joint: row.joint for row in table.rows}, AS_WRITTEN)

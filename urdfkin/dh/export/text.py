@@ -1,6 +1,7 @@
 """Export a table as text: for a terminal, in Markdown, in HTML and in LaTeX.
 
-All formats contain the convention, the formula, the cells, base and tool.
+All formats contain the convention, the formula, the cells, base and tool. `printed` computes the tip error
+due to the rounding of the printed numbers.
 """
 
 from __future__ import annotations
@@ -8,12 +9,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from urdfkin.dh.snapping import SAMPLES, samples_within_limits
 from urdfkin.dh.table import DHConvention, DHRow, DHTable, is_identity
 from urdfkin.dh.units import Angles, Units
 from urdfkin.errors.display import CodeLine, Matrix, Table, TextDocument
 from urdfkin.errors.escape import latex_text
+from urdfkin.model.configuration import TRAVEL_CONDITION, axis_range, largest_value
 from urdfkin.model.tree import FloatArray
 
 _FORMULA = {
@@ -55,13 +61,10 @@ def coordinate_names(table: DHTable) -> str:
     return "with " + ", ".join(f"q{i} = {name}" for i, name in enumerate(table.joint_names, 1))
 
 
-def constant_of(row: DHRow) -> float:
-    """Return the constant that is added to the joint's variable.
-
-    For a mimic joint, it is the cell plus the product of the joint's sign and the offset of the mimic rule.
-    """
-    cell = row.theta if row.kind.turns else row.d
-    return cell + row.sense * row.mimic.offset if row.mimic else cell
+def _mimic_offsets(row: DHRow) -> tuple[float, float]:
+    """Return the numbers that the row's mimic rule adds to the printed theta and to the printed d."""
+    offset = row.sense * row.mimic.offset if row.mimic else 0.0
+    return (offset, 0.0) if row.kind.turns else (0.0, offset)
 
 
 def format_sum(variable: str, constant: str) -> str:
@@ -72,11 +75,12 @@ def format_sum(variable: str, constant: str) -> str:
 
 def cells(table: DHTable, row: DHRow, units: Units, pi: str = "pi", **style: Any) -> list[str]:
     q = variable(table, row, **style)
-    theta, d = units.angle(row.theta, pi), units.length(row.d)
+    theta_offset, d_offset = _mimic_offsets(row)
+    theta, d = units.angle(row.theta + theta_offset, pi), units.length(row.d + d_offset)
     if row.kind.turns:
-        theta = format_sum(q, units.angle(constant_of(row), pi))
+        theta = format_sum(q, theta)
     else:
-        d = format_sum(q, units.length(constant_of(row)))
+        d = format_sum(q, d)
     a, alpha, beta = units.length(row.a), units.angle(row.alpha, pi), units.angle(row.beta, pi)
     texts = {"a": a, "alpha": alpha, "d": d, "theta": theta, "beta": beta}
     return [texts[name] for name in _columns(table, units)]
@@ -123,9 +127,10 @@ def snap_lines(table: DHTable) -> list[str]:
         return [f"Snapped within {snap.tolerance:.3g} rad: no angle changed."]
     metres, radians = at_most(snap.metres), at_most(snap.radians)
     measured = f"{snap.measured_metres:.2e} m and {snap.measured_radians:.2e} rad"
+    condition = f"limits and {TRAVEL_CONDITION}" if table.unlimited else "limits"
     lines = [
         f"Snapped within {snap.tolerance:.3g} rad: the tip moves by at most {metres} m and turns by at most",
-        f"{radians} rad; this is guaranteed if prismatic joints are within their limits",
+        f"{radians} rad; this is guaranteed if prismatic joints are within their {condition}",
         f"({measured} measured on {snap.samples} samples).",
     ]
     for change in snap.changes:
@@ -198,8 +203,9 @@ def _caption(table: DHTable) -> str:
     if table.snap is not None and table.snap.changes:
         caption += (
             f" Angles were rounded within {latex_math(f'{table.snap.tolerance:.2g}')}\\,rad,"
-            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m."
+            f" which moves the tip by at most {latex_math(at_most(table.snap.metres))}\\,m"
         )
+        caption += f" if {TRAVEL_CONDITION}." if table.unlimited else "."
     return caption
 
 
@@ -222,3 +228,96 @@ def latex_math(text: str) -> str:
 def _with_powers_of_ten(text: str) -> str:
     """Write numbers such as 1e-6 as powers of ten."""
     return re.sub(r"e([+-])0*(\d+)", lambda m: rf"\cdot 10^{{{'-' if m[1] == '-' else ''}{m[2]}}}", text)
+
+
+# -- the tip error of a printed table -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class PrintedPrecision:
+    """Tip error of a printed table on samples; `bound` (m) is guaranteed within the joint limits.
+
+    If `unlimited` is true, a prismatic joint has no limits. The error and the bound then assume a travel of
+    at most `WIDEST`.
+    """
+
+    digits: int
+    metres: float
+    bound: float | None
+    samples: int
+    unlimited: bool = False
+
+    def __str__(self) -> str:
+        proven = "" if self.bound is None else f"; the proven bound is {at_most(self.bound)} m"
+        condition = f"; this holds if {TRAVEL_CONDITION}" if self.unlimited else ""
+        return (
+            f"printed with {self.digits} digits, the table gives the tip within {at_most(self.metres)} m"
+            f" of its exact position on {self.samples} samples{proven}{condition}"
+        )
+
+
+def printed(table: DHTable, units: Units, pose_digits: int | None = None) -> PrintedPrecision:
+    """Return the tip error of a printed table with `pose_digits` significant digits in base and tool."""
+    rows = tuple(_printed_row(row, units) for row in table.rows)
+    base, tool = (_printed_pose(T, pose_digits or units.digits) for T in (table.base, table.tool))
+    q = samples_within_limits(table)
+    # DHTable rejects coarsely rounded rotations, so the printed base and tool are multiplied separately.
+    T_0_n = replace(table, rows=rows, base=np.eye(4), tool=np.eye(4)).placement(q)
+    distances = np.linalg.norm((base @ T_0_n @ tool - table.placement(q))[:, :3, 3], axis=-1)
+    bound = _printed_bound(table, rows, base, tool)
+    finite_bound = bound if math.isfinite(bound) else None
+    measured, unlimited = float(distances.max(initial=0.0)), bool(table.unlimited)
+    return PrintedPrecision(units.digits, measured, finite_bound, SAMPLES, unlimited)
+
+
+def _printed_row(row: DHRow, units: Units) -> DHRow:
+    rule = row.mimic
+    theta_offset, d_offset = _mimic_offsets(row)
+    return replace(
+        row,
+        a=units.printed_length(row.a),
+        alpha=units.printed_angle(row.alpha),
+        d=units.printed_length(row.d + d_offset) - d_offset,
+        theta=units.printed_angle(row.theta + theta_offset) - theta_offset,
+        beta=units.printed_angle(row.beta),
+        mimic=rule and replace(rule, multiplier=float(f"{rule.multiplier:.10g}")),
+    )
+
+
+def _printed_pose(T: FloatArray, digits: int) -> FloatArray:
+    return T if is_identity(T) else np.array([[float(f"{x:.{digits}g}") for x in row] for row in T])
+
+
+def _largest_coordinate(table: DHTable, row: DHRow) -> float:
+    """Return the largest absolute value (rad or m) of the joint that the joint of a row mimics.
+
+    If the table has no row of the mimicked joint, the limits of the mimic joint limit its value.
+    """
+    if row.mimic is None or row.mimic.multiplier == 0.0:
+        return 0.0
+    for other in table.rows:
+        if other.joint == row.mimic.leader:
+            return max(map(abs, axis_range(other.kind, other.limit)))
+    largest = max(map(abs, axis_range(row.kind, row.limit)))
+    return (largest + abs(row.mimic.offset)) / abs(row.mimic.multiplier)
+
+
+def _printed_bound(table: DHTable, rows: tuple[DHRow, ...], base: FloatArray, tool: FloatArray) -> float:
+    """Return a bound (m) of the tip error that the rounded numbers of a printed table cause together.
+
+    The rounding error of an angle moves the tip by at most this error times `lever`. The length `lever` is an
+    upper bound of the distance from the row's frame to the tip.
+    """
+    lever = float(np.linalg.norm(table.tool[:3, 3]))
+    total = float(np.linalg.norm((tool - table.tool)[:3, 3]))
+    for row, printed_row in zip(reversed(table.rows), reversed(rows), strict=True):
+        lever += abs(row.a) + abs(row.d) + (0.0 if row.kind.turns else largest_value(row.limit))
+        if row.mimic is not None and printed_row.mimic is not None:
+            multiplier_error = abs(row.mimic.multiplier - printed_row.mimic.multiplier)
+            total += multiplier_error * _largest_coordinate(table, row) * max(lever, 1.0)
+        errors = np.abs(np.subtract(row.cells, printed_row.cells))
+        total += float(errors[[0, 2]].sum() + errors[[1, 3, 4]].sum() * lever)
+    base_error = base - table.base
+    rotation_error = float(np.linalg.norm(base_error[:3, :3]))
+    total = total * (1.0 + rotation_error) + rotation_error * lever + float(np.linalg.norm(base_error[:3, 3]))
+    return total + table.rounding(np.zeros(len(table.joint_names))).item()

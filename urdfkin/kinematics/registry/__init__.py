@@ -146,9 +146,9 @@ October 2000. Well-known equations are:
 * transverse, centripetal and Coriolis acceleration (7.125);
 * the forward recursion (7.127 to 7.130).
 
-A test checks this table: every number is present, every function exists, and each named test fails if one of
-the equation's functions returns a slightly wrong result. Vectors are expressed in frame 0 unless stated
-otherwise."""
+Tests check this table: every number except the {len(LOST)} above is present, and every function and every
+named test exists. If a function of an equation returns a slightly wrong result, at least one of the
+equation's tests fails. Vectors are expressed in frame 0 unless stated otherwise."""
 
 
 def _row(equation: Equation) -> str:

@@ -338,8 +338,15 @@ class Conversion:
 
     @property
     def is_constant(self) -> bool:
-        """Whether `matrix` is the same in every configuration."""
-        return not self._blocks
+        """Whether `matrix` is the same in every configuration.
+
+        The matrix of a floating joint is constant if only the point of the linear velocity differs.
+        """
+        how = self.convention
+        return not any(
+            block.joint.kind is JointKind.PLANAR or "parent" in (how.linear, how.angular)
+            for block in self._blocks
+        )
 
     @property
     def rate_permutation(self) -> NDArray[np.intp] | None:
@@ -521,7 +528,9 @@ class Conversion:
         M[np.arange(self.nv), self._v_index] = self._v_factor
         if not self._blocks:
             return M
-        if q is None:
+        if self.is_constant:
+            q = configuration.neutral(self.tree)
+        elif q is None:
             raise InputError(
                 "the matrix of a floating or planar joint depends on q", where=self.convention.name
             )
@@ -625,7 +634,7 @@ class Conversion:
     def jacobian_rate(self, q: Given, v: Given, J: ArrayLike, rate: ArrayLike) -> FloatArray:
         """Convert the time derivative J' of a Jacobian J: S (J' M^-1 + J (M^-1)')."""
         found = self.jacobian(q, rate)
-        if not self._blocks:
+        if self.is_constant:
             return found
         inverse = self.inverse_matrix(q)
         change = -inverse @ self.matrix_rate(q, v) @ inverse
@@ -638,7 +647,7 @@ class Conversion:
         inverse, tensor, columns = self.inverse_matrix(q), self.six(H, -3), self.six(J, -2)
         W = _for_frames(inverse, columns.ndim)
         found: FloatArray = np.einsum("...rkl,...ki,...lj->...rij", tensor, W, W)
-        if self._blocks:
+        if not self.is_constant:
             change = np.zeros((*inverse.shape, self.nv))
             for j in range(self.nv):
                 along = self.matrix_rate(q, inverse[..., j])

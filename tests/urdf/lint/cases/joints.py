@@ -68,7 +68,7 @@ CASES = [
     # Mimic joints.
     Case("mimic-unknown", arm(follow='<mimic joint="j9"/>'), REJECT, "URDF520:7"),
     Case("mimic-a-link", arm(follow='<mimic joint="l1"/>'), REJECT, "URDF520:7"),
-    Case("mimic-circle", arm(inside='<mimic joint="j2"/>', follow=_MIMIC), REJECT, "URDF521:6 URDF521:7"),
+    Case("mimic-cycle", arm(inside='<mimic joint="j2"/>', follow=_MIMIC), REJECT, "URDF521:6 URDF521:7"),
     Case("mimic-planar-leader", arm(attributes='type="planar"', follow=_MIMIC), REJECT, "URDF522:7"),
     Case("mimic-floating-leader", arm(attributes='type="floating"', follow=_MIMIC), REJECT, "URDF522:7"),
     Case("mimic-planar-follower", arm(second='type="planar"', follow=_MIMIC), REJECT, "URDF522:7"),
@@ -76,6 +76,7 @@ CASES = [
     Case("mimic-beyond-its-limits", follows('joint="j1" offset="1"'), WARN, "URDF527:7"),
     Case("mimic-at-rest-outside-its-limits", follows(_REST), WARN, "URDF523:7 URDF527:7"),
     Case("mimic-nowhere-within", follows('joint="j1" offset="5"'), WARN, "URDF527:7"),
+    Case("mimic-within-at-one-value", follows('joint="j1" offset="4"'), WARN, "URDF527:7"),
     Case("mimic-mirrored-within", follows('joint="j1" multiplier="-1"'), ACCEPT),
     Case("mimic-beyond-by-a-digit", follows('joint="j1" multiplier="1.0005"'), ACCEPT),
     Case("mimic-prismatic-of-revolute", arm(second='type="prismatic"', follow=_MIMIC), ACCEPT),

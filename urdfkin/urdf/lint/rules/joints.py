@@ -374,7 +374,7 @@ class _MimicChecker:
             self.report_unknown(mimic)
         elif joint.name in self.in_loops:
             itself = leader is joint
-            message = "the joint mimics itself" if itself else "the joints mimic each other in a circle"
+            message = "the joint mimics itself" if itself else "the joints mimic each other in a cycle"
             self.add(MIMIC_LOOP, message, mimic, "joint", "name a joint that is not a mimic joint")
         elif leader.kind is not None and leader.kind not in AXIAL_TYPES:
             count = "no coordinate" if leader.kind == "fixed" else "several coordinates"
@@ -417,11 +417,14 @@ class _MimicChecker:
         limits, moving = _range_of(joint), None if leader is None else _range_of(leader)
         if leader is None or moving is None or limits is None or joint.kind == "continuous":
             return
-        low, high = allowed_range(rule, Limit(*limits, math.inf, math.inf), *moving)
+        bounds = Limit(*limits, math.inf, math.inf)
+        low, high = allowed_range(rule, bounds, *moving)
         least = 0.0 if rule.multiplier == 0.0 else (1.0 - NEGLIGIBLE_RANGE_LOSS) * (moving[1] - moving[0])
         if low <= high and high - low >= least:
             return
-        allowed = f"only {range_words((low, high))}" if low < high else "no value"
+        # Rounding errors narrow a range of one value to an empty range.
+        single = [f"only {end:.6g}" for end in moving if allowed_range(rule, bounds, end, end) == (end, end)]
+        allowed = f"only {range_words((low, high))}" if low < high else (*single, "no value")[0]
         message = f"the mimic joint leaves its limits: {leader.name!r} moves from {range_words(moving)}, "
         ends = sorted(rule.multiplier * end + rule.offset for end in moving)
         self.report.add(
@@ -435,7 +438,7 @@ class _MimicChecker:
         )
 
     def resolve_chain(self, mimic: MimicRecord) -> tuple[Mimic, JointRecord | None]:
-        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a circle)."""
+        """Return the combined rule of a mimic chain, and the last joint (None if missing or in a cycle)."""
         from urdfkin.model.tree import Mimic
 
         rule = Mimic(mimic.leader, mimic.multiplier, mimic.offset)

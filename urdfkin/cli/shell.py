@@ -1,4 +1,4 @@
-"""Shell completion of commands, options, robots, files, frames, tables, finding codes and equation numbers.
+"""`urdfkin completion`: complete the words of a command in a shell. `urdfkin warm`: compile all kernels.
 
 Completion runs at each press of the Tab key, so completion imports no large package. A name in a malicious
 file, such as `$(...)`, could make the shell run a command. Completion therefore offers only names without
@@ -8,6 +8,7 @@ characters that a shell interprets.
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -15,8 +16,8 @@ from typing import TYPE_CHECKING, Literal
 import click
 from click.shell_completion import CompletionItem, get_completion_class
 
-from urdfkin.cli.streams import say_file
-from urdfkin.errors import UrdfkinError
+from urdfkin.cli.streams import say, say_file
+from urdfkin.errors import SourceError, UrdfkinError
 from urdfkin.urdf.catalogue import catalogue
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def _frames(word: str) -> Iterator[str]:
 @click.command()
 @click.argument("shell", type=click.Choice(("bash", "zsh", "fish")))
 @click.pass_context
-def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> None:
+def completion_command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> None:
     """Print the completion script for a shell.
 
     The script completes commands, options and the choices of options. It also completes robots, files, the
@@ -114,3 +115,40 @@ def command(context: click.Context, shell: Literal["bash", "zsh", "fish"]) -> No
     script = get_completion_class(shell)
     # The script sets the variable _URDFKIN_COMPLETE, so that click prints completions.
     say_file(script(context.find_root().command, {}, "urdfkin", "_URDFKIN_COMPLETE").source())
+
+
+@click.command(epilog="Example: urdfkin warm")
+def warm_command() -> None:
+    """Compile all kernels (machine code for batches) and store them, for container images and CI.
+
+    Without this command, urdfkin compiles a kernel when computations without the kernel take too long, for
+    example for a large batch. Each compilation takes some seconds. Kernels are stored below XDG_CACHE_HOME.
+    On another processor, the kernels are compiled again.
+
+    Exit 0: all kernels are stored. 2: the kernels cannot be stored.
+    """
+    from urdfkin.compiled.kernel_cache import cache_folder, listen_to_compile_events
+    from urdfkin.compiled.machine import kernels
+    from urdfkin.compiled.machine.single import one_configuration
+    from urdfkin.verify.comparison import load_kernels
+
+    folder = cache_folder()
+    if folder is None:
+        raise SourceError(
+            "no folder to store compiled kernels in",
+            remedy="set XDG_CACHE_HOME to a folder that only you can write to",
+        )
+    begin, before = time.perf_counter(), set(folder.glob("*.kernel"))
+
+    def report(name: str, seconds: float | None) -> None:
+        say(f"compiling {name} ..." if seconds is None else f"compiled {name} in {seconds:.1f} s", err=True)
+
+    with listen_to_compile_events(report):
+        load_kernels()
+        for kernel in (kernels.hessians, kernels.imus, one_configuration):
+            _ = kernel.compiled
+    stored = set(folder.glob("*.kernel"))
+    if new := stored - before:
+        say(f"{len(new)} of {len(stored)} kernels compiled in {time.perf_counter() - begin:.0f} s: {folder}")
+    else:
+        say(f"all {len(stored)} kernels are compiled: {folder}")

@@ -1,0 +1,270 @@
+"""Check a robot's chains, solvers and orientations with Pinocchio, and robots made of tables or models.
+
+| Function | Compared |
+|---|---|
+| `check_chain` | the origin and the direction of each joint of a chain, and the tip |
+| `check_opw` | the forward kinematics of an OPW (ortho-parallel wrist) solver |
+| `check_screws` | the placement of the tip by a product of exponentials |
+| `check_orientations` | rotation matrices that Pinocchio computes from roll-pitch-yaw angles or quaternions |
+| `check_table_source` | Pinocchio's placements of the tip with the product of a table's matrices (eq. 7.64) |
+| `check_model_source` | placements of all links with the placements of a `pinocchio.Model` |
+
+`check_chain`, `check_opw` and `check_screws` return a line of text with the result, or None if Pinocchio
+cannot check the robot.
+
+urdfkin writes a URDF text for a table or for a `pinocchio.Model`. Pinocchio reads the same text to check a
+robot's results, so the usual checks do not find an error in the text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from urdfkin.compiled.plan import compile_tree
+from urdfkin.dh.common_normals import left_out
+from urdfkin.dh.convert import link_names
+from urdfkin.dh.screws import ProductOfExponentials
+from urdfkin.dh.structure import Opw
+from urdfkin.dh.table import DHTable
+from urdfkin.errors import OracleError
+from urdfkin.kinematics.roundings import EPS, LEAST_UNIT, ROW, of_joints, of_rows, of_rows_read_back
+from urdfkin.model.base_motion import STILL_STATE
+from urdfkin.model.chain import FrameChain, chain
+from urdfkin.model.configuration import neutral, sample
+from urdfkin.model.tree import FloatArray, JointFrame, JointKind, KinematicTree, LinkFrame
+from urdfkin.urdf.foreign import ConvertedModel
+from urdfkin.verify.bounds import Bound, magnitudes
+from urdfkin.verify.certificate import VerificationError
+from urdfkin.verify.comparison import compare
+from urdfkin.verify.oracle import QueryBatch
+from urdfkin.verify.pinocchio import MOST_RATES, pinocchio, version
+from urdfkin.verify.quantities import PLACEMENT
+from urdfkin.verify.tables import TableError
+from urdfkin.verify.verifier import TABLE_SAMPLES, Verifier
+
+#: Number of random configurations besides the zero configuration.
+_SAMPLES = 8
+#: Upper bound, in eps, on the sum of the rounding errors of urdfkin and of Pinocchio in `check_orientations`.
+#: The error of each program is less than 8 eps.
+#: Angles need arctan2, sines, cosines and products of three numbers (`urdfkin.kinematics.roundings`).
+#: Quaternions need a square root, a quotient and products of two numbers.
+_ROUNDINGS = 16.0
+
+
+def check_chain(verifier: Verifier, path: FrameChain, q: FloatArray) -> str | None:
+    """Compare the joint frames and the tip of a chain with Pinocchio's at the configurations q (n, nq).
+
+    Pinocchio's frame of a joint is the frame of the child link. If the chain leads from the parent link to
+    the child link, Pinocchio's frame includes the joint's motion. If the chain leads from the child link to
+    the parent link, Pinocchio's frame does not include the motion.
+
+    Pinocchio computes along two paths, from the root to the first and to the last frame of the chain. urdfkin
+    computes along the chain, which is a part of the two paths. The bound allows for the rounding errors of
+    all joints on both paths of Pinocchio. The length in the bound is the distance of the first frame from the
+    root plus the length of the chain, with prismatic displacements.
+    """
+    if verifier.cannot() is not None:
+        return None
+    tree = verifier.tree
+    names = [path.base, *(JointFrame.of(joint.name) for joint in path.joints), path.tip]
+    theirs = verifier.oracle().placements(QueryBatch(names, (q,)))
+    base, theirs = theirs[:, :1], theirs[:, 1:]
+    coordinates = path.coupling.select(tree, q)
+    values, ours = path.coupling.values(coordinates), base @ path.frames(coordinates)
+    expected = theirs.copy()
+    for i, joint in enumerate(path.joints):
+        axis = tree.joints[tree.joint_index(joint.name)].axis
+        expected[:, i, :3, 2] = theirs[:, i, :3, :3] @ (-axis if joint.backwards else axis)
+        if not joint.backwards and not joint.kind.turns:
+            expected[:, i, :3, 3] -= values[:, i, np.newaxis] * expected[:, i, :3, 2]
+    off = np.abs(ours - expected)[:, :, :3]
+    metres = float(off[..., 3].max(initial=0.0))
+    turned = max(float(off[..., 2].max(initial=0.0)), float(off[:, -1, :, :3].max(initial=0.0)))
+    ends = [i for end in (path.base, path.tip) for i in tree.path(tree.frame_link(end))]
+    unit = EPS * float(of_joints(len(ends) + 2, sum(tree.joints[i].tilt for i in ends)))
+    length = np.linalg.norm(base[..., :3, 3], axis=-1).max(initial=0.0) + path.lengths.sum()
+    slides = values[:, [not joint.kind.turns for joint in path.joints]]
+    length += np.abs(slides).sum(axis=-1).max(initial=0.0)
+    share = max(metres / (unit * length + LEAST_UNIT), turned / unit)
+    if share > 1.0:
+        raise TableError(
+            "the chain's axes disagree with Pinocchio's",
+            where=f"{path.robot}, {path.base} to {path.tip}",
+            found=f"an origin {metres:.3g} m off, a direction {turned:.3g}",
+            remedy="please report this as an error of urdfkin, with the URDF",
+        )
+    return (
+        f"origins of {len(path.joints)} joints and the tip within {metres:.2e} m ({share:.0%} of the bound)"
+    )
+
+
+def check_opw(verifier: Verifier, path: FrameChain, found: Opw) -> str | None:
+    if verifier.cannot() is not None:
+        return None
+    q, base, tip = _sampled_ends(verifier, path.base, path.tip)
+    values = path.coupling.values(path.coupling.select(verifier.tree, q))
+    off = np.abs(base @ found.placement(values) - tip)[:, :3]
+    return (
+        "the OPW solver's tip pose base . F(sign q - offset) . tool differs from Pinocchio by at most"
+        f" {off[..., 3].max():.2e} m and {off[..., :3].max():.2e} rad on {len(q)} samples"
+    )
+
+
+def check_screws(verifier: Verifier, screws: ProductOfExponentials) -> str | None:
+    if verifier.cannot() is not None:
+        return None
+    q, base, tip = _sampled_ends(verifier, screws.base_frame, screws.tip_frame)
+    coordinates = screws.coupling.select(verifier.tree, q)
+    size = np.abs(coordinates).sum(axis=-1)
+    off = np.abs(base @ screws.placement(coordinates) - tip)[:, :3]
+    path = chain(verifier.tree, screws.tip_frame, screws.base_frame)
+    # Pinocchio computes the placements of the base and the tip relative to the root.
+    # The product of exponentials is the placement of the tip relative to the base.
+    lever = np.linalg.norm(base[:, :3, 3], axis=-1) + path.reach + float(path.lengths[0])
+    joints = sum(len(verifier.tree.path(verifier.tree.frame_link(end))) for end in (path.base, path.tip))
+    unit = EPS * (of_joints(joints) + size) + left_out(path)
+    allowed = screws.rounding(coordinates) + unit * (lever + size)
+    share = float((off[..., 3].max(axis=-1) / (allowed + LEAST_UNIT)).max(initial=0.0))
+    turn = float((off[..., :3].max(axis=(-1, -2)) / (unit + EPS * screws.roundings)).max())
+    if not max(share, turn) <= 1.0:
+        raise TableError(
+            "the product of exponentials disagrees with Pinocchio",
+            where=f"{screws.robot}, {screws.base_frame} to {screws.tip_frame}",
+            found=f"a tip {off[..., 3].max():.3g} m off",
+            remedy="please report this as an error of urdfkin, with the URDF",
+        )
+    return (
+        f"agrees within rounding on {len(q)} samples: tip within {off[..., 3].max():.2e} m"
+        f" ({max(share, turn):.0%} of the bound)"
+    )
+
+
+def _sampled_ends(verifier: Verifier, base: str, tip: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return random configurations, and Pinocchio's placements (n, 4, 4) of base and tip."""
+    q = sample(verifier.tree, TABLE_SAMPLES, np.random.default_rng(0))
+    T = verifier.oracle().placements(QueryBatch([base, tip], (q,)))
+    return q, T[:, 0], T[:, 1]
+
+
+def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Callable[[int], str]) -> None:
+    """Compare rotations that Pinocchio computes from angles or quaternions with the verified rotations `R`.
+
+    `numbers` contains roll, pitch, yaw (n, 3) in rad or quaternions (n, 4), scalar last. `again(k)` returns a
+    command that computes sample k again. The bound includes the distance between `R` and the nearest rotation
+    matrix, because `R` has rounding errors. Raises VerificationError if a rotation differs by more than the
+    bound.
+
+    Only the matrices can be compared. At gimbal lock, two correct programs may return different angles for a
+    rotation. Two correct quaternions may have opposite signs.
+    """
+    pin = pinocchio()
+    if numbers.shape[-1] == 3:
+        theirs = np.array([pin.rpy.rpyToMatrix(*row) for row in numbers.tolist()])
+    else:
+        theirs = np.array([pin.Quaternion(row).toRotationMatrix() for row in numbers])
+    theirs = theirs.reshape(-1, 3, 3)
+    defect = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).sum(axis=(-1, -2))
+    bound = _ROUNDINGS * EPS + 2.0 * defect
+    off = np.abs(theirs - R).max(axis=(-1, -2))
+    if (off <= bound).all():
+        return
+    k = int(np.argmax(off / bound))
+    raise VerificationError(
+        "orientation",
+        frame,
+        "rpy" if numbers.shape[-1] == 3 else "quaternion",
+        index=(k,),
+        ours=R[k],
+        theirs=theirs[k],
+        bound=np.full((3, 3), bound[k]),
+        units=float(off[k] / EPS),
+        reproduce=again(k),
+    )
+
+
+def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) -> str:
+    """Compare a robot with the Pinocchio model (or RobotWrapper) from which the robot was made.
+
+    Returns a line of text with the result. Raises OracleError if a placement differs by more than the bound.
+    """
+    model, tree = getattr(source, "model", source), verifier.tree
+    if model.nv > MOST_RATES:  # Pinocchio's memory grows with the cube of nv.
+        return f"not compared with the model itself: nv is {model.nv}, more than {MOST_RATES}"
+    q = np.vstack((neutral(tree), sample(tree, _SAMPLES, np.random.default_rng(0))))
+    names = [*made.joints, *made.frames]
+    plan = compile_tree(tree, [tree.frame_link(LinkFrame.of(name)) for name in names])
+    ours: FloatArray = PLACEMENT.ours(plan, (q,), None, base=STILL_STATE)
+    theirs = _placements(model, _configurations(model, tree, q), made)
+    # The factor 2 in the bound allows for the rounded angles in the URDF text.
+    bound = PLACEMENT.bound(plan, magnitudes(plan, q, None, None, STILL_STATE), None)
+    found = compare(ours, theirs, Bound(bound.scale, 2.0 * bound.k), 2)
+    if not found.agrees:
+        raise OracleError(
+            "the robot made from a pinocchio.Model differs from the model",
+            where=f"{tree.name}, {names[found.index[1]]}",
+            found=f"{found.share:.3g} times the bound of rounding, Pinocchio {version()}",
+            remedy="please report this as an error of urdfkin, with the model",
+        )
+    return (
+        f"compared with the model itself: {len(names)} links agree in {len(q)} configurations"
+        f" ({found.share:.1%} of the bound)"
+    )
+
+
+def _placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
+    """Return the model's placements (n, joints + frames, 4, 4)."""
+    pin = pinocchio()
+    data = model.createData()
+    out = np.empty((len(q), len(made.joints) + len(made.frames), 4, 4))
+    for k, q_k in enumerate(q):
+        pin.framesForwardKinematics(model, data, q_k)
+        placed = [data.oMi[j] for j in made.joints.values()] + [data.oMf[i] for i in made.frames.values()]
+        out[k] = [one.homogeneous for one in placed]
+    return out
+
+
+def _configurations(model: Any, tree: KinematicTree, q: FloatArray) -> FloatArray:
+    """Return configurations (n, model.nq) of the model for the tree's q, with joints matched by name."""
+    full = np.zeros((len(q), int(model.nq)))
+    for joint, at in zip(tree.joints, tree.q_index, strict=True):
+        if not joint.nq:
+            continue
+        theirs = model.joints[model.getJointId(joint.name)]
+        to, size = int(theirs.idx_q), int(theirs.nq)
+        numbers = q[:, at : at + joint.nq]
+        if joint.kind is JointKind.PLANAR:
+            numbers = np.column_stack((numbers[:, :2], np.cos(numbers[:, 2]), np.sin(numbers[:, 2])))
+        elif size == 2:
+            numbers = np.column_stack((np.cos(numbers), np.sin(numbers)))
+        full[:, to : to + size] = numbers
+    return full
+
+
+def check_table_source(verifier: Verifier, table: DHTable) -> None:
+    """Compare Pinocchio's placements of the tip with the placements from the robot's table."""
+    if verifier.cannot() is not None:
+        return
+    q = sample(verifier.tree, _SAMPLES, np.random.default_rng(0))
+    own = table.coupling.select(verifier.tree, q)
+    theirs = verifier.oracle().placements(QueryBatch([LinkFrame.of(link_names(table)[-1])], (q,)))[:, 0]
+    off = np.abs(theirs - table.placement(own))[:, :3]
+    # Base and tool of the table may be rounded to six digits; the rotations in the URDF are exact.
+    rows, metres, defect = len(table.rows), table.rounding(own), _defect(table)
+    turn = EPS * of_rows_read_back(rows) + defect
+    allowed = metres * (of_rows_read_back(rows) / of_rows(rows) + defect / (EPS * ROW))
+    if (off[..., 3].max(axis=-1) > allowed).any() or (off[..., :3] > turn).any():
+        raise TableError(
+            "the URDF made from a table differs from the table",
+            where=table.robot,
+            found=f"a tip {off[..., 3].max():.3g} m off",
+            remedy="please report this as an error of urdfkin, with the table",
+        )
+
+
+def _defect(table: DHTable) -> float:
+    """Return the sum of the Frobenius norms of R^T R - I over the rotations R of base and tool."""
+    rotations: list[FloatArray] = [table.base[:3, :3], table.tool[:3, :3]]
+    return sum(float(np.linalg.norm(R.T @ R - np.eye(3))) for R in rotations)
