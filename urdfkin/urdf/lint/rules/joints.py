@@ -590,9 +590,9 @@ def _replace_words(raw_value: str | None, words: list[str]) -> str:
 def find_rounded_pi(text: str, angle: float) -> tuple[Fraction, float] | None:
     """If a decimal number is a rounded multiple of pi, return the multiple and its value, else None.
 
-    >>> rounded_pi("1.5708", 1.5708)
+    >>> find_rounded_pi("1.5708", 1.5708)
     (Fraction(1, 2), 1.5707963267948966)
-    >>> rounded_pi("1.5707963267948966", 1.5707963267948966) is None
+    >>> find_rounded_pi("1.5707963267948966", 1.5707963267948966) is None
     True
     """
     mantissa, _, exponent = text.lower().partition("e")
