@@ -40,7 +40,7 @@ from urdfkin.kinematics.roundings import EPS, table_roundings
 from urdfkin.model.configuration import coordinate_names, sample
 from urdfkin.model.tree import FloatArray
 from urdfkin.robot import Robot
-from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.oracle import QueryBatch
 
 SAMPLES = 4
@@ -212,7 +212,7 @@ class Subject:
 
 
 def subjects(leaves: bool) -> Iterator[Subject]:
-    for name in examples():
+    for name in example_robots():
         robot = urdfkin.load(name)
         tips = [robot.tree.frame_name(leaf) for leaf in robot.tree.leaves()] if leaves else [robot.tip_frame]
         for tip in tips:

@@ -25,7 +25,7 @@ from urdfkin.kinematics.roundings import EPS
 from urdfkin.model.chain import make_chain
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, Mimic
 from urdfkin.urdf.writer import to_urdf
-from urdfkin.urdf.xacro import arguments_of
+from urdfkin.urdf.xacro import find_arguments
 from urdfkin.verify.tables import TableCheck, TableError
 
 #: A right angle with twelve digits, an error of 2.07e-13 rad; the parallel axes are 0.1 m apart.
@@ -233,10 +233,10 @@ def test_all_xacro_arguments_are_found_unless_an_include_is_computed_or_missing(
     def nowhere(package: str) -> str:
         raise LookupError(package)
 
-    assert arguments_of(xacro, nowhere) == {"length", "width", "colour"}
+    assert find_arguments(xacro, nowhere) == {"length", "width", "colour"}
     for file in ("$(arg width).xacro", "missing.xacro"):
         xacro.write_text(XACRO.replace("part.xacro", file))
-        assert arguments_of(xacro, nowhere) is None
+        assert find_arguments(xacro, nowhere) is None
 
 
 @pytest.mark.slow

@@ -358,7 +358,7 @@ def test_locked_joints_have_no_coordinate_and_no_column() -> None:
     robot = library.load("panda").locked("ready, panda_joint7=30deg", joints=["panda_joint1", "panda_joint2"])
     assert found["result"] == [robot.placement([0.1, 0.2]).tolist()]
     robot = library.load("panda").locked({"panda_joint4": -1.0 / 3.0})
-    replay = robot.origin.words.split()
+    replay = robot.origin.command_line.split()
     assert replay == ["panda", "--lock", f"panda_joint4={-1.0 / 3.0!r}"]
     found = urdfkin("placement", *replay, "--q", "ready", "--format", "json").data
     assert found["result"] == [robot.placement("ready").tolist()]

@@ -171,7 +171,7 @@ def test_a_table_file_can_be_loaded_like_a_urdf(tmp_path: Path, root_joint: str 
     np.testing.assert_array_equal(robot.jacobian(q, "tool0"), same.jacobian(q, "tool0"))
     assert robot.certificate().verified
     assert (robot.source, same.source) == (str(file), "<table>")
-    assert robot.origin.python.startswith(f"urdfkin.load({str(file)!r}")
+    assert robot.origin.python_call.startswith(f"urdfkin.load({str(file)!r}")
 
 
 def test_a_table_and_a_table_file_can_be_validated() -> None:

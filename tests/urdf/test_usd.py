@@ -393,7 +393,7 @@ def test_a_variant_is_selected(write: Write) -> None:
     assert reach(robot) == pytest.approx(5.0)
     assert codes(robot) == {}
     assert path.read_bytes() == before
-    assert "--variant gripper=long" in robot.origin.words
+    assert "--variant gripper=long" in robot.origin.command_line
     for wrong, named in (({"gripper": "lon"}, "long"), ({"griper": "long"}, "gripper")):
         with pytest.raises(InputError, match=named):
             loaded(path, variant=wrong)
@@ -583,7 +583,7 @@ def test_a_blocked_value_is_treated_as_missing(read: Read) -> None:
 
 
 def test_a_spline_without_a_default_value_is_reported(write: Write) -> None:
-    if not hasattr(usd.library().Usd.Attribute, "HasSpline"):
+    if not hasattr(usd.import_openusd().Usd.Attribute, "HasSpline"):
         pytest.skip("this OpenUSD has no splines")
     spline = "double xformOp:translateZ.spline = {\n1: 1; post held,\n}"
     text = stage(ARM).replace("double3 xformOp:translate = (0, 0, 1)", spline)
@@ -690,7 +690,7 @@ def test_a_reference_outside_the_folder_is_refused(write: Write, reference: str,
     }.get(arc, f'#usda 1.0\ndef "x" {own} {{ }}\n')
     path.write_text(text)
     with pytest.raises(InputError, match=why):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
     if arc == "reference":
         with pytest.raises(InputError, match=why):
             loaded(path)
@@ -740,7 +740,7 @@ def test_layers_of_hundreds_of_megabytes_are_refused_before_they_are_read(write:
     begin = time.monotonic()
     words = r"large\.usdc: the file is too large: found 700000000 bytes"
     with pytest.raises(SourceError, match=words):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
     with pytest.raises(InputError, match=words):
         loaded(path)
     assert time.monotonic() - begin < 30.0
@@ -755,21 +755,21 @@ def test_the_total_size_of_all_layers_is_limited(write: Write, monkeypatch: pyte
     own = path.stat().st_size
     monkeypatch.setattr(usd, "MOST", own + 2000)
     with pytest.raises(SourceError, match=f"too large: found over {own + 2000} bytes"):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
     monkeypatch.setattr(usd, "MOST", own + 5000)
-    assert len(usd.files_of(usd.library(), str(path))) == 6
+    assert len(usd.find_layer_files(usd.import_openusd(), str(path))) == 6
 
 
 def test_hundreds_of_layers_are_read_but_not_thousands(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     refs = "".join(f'def "x{k}" (references = @./part{k}.usdc@</a>) {{ }}\n' for k in range(200))
     path = write(stage(ARM + refs))
-    part = usd.library().Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
+    part = usd.import_openusd().Sdf.Layer.FindOrOpen(str(write('#usda 1.0\ndef "a" { }\n', "part.usda")))
     for k in range(200):  # the process may have 64 open files
         part.Export(str(path.with_name(f"part{k}.usdc")))
     assert loaded(path).nq == 2
     monkeypatch.setattr(usd, "_LAYERS", 100)
     with pytest.raises(InputError, match="too many layers: found over 100"):
-        usd.files_of(usd.library(), str(path))
+        usd.find_layer_files(usd.import_openusd(), str(path))
 
 
 def test_textures_and_other_assets_are_never_opened(write: Write, tmp_path: Path) -> None:
@@ -806,7 +806,9 @@ DEEDS = {
 @pytest.mark.parametrize("deed", DEEDS)
 def test_the_confined_process_cannot_write_files_or_start_processes(tmp_path: Path, deed: str) -> None:
     file = tmp_path / "made"
-    words = f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit(5)\n{DEEDS[deed]}"
+    words = (
+        f"import os, sys; from urdfkin.verify import usd_process; usd_process.limit_process(5)\n{DEEDS[deed]}"
+    )
     if os.geteuid() == 0 and deed != "write":
         pytest.skip("the kernel does not limit the processes of root")
     assert python(words, str(file), check=False, timeout=60).returncode != 0
@@ -867,7 +869,7 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
 ) -> None:
     path = write(stage(ARM, unit=0.5))
     assert loaded_in_this_process(monkeypatch, path).nq == 2
-    side, motion = usd._StageReader._side, usd._StageReader._motion
+    side, motion = usd._StageReader._read_side, usd._StageReader._read_motion
 
     def wrong_side(self: Any, prim: Any, i: int, target: str | None) -> Any:
         found = present(side(self, prim, 1 - i if mistake == "swapped" else i, target))
@@ -880,8 +882,8 @@ def test_the_comparison_with_openusds_parser_finds_an_error_of_the_reader(
         factor = 180.0 / math.pi if mistake == "degrees" else 1.0
         return kind, axis, (lower * factor, upper * factor), "rotX" if mistake == "axis" else free
 
-    monkeypatch.setattr(usd._StageReader, "_side", wrong_side)
-    monkeypatch.setattr(usd._StageReader, "_motion", wrong_motion)
+    monkeypatch.setattr(usd._StageReader, "_read_side", wrong_side)
+    monkeypatch.setattr(usd._StageReader, "_read_motion", wrong_motion)
     with pytest.raises(OracleError, match="parser of UsdPhysics and urdfkin disagree about this joint"):
         loaded_in_this_process(monkeypatch, path)
 
@@ -1470,7 +1472,7 @@ def _angle_between(T: Any, U: Any) -> float:
 
 
 def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_precision() -> None:
-    pxr, rng = usd.library(), np.random.default_rng(3)
+    pxr, rng = usd.import_openusd(), np.random.default_rng(3)
     made, gf = pxr.Usd.Stage.CreateInMemory(), pxr.Gf
     reader = usd._StageReader(pxr, made, "", frozenset())
     reader._cache = pxr.UsdGeom.XformCache(pxr.Usd.TimeCode.Default())
@@ -1479,7 +1481,7 @@ def test_the_bound_of_a_prims_rotation_holds_for_random_transforms_in_single_pre
         prim = pxr.UsdGeom.Xform.Define(made, f"/{op}{k}{precision}")
         how = [] if op == "Transform" else [getattr(pxr.UsdGeom.XformOp, f"Precision{precision}")]
         getattr(prim, f"Add{op}Op")(*how).Set(value)
-        return reader._placed(prim.GetPrim())[0]
+        return reader._world_pose(prim.GetPrim())[0]
 
     orders = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
     worst = dict.fromkeys(("Rotate", "Orient", "Transform"), 0.0)

@@ -17,7 +17,7 @@ from urdfkin.cli.output import Answer, writes_answer
 from urdfkin.errors.display import Table, TextDocument
 from urdfkin.errors.escape import csv_cell, csv_value
 from urdfkin.system.lazy_import import lazy_import
-from urdfkin.urdf.catalogue import Entry, catalogue
+from urdfkin.urdf.catalogue import CatalogueEntry, catalogue
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -43,9 +43,9 @@ def robots_command(family: str | None) -> Answer:
     heads = ("name", "family", "base", "tip")
     rows = [(entry.name, entry.family, entry.base or "", entry.tip or "") for entry in entries]
     without_mimic = [
-        f"{entry.name}: mimic joints are loaded as free joints: {entry.reason}"
+        f"{entry.name}: mimic joints are loaded as free joints: {entry.mimic_problem}"
         for entry in entries
-        if entry.reason
+        if entry.mimic_problem
     ]
     table = Table(heads, rows, left=4, names=(0, 2, 3))
     data = {
@@ -55,15 +55,15 @@ def robots_command(family: str | None) -> Answer:
     return Answer(lambda: TextDocument("", [table, f"{len(entries)} robots", *without_mimic]), data)
 
 
-def _as_dict(entry: Entry) -> dict[str, object]:
+def _as_dict(entry: CatalogueEntry) -> dict[str, object]:
     return {
         "name": entry.name,
         "family": entry.family,
         "path": str(entry.path),
         "limbs": {limb: list(ends) for limb, ends in entry.limbs.items()},
         "mimic": entry.mimic,
-        "reason": entry.reason,
-        "own": entry.own,
+        "mimic_problem": entry.mimic_problem,
+        "is_bundled": entry.is_bundled,
     }
 
 

@@ -28,7 +28,7 @@ from urdfkin.cli.shell import complete_robot
 from urdfkin.cli.streams import say
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.system.lazy_import import install_remedy
-from urdfkin.urdf.catalogue import examples
+from urdfkin.urdf.catalogue import example_robots
 from urdfkin.verify.quantities import compared, not_compared
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ def validate_command(
     if how["xacro_args"] and not any(map(is_xacro, robots)):
         reject_unused_options(context, ("xacro_arg",), "without a .xacro file")
     usd: dict[str, Any] = {name: how.pop(name) for name in ("variant", "articulation") if name in how}
-    given = [_load_stdin(robot, how) if with_study else robot for robot in robots or examples()]
+    given = [_load_stdin(robot, how) if with_study else robot for robot in robots or example_robots()]
     given = [_load_usd(robot, how, usd) if usd else robot for robot in given]
     with (
         stoppable() as stop,

@@ -32,7 +32,7 @@ from urdfkin.model.tree import Joint, KinematicTree, Mimic
 from urdfkin.robot import Robot
 from urdfkin.robot.loading import as_robot, robot_of
 from urdfkin.system.plain_xml import plain_xml
-from urdfkin.urdf.sources import Source, Text, is_usd
+from urdfkin.urdf.sources import Source, UrdfText, is_usd
 from urdfkin.urdf.writer import to_urdf
 
 _PARTS = {"xyz": ("x", "y", "z"), "rpy": ("roll", "pitch", "yaw")}
@@ -336,5 +336,5 @@ def _effect(old: KinematicTree, new: KinematicTree, element: str, name: str) -> 
 
 
 def _quiet_robot(tree: KinematicTree) -> Robot:
-    text = Text(to_urdf(tree).encode(), tree.name, tree.name)
+    text = UrdfText(to_urdf(tree).encode(), tree.name, tree.name)
     return robot_of(text, verify=False, made=True, quiet=True)

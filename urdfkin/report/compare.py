@@ -397,7 +397,7 @@ def _findings(source: str, old: ReportedRobot, new: ReportedRobot) -> Iterator[R
         for finding in robot["findings"]:
             if finding["severity"] != "note":
                 key = f"{finding['severity']} {finding['code']}"
-                count[key] = count.get(key, 0) + 1 + len(finding["also"])
+                count[key] = count.get(key, 0) + 1 + len(finding["other_lines"])
     for key in sorted(counts[0].keys() | counts[1].keys()):
         before, after = counts[0].get(key, 0), counts[1].get(key, 0)
         if before != after:

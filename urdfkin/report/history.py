@@ -274,7 +274,7 @@ def _add(found: History, before: Document | None, document: Document) -> None:
 def _point(run: int, source: str, robot: ReportedRobot) -> Point:
     counts = Counter[str]()
     for finding in robot["findings"]:
-        counts[finding["severity"]] += 1 + len(finding["also"])
+        counts[finding["severity"]] += 1 + len(finding["other_lines"])
     return {
         "run": run,
         "source": source,

@@ -357,7 +357,7 @@ def as_html(
 
 
 def command_of(robots: tuple[Robot, Robot], question: SameQuestion, options: Sequence[str]) -> str:
-    words = [robot.origin.words for robot in robots]
+    words = [robot.origin.command_line for robot in robots]
     words += [] if question.within is None else [f"--within {question.within!r}"]
     words += ["--strict"] if question.strict else []
     return " ".join(["urdfkin same", *words, *map(shlex.quote, options)])

@@ -48,7 +48,7 @@ from urdfkin.model.tree import FloatArray, FrameName, KinematicTree, LinkFrame, 
 from urdfkin.system.lazy_import import hook
 from urdfkin.system.locks import importing
 from urdfkin.urdf.findings import Finding, Findings
-from urdfkin.urdf.sources import Origin, entry_of
+from urdfkin.urdf.sources import Origin, find_entry
 from urdfkin.verify.bounds import magnitudes, movable, nearest_singularity
 from urdfkin.verify.call import Call
 from urdfkin.verify.certificate import Certificate
@@ -279,7 +279,7 @@ class Robot(Displayable):
         >>> urdfkin.load("planar_two_link").path.endswith("planar_two_link.urdf")
         True
         """
-        entry = entry_of(self.source)
+        entry = find_entry(self.source)
         path = entry.path if entry is not None else Path(self.source)
         return str(path.resolve()) if not self.source.startswith(("<", "-")) and path.is_file() else None
 

@@ -148,7 +148,7 @@ def _short(value: object) -> str:
 
 def _called(robot: tuple[Origin, str]) -> str:
     origin, stamp = robot
-    return f"{origin.words} (sha256 {stamp[:12] or 'unknown'})"
+    return f"{origin.command_line} (sha256 {stamp[:12] or 'unknown'})"
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.chain import FrameChain, make_chain
 from urdfkin.model.configuration import neutral, sample
 from urdfkin.model.tree import FloatArray, JointFrame, JointKind, KinematicTree, LinkFrame
-from urdfkin.urdf.foreign import Modelled
+from urdfkin.urdf.foreign import ConvertedModel
 from urdfkin.verify.bounds import Bound, magnitudes
 from urdfkin.verify.certificate import VerificationError
 from urdfkin.verify.comparison import compare
@@ -192,7 +192,7 @@ def check_orientations(numbers: FloatArray, R: FloatArray, frame: str, again: Ca
     )
 
 
-def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
+def check_model_source(verifier: Verifier, made: ConvertedModel, source: Any) -> str:
     """Compare a robot with the Pinocchio model (or RobotWrapper) from which the robot was made.
 
     Returns a line of text with the result. Raises OracleError if a placement differs by more than the bound.
@@ -221,7 +221,7 @@ def check_model_source(verifier: Verifier, made: Modelled, source: Any) -> str:
     )
 
 
-def _placements(model: Any, q: FloatArray, made: Modelled) -> FloatArray:
+def _placements(model: Any, q: FloatArray, made: ConvertedModel) -> FloatArray:
     """Return the model's placements (n, joints + frames, 4, 4)."""
     pin = pinocchio()
     data = model.createData()

@@ -28,7 +28,7 @@ from urdfkin.model.base_motion import FIXED_BASE_STATE
 from urdfkin.model.tree import FloatArray, LinkFrame
 from urdfkin.system.files import at_home
 from urdfkin.system.processes import ask_python, own_python
-from urdfkin.urdf.mjcf import Listed, is_text, name_of
+from urdfkin.urdf.mjcf import MjcfRemark, is_text, source_name
 from urdfkin.urdf.mujoco import version
 from urdfkin.verify.bounds import Bound, magnitudes, mjcf_placement_bound, mujoco_magnitudes, result_k
 from urdfkin.verify.comparison import worst_of_each
@@ -53,7 +53,7 @@ class MjcfReading:
     """
 
     urdf: str
-    listed: tuple[Listed, ...]
+    listed: tuple[MjcfRemark, ...]
     path: str | None
     answer: Mapping[str, Any]
     not_whole: str | None
@@ -70,7 +70,7 @@ def read_mjcf(
     joint.
     """
     version()
-    name = name_of(source)
+    name = source_name(source)
     text = isinstance(source, bytes) or is_text(source)
     path = None if text else str(at_home(os.fspath(source)))  # type: ignore[arg-type]
     request = {
@@ -92,7 +92,7 @@ def read_mjcf(
     reasons = [answer["not_whole"] for answer in answers if "not_whole" in answer]
     return MjcfReading(
         read[-1]["urdf"],
-        tuple(Listed(*one) for one in read[-1]["listed"]),
+        tuple(MjcfRemark(*one) for one in read[-1]["listed"]),
         path,
         read[-1],
         None if read[-1]["whole"] else printable((reasons or [ending])[0])[:_QUOTED],

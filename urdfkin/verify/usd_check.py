@@ -33,7 +33,7 @@ from urdfkin.model.configuration import largest_value
 from urdfkin.model.tree import FloatArray, JointKind, KinematicTree, LinkFrame, inverse, pose
 from urdfkin.system.files import at_home, read_bytes
 from urdfkin.system.processes import ask_python, own_python
-from urdfkin.urdf.usd import Remark, version
+from urdfkin.urdf.usd import UsdRemark, version
 from urdfkin.verify.mjcf_process import MOST, parse_answers, unpacked
 from urdfkin.verify.quantities import PLACEMENT
 from urdfkin.verify.verifier import Verifier
@@ -55,7 +55,7 @@ class UsdReading:
     """The tree of a USD stage as a URDF text, and the answer of the process that read the stage."""
 
     urdf: str
-    remarks: tuple[Remark, ...]
+    remarks: tuple[UsdRemark, ...]
     path: str
     answer: Mapping[str, Any]
 
@@ -96,10 +96,10 @@ def read_usd(
             remedy="check that the file is complete",
         )
     answer = answers[-1]
-    return UsdReading(answer["urdf"], tuple(Remark(*one) for one in answer["remarks"]), str(path), answer)
+    return UsdReading(answer["urdf"], tuple(UsdRemark(*one) for one in answer["remarks"]), str(path), answer)
 
 
-def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[Remark, ...]]:
+def check_usd_source(verifier: Verifier, read: UsdReading) -> tuple[str, tuple[UsdRemark, ...]]:
     """Compare a robot with OpenUSD's data of the stage; return a sentence and remarks about prims.
 
     Raises OracleError if OpenUSD's parser and urdfkin disagree about a joint.
@@ -160,7 +160,7 @@ def _angle(R: FloatArray) -> float:
     return float(np.arctan2(sine, (np.trace(R) - 1.0) / 2.0))
 
 
-#: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single`).
+#: Five numbers about rounding to single precision for each joint (`urdfkin.urdf.usd.Usd.single_precision`).
 Single = Mapping[str, tuple[float, float, float, float, float]]
 
 
@@ -227,7 +227,7 @@ def single_precision(tree: KinematicTree, single: Single) -> SinglePrecision:
     return SinglePrecision(of_links, joint_roundings)
 
 
-def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[Remark, ...]]:
+def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str, tuple[UsdRemark, ...]]:
     """Compare the placements of links with the transforms of their prims, in the stage's configuration.
 
     The bound assumes that a prim's transform consists of several operations: one operation for each joint on
@@ -273,7 +273,7 @@ def _compare_prims(tree: KinematicTree, answer: Mapping[str, Any]) -> tuple[str,
                 f" and {np.degrees(angle):.3g} degrees"
             )
             remarks.append(
-                Remark("rest-pose", path, what, "correct the joint's frames or the prim's transform")
+                UsdRemark("rest-pose", path, what, "correct the joint's frames or the prim's transform")
             )
     moved = (
         int(np.count_nonzero(np.abs(q) > 0.0)) if not any(joint.kind.nq > 1 for joint in tree.joints) else 0

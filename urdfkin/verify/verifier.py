@@ -169,7 +169,7 @@ class Verifier:
     def certificate(self) -> Certificate:
         return replace(
             self.ledger.certificate(self.tree.name, self.library.words),
-            reading="; ".join(filter(None, (self.reading, self.origin.lock_words))),
+            reading="; ".join(filter(None, (self.reading, self.origin.locks_text))),
             source=self.origin.source,
             sha256=self.sha256,
             urdfkin=own_version(),
@@ -290,7 +290,7 @@ class Verifier:
         if (query := call.question.rows(np.array([k])).base) is not None:
             fields = query.placement, query.velocity, query.acceleration
             words.append(f"base=urdfkin.BaseMotion({', '.join(repr(x[0].tolist()) for x in fields)})")
-        return f"{self.origin.python}.{quantity.method}({', '.join(words)})"
+        return f"{self.origin.python_call}.{quantity.method}({', '.join(words)})"
 
     # -- tables --------------------------------------------------------------------------------------
 
