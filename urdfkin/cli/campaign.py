@@ -200,12 +200,10 @@ def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    if not store.has_study:
-        return
-    robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     from urdfkin.report.words import counted
     from urdfkin.validation.store import AccuracyResult
 
+    robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     if (results := AccuracyResult.of(store)) is not None:
         say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')} done")
 
@@ -250,8 +248,7 @@ def merge(folder: Path, stores: tuple[Path, ...]) -> None:
             whole.check_same(other.manifest, other.folder)
         for other in others:
             say(f"{other.folder}: {whole.copy_missing(other):,} chunks copied")
-        if any(other.has_study for other in others):
-            AccuracyResult.merge(whole, others)
+        AccuracyResult.merge(whole, others)
         counts = whole.counts()
         missing = _missing_chunks(whole, counts)
         _print_accuracy_progress(whole, counts)

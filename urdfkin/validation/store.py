@@ -189,10 +189,6 @@ class Store:
     def has(self, key: str, kind: str) -> bool:
         return self._place(key, kind).exists()
 
-    @property
-    def has_study(self) -> bool:
-        return (self.folder / _STUDY_FILE).exists()
-
     def write_entry(self, key: str, kind: str, data: bytes) -> None:
         self._write(self._place(key, kind), data)
 
