@@ -20,7 +20,7 @@ from urdfkin.validation import memory
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.chunk import run_chunk
 from urdfkin.validation.document import ValidationVerdict
-from urdfkin.validation.robot_input import subject
+from urdfkin.validation.robot_input import make_robot_input
 from urdfkin.verify.pinocchio import PinocchioOracle
 
 GB = 10**9
@@ -47,7 +47,7 @@ def test_blocks_contain_each_item_once_and_processes_share_half_of_the_free_memo
 def test_comparing_in_blocks_changes_no_number(
     source: str, root_joint: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (chunk,) = chunks(subject(source, None, root_joint), 5, 3)
+    (chunk,) = chunks(make_robot_input(source, None, root_joint), 5, 3)
     whole = run_chunk(chunk)
     monkeypatch.setattr(memory, "BLOCK_BYTES", 2 * memory.frame_bytes(8, len(whole.joints)))
     parts = run_chunk(chunk)
@@ -71,7 +71,7 @@ def test_no_array_of_a_block_is_larger_than_a_block(monkeypatch: pytest.MonkeyPa
         for where in (evaluate, PinocchioOracle):
             monkeypatch.setattr(where, name, recorded(getattr(where, name)))
     monkeypatch.setattr(memory, "BLOCK_BYTES", 100_000)
-    (chunk,) = chunks(subject("talos"), 5, 3)
+    (chunk,) = chunks(make_robot_input("talos"), 5, 3)
     run_chunk(chunk)
     assert len(sizes) > 100
     assert 50_000 < max(sizes) <= 100_000

@@ -17,11 +17,11 @@ from tests.validation import faulty_worker
 from urdfkin.errors import UrdfkinError
 from urdfkin.validation import answer, engines, worker_processes
 from urdfkin.validation.campaign import validate
-from urdfkin.validation.chunk import Chunk, ChunkResult, Cut, run_chunk
+from urdfkin.validation.chunk import Chunk, Chunking, ChunkResult, run_chunk
 from urdfkin.validation.document import ValidationVerdict, outcome
 from urdfkin.validation.engines import ExecutorEngine, SerialEngine, Task
 from urdfkin.validation.results import ValidationReport
-from urdfkin.validation.robot_input import RobotInput, subject
+from urdfkin.validation.robot_input import RobotInput, make_robot_input
 
 ROBOTS = ["double_pendulum", "ur5", "planar_two_link"]
 ROOT = Path(__file__).parents[2]
@@ -29,7 +29,7 @@ run = partial(subprocess.run, capture_output=True, text=True, check=False)
 
 
 def chunks(robot: RobotInput, samples: int, seed: int) -> Iterator[Chunk]:
-    cut = Cut(samples)
+    cut = Chunking(samples)
     return (cut.chunk(robot, seed, index) for index in range(len(cut)))
 
 
@@ -222,7 +222,7 @@ def test_an_interrupt_keeps_finished_chunks_and_drops_waiting_chunks(
     ran: list[tuple[str, int]] = []
 
     def interrupted(chunk: Chunk) -> ChunkResult:
-        ran.append((chunk.subject.label, chunk.index))
+        ran.append((chunk.robot_input.label, chunk.index))
         if ran[-1] == ("ur5", 1):
             raise KeyboardInterrupt
         return run_chunk(chunk)
@@ -252,7 +252,7 @@ def test_an_executors_waiting_chunks_are_cancelled_on_an_interrupt() -> None:
                 raise KeyboardInterrupt
             return made[-1]
 
-    tasks = [Task(0, chunk) for chunk in chunks(subject("ur5"), 100, 0)]
+    tasks = [Task(0, chunk) for chunk in chunks(make_robot_input("ur5"), 100, 0)]
     with pytest.raises(KeyboardInterrupt):
         ExecutorEngine(Never()).run([tasks], lambda *_: None)
     assert [future.cancelled() for future in made] == [True, True, False]

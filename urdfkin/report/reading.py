@@ -316,9 +316,9 @@ def read_document(path: Path) -> Document:
 
 
 def stored_document(folder: Path) -> Document:
-    from urdfkin.validation.campaign import stored
+    from urdfkin.validation.campaign import read_stored_report
 
-    return checked(stored(folder).as_dict(), str(folder))
+    return checked(read_stored_report(folder).as_dict(), str(folder))
 
 
 def checked(data: object, where: str) -> Document:

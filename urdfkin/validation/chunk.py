@@ -35,9 +35,9 @@ from urdfkin.verify.oracles import PINOCCHIO, OracleLibrary
 from urdfkin.verify.quantities import SCREWS, Quantity, validated
 
 #: Number of samples in one draw.
-DRAWN = 25
+DRAW_SIZE = 25
 #: Number of special configurations before the random configurations.
-SPECIAL = 3
+SPECIAL_SAMPLES = 3
 #: A robot with at least 200 samples has at least this number of chunks, so that several workers can share it.
 _MIN_CHUNKS = 8
 #: Maximum number of draws in a chunk.
@@ -56,7 +56,7 @@ class Chunk:
     check of the robot may use `memory` bytes; None means half of the machine's free memory.
     """
 
-    subject: RobotInput
+    robot_input: RobotInput
     seed: int
     index: int
     first: int
@@ -65,19 +65,19 @@ class Chunk:
 
     @property
     def configurations(self) -> int:
-        return self.samples + (SPECIAL if self.first == 0 else 0)
+        return self.samples + (SPECIAL_SAMPLES if self.first == 0 else 0)
 
     @property
     def first_sample(self) -> int:
-        return 0 if self.first == 0 else SPECIAL + self.first * DRAWN
+        return 0 if self.first == 0 else SPECIAL_SAMPLES + self.first * DRAW_SIZE
 
     def draw(self, tree: KinematicTree) -> Samples:
-        drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAWN)))]
+        drawn = [self._draw(tree, i) for i in range(max(1, -(-self.samples // DRAW_SIZE)))]
         return Samples(*(np.concatenate([getattr(x, name) for x in drawn]) for name in ("q", "v", "a")))
 
     def _draw(self, tree: KinematicTree, i: int) -> Samples:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.first + i,)))
-        samples = min(DRAWN, self.samples - i * DRAWN)
+        samples = min(DRAW_SIZE, self.samples - i * DRAW_SIZE)
         return draw(tree, samples, rng, with_special=self.first + i == 0)
 
 
@@ -91,7 +91,7 @@ class Timings:
     compare: float = 0.0
     second: float = 0.0
 
-    def timed(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
+    def time_call(self, part: str, function: Callable[_P, _T], *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Call a function. Add its computing time (s) to the attribute named by `part`, such as "urdfkin"."""
         begin = time.perf_counter()
         try:
@@ -140,10 +140,10 @@ class ChunkResult:
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
+class Chunking:
     """Division of each robot's samples into chunks, which depends only on the number of samples.
 
-    >>> len(Cut(1000)), len(Cut(10_000)), len(Cut(1_000_000)), len(Cut(0))
+    >>> len(Chunking(1000)), len(Chunking(10_000)), len(Chunking(1_000_000)), len(Chunking(0))
     (8, 10, 1000, 1)
     """
 
@@ -151,24 +151,24 @@ class Cut:
 
     @property
     def _draws(self) -> int:
-        return min(_MAX_DRAWS, max(1, -(-self.samples // DRAWN) // _MIN_CHUNKS))
+        return min(_MAX_DRAWS, max(1, -(-self.samples // DRAW_SIZE) // _MIN_CHUNKS))
 
     def __len__(self) -> int:
         """Number of chunks of a robot: at least one, because the special configurations need a chunk."""
-        return max(1, -(-self.samples // (self._draws * DRAWN)))
+        return max(1, -(-self.samples // (self._draws * DRAW_SIZE)))
 
-    def chunk(self, subject: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
+    def chunk(self, robot_input: RobotInput, seed: int, index: int, most: int | None = None) -> Chunk:
         first = index * self._draws
-        samples = min(self._draws * DRAWN, self.samples - first * DRAWN)
-        return Chunk(subject, seed, index, first, samples, most)
+        samples = min(self._draws * DRAW_SIZE, self.samples - first * DRAW_SIZE)
+        return Chunk(robot_input, seed, index, first, samples, most)
 
     def configurations(self, chunks: range) -> int:
         """Return the number of samples in a range of chunks, including the special configurations."""
         if not chunks:
             return 0
-        size = self._draws * DRAWN
+        size = self._draws * DRAW_SIZE
         random = min(self.samples, chunks.stop * size) - chunks.start * size
-        return random + (SPECIAL if chunks.start == 0 else 0)
+        return random + (SPECIAL_SAMPLES if chunks.start == 0 else 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,7 @@ class SecondOracleModel:
     def cross_check(
         self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
     ) -> CrossCheck:
-        second = block.timings.timed("second", row.ask, self.oracle, block.query(row, reference))
+        second = block.timings.time_call("second", row.ask, self.oracle, block.query(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
@@ -246,7 +246,7 @@ class _Block(_ComparisonBatch):
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.timings.timed("urdfkin", row.ours, self.plan, inputs, reference)
+                ours = self.timings.time_call("urdfkin", row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
                 yield self._compare(row, reference, ours, bound, second)
                 for joint in joints:
@@ -272,7 +272,7 @@ class _Block(_ComparisonBatch):
         second: SecondOracleModel | None,
     ) -> tuple[Key, Tally]:
         names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.timings.timed("pinocchio", row.ask, self.oracle, self.query(row, reference))
+        theirs = self.timings.time_call("pinocchio", row.ask, self.oracle, self.query(row, reference))
         found = self.tally(ours, theirs, bound, names)
         if second is not None:
             found = replace(found, cross_check=second.cross_check(self, row, reference, ours, theirs))
@@ -289,9 +289,9 @@ class _Screws(_ComparisonBatch):
         robot, x = self.robot, self.x
         tree = without_mimic_rules(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.timings.timed("pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))).swapaxes(
-            1, 2
-        )
+        theirs = self.timings.time_call(
+            "pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))
+        ).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
         column = 0
         for block in memory.blocks(len(moving), memory.frame_bytes(len(x.q), tree.nv)):
@@ -305,7 +305,7 @@ class _Screws(_ComparisonBatch):
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
         size = magnitudes(plan, q, *still, STILL_STATE)
-        J = self.timings.timed("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
+        J = self.timings.time_call("urdfkin", SCREWS.ours, plan, (q,), Reference.WORLD)
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
@@ -333,18 +333,18 @@ _cache: dict[RobotInput, _Models] = {}
 
 
 def _load(chunk: Chunk) -> _Models:
-    if (found := _cache.get(chunk.subject)) is not None:
-        return found
+    if (models := _cache.get(chunk.robot_input)) is not None:
+        return models
     _cache.clear()
-    robot = chunk.subject.load()
+    robot = chunk.robot_input.load()
     most = memory.limit() if chunk.memory is None else chunk.memory
-    memory.check(robot.tree, chunk.samples + SPECIAL, most)  # The first chunk is the largest.
+    memory.check(robot.tree, chunk.samples + SPECIAL_SAMPLES, most)  # The first chunk is the largest.
     second = None
     if (by := robot.verifier.library) is not PINOCCHIO:
         second = SecondOracleModel(by, robot.verifier.oracle(by=by))
-    found = robot, robot.verifier.oracle(), second
-    _cache[chunk.subject] = found
-    return found
+    models = robot, robot.verifier.oracle(), second
+    _cache[chunk.robot_input] = models
+    return models
 
 
 def run_chunk(chunk: Chunk) -> ChunkResult:
