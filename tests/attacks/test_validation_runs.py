@@ -152,7 +152,7 @@ def test_a_disagreement_takes_precedence_over_an_error(monkeypatch: pytest.Monke
         if chunk.index == 1:
             raise MemoryError
         result = run_chunk(chunk)
-        return replace(result, tallies={k: replace(t, failed=1) for k, t in result.tallies.items()})
+        return replace(result, error_stats={k: replace(t, failed=1) for k, t in result.error_stats.items()})
 
     monkeypatch.setattr(answer, "run_chunk", failing)
     report = validate("planar_two_link", samples=50)

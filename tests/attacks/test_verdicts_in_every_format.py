@@ -40,7 +40,7 @@ def _tables_without_numbers(monkeypatch: pytest.MonkeyPatch) -> Document:
     right = robot_summary.chains_of
 
     def without(*args: Any) -> tuple[Any, ...]:
-        return tuple(chain | {"share_of_bound": None, "worst": None} for chain in right(*args))
+        return tuple(chain | {"bound_ratio": None, "worst": None} for chain in right(*args))
 
     monkeypatch.setattr(robot_summary, "chains_of", without)
     return _document("ur5")

@@ -41,7 +41,7 @@ def test_the_history_of_a_robot_has_a_point_for_each_run_with_the_robot(month: P
         "panda": "✓✓✓✓✗✓✓✓", "ur5": "✓✓✓✓✓✓✓✓", "broken.urdf": "····✗···",
     }  # fmt: skip
     point = found.robots["panda"][4]
-    assert (point["verdict"], point["failed"], point["worst"], point["share_of_bound"]) == (
+    assert (point["verdict"], point["failed"], point["worst"], point["bound_ratio"]) == (
         "disagrees", 3, None, None,
     )  # fmt: skip
     assert [point["warnings"] for point in found.robots["panda"]] == [0, 0, 28, 28, 0, 0, 0, 0]

@@ -192,9 +192,9 @@ def result() -> ChunkResult:
 
 def test_a_stored_answer_of_a_worker_is_read_back_exactly() -> None:
     found = result()
-    odd: Any = {"worst": float("inf"), "by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
-    tallies = {key: replace(tally, **odd) for key, tally in found.tallies.items()}
-    other = replace(found, tallies=tallies, summary=None)
+    odd: Any = {"worst": float("inf"), "worst_by_frame": (0.1 + 0.2, 5e-324, float("inf"))}
+    error_stats = {key: replace(stats, **odd) for key, stats in found.error_stats.items()}
+    other = replace(found, error_stats=error_stats, summary=None)
     for each in (found, other, Failure(ValidationVerdict.BAD_INPUT, "no \ud800")):
         again = decode_answer("k", encode_answer("k", each))
         assert json.dumps(_plain(again)) == json.dumps(_plain(each))
@@ -203,7 +203,7 @@ def test_a_stored_answer_of_a_worker_is_read_back_exactly() -> None:
 def _plain(found: Answer) -> Any:
     data = asdict(found)
     if isinstance(found, ChunkResult):
-        data["tallies"] = [(*key, asdict(tally)) for key, tally in found.tallies.items()]
+        data["error_stats"] = [(*key, asdict(stats)) for key, stats in found.error_stats.items()]
     return data
 
 
@@ -213,8 +213,8 @@ def _plain(found: Answer) -> Any:
         lambda body: body.pop("result"),
         lambda body: body["result"].update(samples="many"),
         lambda body: body["result"].update(timings=None),
-        lambda body: body["tallies"][0].pop(),
-        lambda body: body["tallies"][0][1].update(worst="small"),
+        lambda body: body["error_stats"][0].pop(),
+        lambda body: body["error_stats"][0][1].update(worst="small"),
         lambda body: body["result"]["summary"]["model"].pop("joints"),
         lambda body: body["result"]["summary"]["chains"][0].update(samples=-1),
         lambda body: body.update(failure={"verdict": "fine", "reason": "none"}),
@@ -288,7 +288,7 @@ MANIFESTS = {
 @pytest.mark.parametrize("content", MANIFESTS)
 def test_a_file_that_is_no_manifest_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_bytes(content)
-    for use in (stored, lambda store: validate("ur5", samples=0, store=store)):
+    for use in (read_stored_report, lambda store: validate("ur5", samples=0, store=store)):
         with pytest.raises(InputError, match=MANIFESTS[content]):
             use(tmp_path)
 
@@ -372,7 +372,7 @@ def test_samples_do_not_depend_on_the_size_of_the_chunks(
 def _peak(chunks_: int) -> int:
     """Return the peak memory while the chunks of a robot are collected, each pair in reverse order."""
     found, robot = result(), make_robot_input("planar_two_link")
-    found = replace(found, tallies=dict(list(found.tallies.items())[:2]))
+    found = replace(found, error_stats=dict(list(found.error_stats.items())[:2]))
     cut = Chunking(1000 * chunks_)
     assert len(cut) == chunks_
     collector = ResultCollector([robot], cut, [range(chunks_)])

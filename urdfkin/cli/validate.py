@@ -65,7 +65,7 @@ def study_all(
     try:
         with _open_results(store, settings, shard) as results:
             for i, robot in zip(here, report.robots, strict=True):
-                if not robot.tallies or parts[i].start > 0:
+                if not robot.error_stats or parts[i].start > 0:
                     continue
                 found = None if results is None else results.read(i)
                 if found is None or (retry and isinstance(found, FailedStudy)):

@@ -375,10 +375,10 @@ def _check(
     if grew or _grew(new["worst"], old["worst"], factor):
         yield change(lambda c: f"{units(c['worst'])} eps*scale", grew)
 
-    was, now = old["share_of_bound"], new["share_of_bound"]
+    was, now = old["bound_ratio"], new["bound_ratio"]
     grew = _grew(was, now, factor, _SHARE_FLOOR)
     if grew or _grew(now, was, factor, _SHARE_FLOOR):
-        yield change(lambda c: f"{percent(c['share_of_bound'])} of the bound", grew)
+        yield change(lambda c: f"{percent(c['bound_ratio'])} of the bound", grew)
 
 
 def _ends(check: ReportedCheck) -> str:

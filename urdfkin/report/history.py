@@ -53,7 +53,7 @@ class ValidationRun(TypedDict):
     robots: Annotated[Count, says("Number of robots.")]
     results: Annotated[Count, says("Number of compared results.")]
     failed: Annotated[Count, says("Number of results outside their bound.")]
-    share_of_bound: Units
+    bound_ratio: Units
     versions: Annotated[dict[str, str], says("Versions of urdfkin, its libraries and the oracles.")]
     changes: Annotated[
         list[ChangeEntry], says("Changes since the previous run, as `urdfkin report compare` lists them.")
@@ -72,7 +72,7 @@ class Point(TypedDict):
     results: Annotated[Count, says("Number of compared results.")]
     failed: Annotated[Count, says("Number of results outside their bound.")]
     worst: Units
-    share_of_bound: Annotated[
+    bound_ratio: Annotated[
         float | None,
         says("The largest ratio of a disagreement to its bound; null if a disagreement is not finite."),
     ]
@@ -260,7 +260,7 @@ def _run(file: str, document: Document, before: Document | None) -> ValidationRu
         "robots": len(robots),
         "results": sum(robot["results"] for robot in robots),
         "failed": sum(robot["failed"] for robot in robots),
-        "share_of_bound": worst(map(share_of, robots)),
+        "bound_ratio": worst(map(share_of, robots)),
         "versions": document["versions"],
         "changes": cast("list[ChangeEntry]", plain(compare(before, document).changes)) if before else [],
     }
@@ -289,7 +289,7 @@ def _point(run: int, source: str, robot: ReportedRobot) -> Point:
         "results": robot["results"],
         "failed": robot["failed"],
         "worst": worst(check["worst"] for check in robot["checks"]),
-        "share_of_bound": share_of(robot),
+        "bound_ratio": share_of(robot),
         "errors": counts["error"],
         "warnings": counts["warning"],
         "notes": counts["note"],
@@ -388,7 +388,7 @@ def words_of(change: ChangeEntry) -> str:
 
 
 def _share(one: ValidationRun | Point) -> str:
-    return percent(one["share_of_bound"]) if one["results"] else ""
+    return percent(one["bound_ratio"]) if one["results"] else ""
 
 
 def _date(run: ValidationRun) -> str:

@@ -235,7 +235,7 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
                 "agrees": chain_disagreement(chain) is None,
                 "metres": f"{chain['metres'] or 0.0:.2g}",
                 "worst": units(chain["worst"]),
-                "share": percent(chain["share_of_bound"]),
+                "share": percent(chain["bound_ratio"]),
             }
             for chain in robot["chains"]
         ],

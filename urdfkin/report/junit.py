@@ -66,7 +66,7 @@ def _function_case(check: FunctionCheck) -> ET.Element:
     title = text.partition("\n")[0]
     name = f"{check.quantity} by {check.function}"
     case = ET.Element("testcase", {"name": _clean(name), "classname": f"urdfkin.{_clean(check.robot)}"})
-    if check.agrees and check.oracle_share is not None:
+    if check.agrees and check.oracle_bound_ratio is not None:
         ET.SubElement(case, "system-out").text = _clean(text)
     else:
         kind = "not verified" if check.agrees else "disagreement"
@@ -151,7 +151,7 @@ def _text(check: ReportedCheck, robot: ReportedRobot) -> str:
         f"outside their bound: {check['failed']:,}",
         f"disagreement in eps*scale: median {units(check['median'])}, 99th percentile {units(check['p99'])},"
         f" worst {units(check['worst'])}",
-        f"largest disagreement relative to its bound: {percent(check['share_of_bound'])}",
+        f"largest disagreement relative to its bound: {percent(check['bound_ratio'])}",
     ]
     if tightest is not None and widest is not None:
         lines.append(f"bounds: {tightest:.0f} to {widest:.0f} eps*scale")

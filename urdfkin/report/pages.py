@@ -191,7 +191,7 @@ def _share(check: ReportedCheck, subject: int) -> float:
     The document has no error bound for a single frame, joint or column. This function therefore divides the
     disagreement by the check's smallest error bound. The result never exceeds the check's largest ratio.
     """
-    value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["share_of_bound"]
+    value, tightest, most = check["worst_by_subject"][subject], check["bound"][0], check["bound_ratio"]
     # A disagreement of 0 lies within every bound.
     if not value:
         return math.inf if value is None else 0.0
@@ -254,10 +254,8 @@ def check_rows(robot: ReportedRobot) -> list[dict[str, Any]]:
             "median": units(check["median"]),
             "p99": units(check["p99"]),
             "worst": units(check["worst"]),
-            "share": percent(check["share_of_bound"]),
-            "width": 100.0
-            if check["share_of_bound"] is None
-            else min(100.0, 100.0 * check["share_of_bound"]),
+            "share": percent(check["bound_ratio"]),
+            "width": 100.0 if check["bound_ratio"] is None else min(100.0, 100.0 * check["bound_ratio"]),
             "case": check["worst_case"],
             "where": "" if check["worst_case"] is None else check["worst_case"]["frame"],
         }
@@ -268,7 +266,7 @@ def check_rows(robot: ReportedRobot) -> list[dict[str, Any]]:
 def failures(robot: ReportedRobot) -> list[dict[str, Any]]:
     failing = sorted(
         (check for check in robot["checks"] if check["failed"]),
-        key=lambda check: -_sortable(check["share_of_bound"]),
+        key=lambda check: -_sortable(check["bound_ratio"]),
     )
     rows = {(row["quantity"], row["reference"]): row for row in check_rows(robot)}
     return [rows[quantity_name(check["quantity"]), check["reference"] or ""] for check in failing]

@@ -178,7 +178,7 @@ def _robot(robot: ReportedRobot, document: Document) -> Iterator[str]:
         for contradiction in _check(check, own, robot, document):
             yield f"{check_name(check)}: {contradiction}"
     for chain in robot["chains"]:
-        figures = chain["metres"], chain["worst"], chain["share_of_bound"]
+        figures = chain["metres"], chain["worst"], chain["bound_ratio"]
         if not chain["samples"] and any(figure is not None for figure in figures):
             ends = f"{chain['base']} to {chain['tip']}"
             yield f"tables from {ends}: `samples` is 0, but the tables have disagreements"
@@ -252,15 +252,15 @@ def _check(
 
 
 def _share(check: ReportedCheck) -> Iterator[str]:
-    """Yield an error if `share_of_bound` contradicts the disagreements and bounds in the document.
+    """Yield an error if `bound_ratio` contradicts the disagreements and bounds in the document.
 
     The ratio must be at least `worst` divided by the largest bound. The ratio must be at most `worst` divided
     by the smallest bound.
     """
-    share, largest = _as_number(check["share_of_bound"]), _as_number(check["worst"])
+    share, largest = _as_number(check["bound_ratio"]), _as_number(check["worst"])
     low, high = _as_number(check["bound"][0]), _as_number(check["bound"][1])
     if (share > 1.0) != (check["failed"] > 0) or check["failed"] > check["results"]:
-        yield f"`failed` is {check['failed']} of {check['results']}, but `share_of_bound` is {share:g}"
+        yield f"`failed` is {check['failed']} of {check['results']}, but `bound_ratio` is {share:g}"
     if low > high:
         # Without a comparison, there is no bound.
         if share or largest or check["worst_case"]:
@@ -268,7 +268,7 @@ def _share(check: ReportedCheck) -> Iterator[str]:
         return
     ends = (largest / high if high else math.inf, largest / low if low else math.inf)
     if not (ends[0] * (1.0 - _TOLERANCE) <= share <= ends[1] * (1.0 + _TOLERANCE)):
-        yield f"`share_of_bound` is {share:g}, but `worst` is {largest:g} and `bound` is {low:g} to {high:g}"
+        yield f"`bound_ratio` is {share:g}, but `worst` is {largest:g} and `bound` is {low:g} to {high:g}"
 
 
 def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, samples: int) -> Iterator[str]:
@@ -290,7 +290,7 @@ def _case(check: ReportedCheck, subjects: list[str], robot: ReportedRobot, sampl
             f"`worst_case` has {case['disagreement']} at {case['frame']}, but the worst disagreement at"
             f" {case['frame']} is {of_frame}"
         )
-    share, units = _as_number(check["share_of_bound"]), _as_number(case["disagreement"])
+    share, units = _as_number(check["bound_ratio"]), _as_number(case["disagreement"])
     low, high = (share * (bound or 0.0) for bound in check["bound"])
     if math.isfinite(units) and not low * (1 - _TOLERANCE) <= units <= high * (1 + _TOLERANCE):
         yield f"`worst_case`: the disagreement {units:g} is not {share:g} times a bound"

@@ -117,7 +117,7 @@ def _print_quantities(robots: Sequence[ReportedRobot], out: Console) -> None:
             if any(check["worst"] == largest for check in of_quantity(robot, name))
         )
         results = f"{sum(check['results'] for check in checks):,}"
-        share = percent(worst(check["share_of_bound"] for check in checks))
+        share = percent(worst(check["bound_ratio"] for check in checks))
         rows.append([quantity_name(name), results, units(largest), share, where])
     print_table(out, Table(["quantity", "results", "worst", "of bound", "robot"], rows, left=(0, 4)))
 
@@ -138,7 +138,7 @@ def _print_checks(robot: ReportedRobot, out: Console) -> None:
             units(check["median"]),
             units(check["p99"]),
             units(check["worst"]),
-            percent(check["share_of_bound"]),
+            percent(check["bound_ratio"]),
         ]
         for check in in_order(robot)
     ]
@@ -189,6 +189,6 @@ def _print_robot(robot: ReportedRobot, out: Console, *, cases: bool) -> None:
         out.print(
             f"{robot['source']}, {check_name(check)}: {check['failed']:,} of {check['results']:,} outside"
             f" the bound, worst {units(check['worst'])} eps*scale,"
-            f" {percent(check['share_of_bound'])} of the bound"
+            f" {percent(check['bound_ratio'])} of the bound"
         )
         out.print(f"  {case['replay']}", soft_wrap=True)

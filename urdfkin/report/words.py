@@ -175,15 +175,15 @@ def second_oracle_cells(checks: Sequence[ReportedCheck], title: str) -> list[str
     }
     return [
         f"{sum(check['results'] for check in checks):,}",
-        percent(worst(check["share_of_bound"] for check in checks)),
-        percent(worst(one["urdfkin"]["share_of_bound"] for one in found)),
-        percent(worst(one["pinocchio"]["share_of_bound"] for one in found)),
+        percent(worst(check["bound_ratio"] for check in checks)),
+        percent(worst(one["urdfkin"]["bound_ratio"] for one in found)),
+        percent(worst(one["pinocchio"]["bound_ratio"] for one in found)),
         ", ".join(f"{who} ({count:,})" for who, count in outliers.items() if count) or "none",
     ]
 
 
 def share_of(robot: ReportedRobot) -> Units:
-    return worst(check["share_of_bound"] for check in robot["checks"])
+    return worst(check["bound_ratio"] for check in robot["checks"])
 
 
 def summary(document: Document) -> str:

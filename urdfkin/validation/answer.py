@@ -22,7 +22,7 @@ from urdfkin.system.documents import as_data, typed
 from urdfkin.urdf.lint import UrdfError
 from urdfkin.validation.chunk import Chunk, ChunkResult, run_chunk
 from urdfkin.validation.document import ValidationVerdict
-from urdfkin.validation.error_stats import Key, Tally
+from urdfkin.validation.error_stats import ErrorStats, Key
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary, entries_of
 
@@ -110,8 +110,8 @@ class DamagedError(Exception):
 def encode_answer(key: str, answer: Answer) -> bytes:
     if isinstance(answer, Failure):
         return pack(key, {"failure": answer})
-    rows = list(answer.tallies.items())  # Keys of JSON objects must be strings.
-    return pack(key, {"tallies": rows, "result": replace(answer, tallies={})})
+    rows = list(answer.error_stats.items())  # Keys of JSON objects must be strings.
+    return pack(key, {"error_stats": rows, "result": replace(answer, error_stats={})})
 
 
 def decode_answer(key: str, content: bytes) -> Answer:
@@ -119,8 +119,8 @@ def decode_answer(key: str, content: bytes) -> Answer:
     try:
         if "failure" in body:
             return typed(body["failure"], Failure)
-        tallies = dict(typed(body["tallies"], list[tuple[Key, Tally]]))
-        return replace(typed(body["result"], ChunkResult), tallies=tallies)
+        error_stats = dict(typed(body["error_stats"], list[tuple[Key, ErrorStats]]))
+        return replace(typed(body["result"], ChunkResult), error_stats=error_stats)
     except (ValueError, KeyError) as error:
         raise DamagedError(f"not a chunk of urdfkin ({error})") from error
 

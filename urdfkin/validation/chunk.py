@@ -26,7 +26,14 @@ from urdfkin.model.reference import Reference
 from urdfkin.model.tree import FloatArray, JointFrame, KinematicTree, without_mimic_rules
 from urdfkin.robot import Robot
 from urdfkin.validation import memory
-from urdfkin.validation.error_stats import CrossCheck, Inputs, Key, Tally, cross_check, tally
+from urdfkin.validation.error_stats import (
+    CrossCheck,
+    ErrorStats,
+    Inputs,
+    Key,
+    compute_error_stats,
+    make_cross_check,
+)
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import RobotSummary
 from urdfkin.verify.bounds import Bound, magnitudes
@@ -120,7 +127,7 @@ class ChunkResult:
     name: str
     joints: tuple[str, ...]
     frames: tuple[str, ...]
-    tallies: dict[Key, Tally]
+    error_stats: dict[Key, ErrorStats]
     samples: int
     seconds: float
     timings: Timings
@@ -131,7 +138,7 @@ class ChunkResult:
             name=self.name,
             joints=self.joints,
             frames=self.frames,
-            tallies={key: tally + other.tallies[key] for key, tally in self.tallies.items()},
+            error_stats={key: stats + other.error_stats[key] for key, stats in self.error_stats.items()},
             samples=self.samples + other.samples,
             seconds=self.seconds + other.seconds,
             timings=self.timings + other.timings,
@@ -177,32 +184,37 @@ class SecondOracleModel:
     oracle: Oracle
 
     def cross_check(
-        self, block: _Block, row: Quantity, reference: Reference | None, ours: FloatArray, theirs: FloatArray
+        self,
+        block: _Block,
+        row: Quantity,
+        reference: Reference | None,
+        results: FloatArray,
+        oracle_results: FloatArray,
     ) -> CrossCheck:
         second = block.timings.time_call("second", row.ask, self.oracle, block.query(row, reference))
         bounds = (
             row.bound(block.plan, size, reference) for size in (block.size, self.library.size(block.size))
         )
         if row.of == "joints":
-            bounds = (block.joint_part(one) for one in bounds)
-        return cross_check(self.library.name, ours, theirs, second, *bounds)
+            bounds = (block.joint_bound(one) for one in bounds)
+        return make_cross_check(self.library.name, results, oracle_results, second, *bounds)
 
 
-def tallies(
+def compare_frames(
     robot: Robot,
     oracle: Oracle,
     x: Samples,
     first_sample: int,
     timings: Timings,
     second: SecondOracleModel | None = None,
-) -> dict[Key, Tally]:
+) -> dict[Key, ErrorStats]:
     """Return the error statistics of each quantity of a robot in each reference frame."""
-    found: dict[Key, Tally] = {}
+    found: dict[Key, ErrorStats] = {}
     work = robot, oracle, x, first_sample, timings
     for frames in memory.blocks(len(robot.all_frames), memory.frame_bytes(len(x.q), robot.nv)):
-        for key, part in _Block(*work, frames).tallies(second):
-            found[key] = found[key].beside(part) if key in found else part
-    screws = reduce(Tally.beside, _Screws(*work).tallies())
+        for key, part in _Block(*work, frames).compare(second):
+            found[key] = found[key].join_frames(part) if key in found else part
+    screws = reduce(ErrorStats.join_frames, _Screws(*work).compare())
     return found | {(SCREWS.name, Reference.WORLD.name.lower()): screws}
 
 
@@ -211,8 +223,10 @@ class _ComparisonBatch:
         self.robot, self.oracle, self.x, self.first, self.timings = robot, oracle, x, first_sample, timings
         self.inputs: list[Inputs] = list(zip(x.q.tolist(), x.v.tolist(), x.a.tolist(), strict=True))
 
-    def tally(self, ours: FloatArray, theirs: FloatArray, bound: Bound, names: tuple[str, ...]) -> Tally:
-        return tally(ours, theirs, bound, names, self.first, self.inputs)
+    def _compute_stats(
+        self, results: FloatArray, oracle_results: FloatArray, bound: Bound, names: tuple[str, ...]
+    ) -> ErrorStats:
+        return compute_error_stats(results, oracle_results, bound, names, self.first, self.inputs)
 
 
 class _Block(_ComparisonBatch):
@@ -236,7 +250,7 @@ class _Block(_ComparisonBatch):
         self.joint_rows = [link - frames.start for link in moving[joints]]
         self.joint_names = robot.joint_names[joints]
 
-    def tallies(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, Tally]]:
+    def compare(self, second: SecondOracleModel | None) -> Iterator[tuple[Key, ErrorStats]]:
         """Yield error statistics for the frames and the joints of the block.
 
         For a joint, urdfkin's result is the result for the joint's child link. Pinocchio computes the joint
@@ -246,14 +260,14 @@ class _Block(_ComparisonBatch):
         for row in validated():
             joints = [joint for joint in validated("joints") if joint.compute is row.compute]
             for reference in row.references:
-                ours = self.timings.time_call("urdfkin", row.ours, self.plan, inputs, reference)
+                results = self.timings.time_call("urdfkin", row.ours, self.plan, inputs, reference)
                 bound = row.bound(self.plan, self.size, reference)
-                yield self._compare(row, reference, ours, bound, second)
+                yield self._compare(row, reference, results, bound, second)
                 for joint in joints:
-                    own, joint_bound = ours[:, self.joint_rows], self.joint_part(bound)
+                    own, joint_bound = results[:, self.joint_rows], self.joint_bound(bound)
                     yield self._compare(joint, reference, own, joint_bound, second)
 
-    def joint_part(self, bound: Bound) -> Bound:
+    def joint_bound(self, bound: Bound) -> Bound:
         return Bound(bound.scale[:, self.joint_rows], bound.k[:, self.joint_rows])
 
     def query(self, row: Quantity, reference: Reference | None) -> QueryBatch:
@@ -267,15 +281,17 @@ class _Block(_ComparisonBatch):
         self,
         row: Quantity,
         reference: Reference | None,
-        ours: FloatArray,
+        results: FloatArray,
         bound: Bound,
         second: SecondOracleModel | None,
-    ) -> tuple[Key, Tally]:
+    ) -> tuple[Key, ErrorStats]:
         names = self.joint_names if row.of == "joints" else self.frames
-        theirs = self.timings.time_call("pinocchio", row.ask, self.oracle, self.query(row, reference))
-        found = self.tally(ours, theirs, bound, names)
+        oracle_results = self.timings.time_call("pinocchio", row.ask, self.oracle, self.query(row, reference))
+        found = self._compute_stats(results, oracle_results, bound, names)
         if second is not None:
-            found = replace(found, cross_check=second.cross_check(self, row, reference, ours, theirs))
+            found = replace(
+                found, cross_check=second.cross_check(self, row, reference, results, oracle_results)
+            )
         return (row.name, reference.name.lower() if reference is not None else ""), found
 
 
@@ -285,11 +301,11 @@ class _Screws(_ComparisonBatch):
     Each column of `data.J` equals a column of one joint's Jacobian in the reference frame WORLD.
     """
 
-    def tallies(self) -> Iterator[Tally]:
+    def compare(self) -> Iterator[ErrorStats]:
         robot, x = self.robot, self.x
         tree = without_mimic_rules(robot.tree)
         q_free = _expand_mimic(robot.tree, tree, x.q)
-        theirs = self.timings.time_call(
+        oracle_results = self.timings.time_call(
             "pinocchio", SCREWS.ask, self.oracle, QueryBatch((), (x.q,))
         ).swapaxes(1, 2)
         moving = [i for i, joint in enumerate(tree.joints) if joint.kind.nv]
@@ -297,10 +313,12 @@ class _Screws(_ComparisonBatch):
         for block in memory.blocks(len(moving), memory.frame_bytes(len(x.q), tree.nv)):
             joints = moving[block]
             width = sum(tree.joints[i].kind.nv for i in joints)
-            yield self._block(tree, q_free, joints, theirs[:, column : column + width])
+            yield self._compare_block(tree, q_free, joints, oracle_results[:, column : column + width])
             column += width
 
-    def _block(self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], theirs: FloatArray) -> Tally:
+    def _compare_block(
+        self, tree: KinematicTree, q: FloatArray, joints: Sequence[int], oracle_results: FloatArray
+    ) -> ErrorStats:
         links = [i + 1 for i in joints]
         plan = compile_tree(tree, links)
         still = (np.zeros((len(q), tree.nv)),) * 2
@@ -309,10 +327,10 @@ class _Screws(_ComparisonBatch):
         bound = SCREWS.bound(plan, size, Reference.WORLD)
         own = [(f, tree.v_index[i] + c) for f, i in enumerate(joints) for c in range(tree.joints[i].kind.nv)]
         frame, column = np.array(own, dtype=np.int64).reshape(-1, 2).T
-        ours = J[:, frame, :, column].swapaxes(0, 1)
+        results = J[:, frame, :, column].swapaxes(0, 1)
         scale = bound.scale[:, frame, :, column].swapaxes(0, 1)
         names = tuple(tree.joints[joints[f]].name for f, _ in own)
-        return self.tally(ours, theirs, Bound(scale, bound.k[:, frame, 0]), names)
+        return self._compute_stats(results, oracle_results, Bound(scale, bound.k[:, frame, 0]), names)
 
 
 def _expand_mimic(tree: KinematicTree, free: KinematicTree, q: FloatArray) -> FloatArray:
@@ -352,14 +370,14 @@ def run_chunk(chunk: Chunk) -> ChunkResult:
     robot, oracle, second = _load(chunk)
     summary = RobotSummary.of(robot, oracle) if chunk.index == 0 else None
     timings.read = time.perf_counter() - begin
-    found = tallies(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
+    found = compare_frames(robot, oracle, chunk.draw(robot.tree), chunk.first_sample, timings, second)
     seconds = time.perf_counter() - begin
     timings.close(seconds)
     return ChunkResult(
         name=robot.name,
         joints=robot.joint_names,
         frames=robot.all_frames,
-        tallies=found,
+        error_stats=found,
         samples=chunk.configurations,
         seconds=seconds,
         timings=timings,

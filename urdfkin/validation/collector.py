@@ -15,7 +15,7 @@ from urdfkin.validation.answer import Answer, Failure
 from urdfkin.validation.chunk import Chunking, ChunkResult
 from urdfkin.validation.document import ValidationVerdict
 from urdfkin.validation.engines import Task
-from urdfkin.validation.error_stats import Key, Tally, plus
+from urdfkin.validation.error_stats import ErrorStats, Key, add_cross_checks
 from urdfkin.validation.results import RobotReport
 from urdfkin.validation.robot_input import RobotInput
 from urdfkin.validation.robot_summary import EMPTY_SUMMARY, RobotSummary
@@ -121,7 +121,7 @@ class _RobotAnswers:
         if isinstance(answer, Failure):
             self.failures[index] = answer
         else:
-            self._has_disagreed = self._has_disagreed or any(_outside(answer.tallies))
+            self._has_disagreed = self._has_disagreed or any(_outside(answer.error_stats))
             self._add_result(range(index, index + 1), answer)
 
     def _add_result(self, chunks: range, result: ChunkResult) -> None:
@@ -159,12 +159,12 @@ class _RobotAnswers:
         failure = self.failures.get(last)
         results = [each for run, each in self._sums if run.start < last]
         result = reduce(add, results) if results else None
-        tallies = result.tallies if result else {}
+        error_stats = result.error_stats if result else {}
         summary = (result.summary if result else None) or EMPTY_SUMMARY
         if failure is not None and summary is EMPTY_SUMMARY:
             summary = failure.summary
         samples = result.samples if result else 0
-        verdict, reasons = _verdict(tallies, summary, failure, samples, requested_samples)
+        verdict, reasons = _verdict(error_stats, summary, failure, samples, requested_samples)
         name = result.name if result else summary.model["name"] if summary.model else robot_input.label
         return RobotReport(
             origin=robot_input.origin,
@@ -173,7 +173,7 @@ class _RobotAnswers:
             reason="; ".join(reasons) or None,
             joints=result.joints if result else (),
             frames=result.frames if result else (),
-            tallies=tallies,
+            error_stats=error_stats,
             samples=samples,
             seconds=result.seconds if result else 0.0,
             summary=summary,
@@ -183,31 +183,31 @@ class _RobotAnswers:
 
 
 def _verdict(
-    tallies: dict[Key, Tally],
+    error_stats: dict[Key, ErrorStats],
     summary: RobotSummary,
     failure: Failure | None,
     samples: int,
     requested_samples: int,
 ) -> tuple[ValidationVerdict, list[str]]:
     """Return the verdict on a robot and its reasons; a disagreement takes precedence."""
-    disagreements = [*_outside(tallies), *summary.disagreements]
+    disagreements = [*_outside(error_stats), *summary.disagreements]
     verdict, reasons = ValidationVerdict.VERIFIED, list[str]()
     if failure is not None:
         verdict, reasons = failure.verdict, [failure.reason]
     elif samples < requested_samples:
         verdict = ValidationVerdict.NOT_VERIFIED
         reasons = [f"interrupted: {samples:,} of {requested_samples:,} samples were compared"]
-    elif not any(tally.results for tally in tallies.values()):
+    elif not any(stats.results for stats in error_stats.values()):
         verdict, reasons = ValidationVerdict.NOT_VERIFIED, ["nothing was compared"]
     return (ValidationVerdict.DISAGREES if disagreements else verdict), disagreements + reasons
 
 
-def _outside(tallies: dict[Key, Tally]) -> Iterator[str]:
-    failed = sum(tally.failed for tally in tallies.values())
+def _outside(error_stats: dict[Key, ErrorStats]) -> Iterator[str]:
+    failed = sum(stats.failed for stats in error_stats.values())
     if failed:
-        results = sum(tally.results for tally in tallies.values())
+        results = sum(stats.results for stats in error_stats.values())
         yield f"{failed:,} of {results:,} results lie outside their bound"
-    found = reduce(plus, (tally.cross_check for tally in tallies.values()), None)
+    found = reduce(add_cross_checks, (stats.cross_check for stats in error_stats.values()), None)
     if found is not None and found.urdfkin.failed:
         ours, theirs, second_oracle = found.alone
         title = ORACLES[found.by].title

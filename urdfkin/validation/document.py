@@ -182,7 +182,7 @@ class Chain(TypedDict):
             " entry covers both tables. null: a result is NaN, or there is no comparison."
         ),
     ]
-    share_of_bound: Annotated[
+    bound_ratio: Annotated[
         float | None,
         says(
             "Largest ratio of a disagreement to its bound. null: a result is NaN, or there is no comparison."
@@ -242,7 +242,7 @@ class ReportedOraclePair(TypedDict):
 
     failed: Annotated[Count, says("Number of results with a disagreement above the bound.")]
     worst: Units
-    share_of_bound: BoundRatio
+    bound_ratio: BoundRatio
 
 
 class Alone(TypedDict):
@@ -281,7 +281,7 @@ class ReportedCheck(TypedDict):
     median: Units
     p99: Units
     worst: Units
-    share_of_bound: BoundRatio
+    bound_ratio: BoundRatio
     bound: Annotated[
         Annotated[list[float | None], of_length(2)],
         says("Smallest and largest bound of the results, in eps * scale; null: nothing was compared."),
