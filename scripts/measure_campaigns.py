@@ -92,8 +92,8 @@ def measure_chunk() -> None:
     print(f"a chunk of {chunk.configurations} samples: {cost(lambda _: run_chunk(chunk), 3):.0f} ms")
     manifest = Manifest.of([robot], cut.samples, 0, "now")
     with tempfile.TemporaryDirectory() as folder, open_store(Path(folder) / "s", manifest, print) as kept:
-        print(f"time to store it: {cost(lambda i: kept.keep(0, i, found)):.2f} ms")
-        print(f"time to read it: {cost(lambda i: kept.answer(0, i)):.2f} ms")
+        print(f"time to store it: {cost(lambda i: kept.write_answer(0, i, found)):.2f} ms")
+        print(f"time to read it: {cost(lambda i: kept.read_answer(0, i)):.2f} ms")
     print(f"time to add two: {cost(lambda _: found + found):.2f} ms")
 
 

@@ -169,7 +169,7 @@ def test_an_error_of_the_engine_is_the_result_of_each_unfinished_robot(
 ) -> None:
     right = SerialEngine.run
 
-    def breaks(self: SerialEngine, work: engines.Work, enter: engines.Enter) -> None:
+    def breaks(self: SerialEngine, work: engines.Work, enter: engines.AnswerCallback) -> None:
         right(self, list(work)[:1], enter)
         raise OSError("no more of anything")
 

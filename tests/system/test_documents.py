@@ -17,8 +17,8 @@ from tests.report.documents import arms, failing, hostile, run_on, saved
 from urdfkin.comparison.certificate import SAME, certificate
 from urdfkin.errors import InputError, SourceError
 from urdfkin.report.compare import COMPARISON, compare
-from urdfkin.report.history import HISTORY, history
-from urdfkin.report.reading import checked, read_document
+from urdfkin.report.history import HISTORY, read_history
+from urdfkin.report.reading import check_document, read_document
 from urdfkin.system.documents import DocumentKind, Header, as_data, plain
 from urdfkin.validation.accuracy import accuracy_study
 from urdfkin.validation.campaign import validate
@@ -46,7 +46,7 @@ def _made(name: str) -> str:
         with TemporaryDirectory() as folder:
             for day in (1, 2):
                 saved(Path(folder) / f"{day}.json", run_on(day, arms()))
-            return json.dumps(history([Path(folder)]).as_dict("urdfkin report history"))
+            return json.dumps(read_history([Path(folder)]).as_dict("urdfkin report history"))
     return json.dumps(arms())
 
 
@@ -103,7 +103,7 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
     layout: DocumentKind[Any], entry: str, value: object, said: str
 ) -> None:
     with pytest.raises(InputError) as error:
-        layout.checked(made(layout) | {entry: value}, "a.json")
+        layout.check_document(made(layout) | {entry: value}, "a.json")
     assert str(error.value).startswith(f"a.json: does not conform to the layout {layout.name}: found $")
     assert said in str(error.value)
     assert error.value.remedy == f"write it again with: {layout.made_by}"
@@ -115,24 +115,24 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
 def test_a_wrong_document_type_and_an_unknown_version_are_different_errors(layout: DocumentKind[Any]) -> None:
     family, _, version = layout.name.rpartition("/")
     with pytest.raises(InputError, match=f"unknown version of the layout {family}.*reads version {version}:"):
-        layout.checked({"schema": f"{family}/99"}, "a.json")
+        layout.check_document({"schema": f"{family}/99"}, "a.json")
     others: list[Any] = [None, [], "text", {}, {"schema": None}, {"schema": "other/1"}, {"schema": {"a": 1}}]
     for data in others:
         with pytest.raises(InputError, match=f"not a file with the layout {layout.name}.*write one with: "):
-            layout.checked(data, "a.json")
+            layout.check_document(data, "a.json")
 
 
 @pytest.mark.parametrize("layout", [COMPARISON, HISTORY, SAME, CERTIFICATE], ids=attrgetter("name"))
 def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: DocumentKind[Any]) -> None:
     with pytest.raises(InputError, match=r"found \$: unknown entry 'more'"):
-        layout.checked(made(layout) | {"more": 1}, "a.json")
+        layout.check_document(made(layout) | {"more": 1}, "a.json")
 
 
 def test_an_unknown_entry_at_any_depth_is_refused() -> None:
     document = made(SAME)
     document["remarks"][1]["words"] = "a sentence"
     with pytest.raises(InputError, match=r"found \$\.remarks\[1\]: unknown entry 'words'"):
-        SAME.checked(document, "a.json")
+        SAME.check_document(document, "a.json")
     assert not Draft202012Validator(SAME.schema()).is_valid(document)
 
 
@@ -213,13 +213,13 @@ def test_a_document_with_a_wrong_entry_is_refused(spoil: Any) -> None:
     document = cast("dict[str, Any]", arms())
     spoil(document)
     with pytest.raises(InputError, match=r"does not conform to the layout urdfkin-validation/1: found \$"):
-        checked(document, "results.json")
+        check_document(document, "results.json")
 
 
 def test_a_file_is_read_back_unchanged_and_unknown_entries_are_ignored(tmp_path: Path) -> None:
     document: Any = arms()
     document["robots"][0]["checks"][0]["later"] = document["later"] = {"a": 1}
-    assert checked(document, "results.json") == arms()
+    assert check_document(document, "results.json") == arms()
     with pytest.raises(SourceError, match="cannot be read"):
         read_document(tmp_path / "results.json")
     assert read_document(saved(tmp_path / "results.json", hostile())) == hostile()

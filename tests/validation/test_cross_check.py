@@ -14,7 +14,7 @@ from urdfkin.model.tree import FloatArray
 from urdfkin.report.html import as_html
 from urdfkin.report.junit import as_junit
 from urdfkin.report.markdown import as_markdown
-from urdfkin.report.reading import checked, contradictions
+from urdfkin.report.reading import check_document, contradictions
 from urdfkin.validation import chunk
 from urdfkin.validation.campaign import validate
 from urdfkin.validation.document import Document
@@ -99,7 +99,7 @@ def test_a_sum_of_cross_checks_has_the_largest_disagreement() -> None:
 
 def document_of(**changes: Any) -> Document:
     report = validate(arm(), samples=3, oracle="mujoco", **changes)
-    return checked(report.as_dict(), "the report")
+    return check_document(report.as_dict(), "the report")
 
 
 def test_each_pair_of_libraries_has_its_own_bound(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -202,12 +202,12 @@ def _missing_chunks(store: Store, counts: dict[int, tuple[int, bool]]) -> int:
 
 
 def _print_accuracy_progress(store: Store, counts: dict[int, tuple[int, bool]]) -> None:
-    from urdfkin.report.words import counted
+    from urdfkin.report.words import format_count
     from urdfkin.validation.store import AccuracyStore
 
     robots = [robot for robot, (_, has_failed) in counts.items() if not has_failed]
     if (results := AccuracyStore.open(store)) is not None:
-        say(f"accuracy study: {sum(map(results.has, robots)):,} of {counted(len(robots), 'robot')} done")
+        say(f"accuracy study: {sum(map(results.has, robots)):,} of {format_count(len(robots), 'robot')} done")
 
 
 def _reason(store: Store, robot: int) -> str:

@@ -293,14 +293,14 @@ def _load_usd(source: Robot | str, how: dict[str, Any], usd: dict[str, Any]) -> 
 
 
 def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None:
-    from urdfkin.report.words import counted
+    from urdfkin.report.words import format_count
 
     for robot in report.robots:
         if robot.reason is not None:
             say(f"{robot.source}: {robot.verdict}: {robot.reason}")
     results = sum(robot.results for robot in report.robots)
     say(
-        f"shard {shard} of {store}: {counted(len(report.robots), 'robot')}, {results:,} results compared, "
-        f"{sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
+        f"shard {shard} of {store}: {format_count(len(report.robots), 'robot')}, {results:,} results"
+        f" compared, {sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
     )
     say("next: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")

@@ -12,7 +12,7 @@ from urdfkin.comparison.result import angle, length
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.kinematics.rotation import rpy_of
 from urdfkin.model.tree import FloatArray
-from urdfkin.report.words import counted
+from urdfkin.report.words import format_count
 from urdfkin.system.documents import plain
 
 #: Residuals below this fraction of the noise are only rounding errors.
@@ -22,7 +22,7 @@ _ROUNDING = 0.5
 def document(calibration: Calibration) -> TextDocument:
     model, identification = calibration.model, calibration.identification
     full_fit, written_fit = calibration.full_fit, calibration.written_fit
-    poses = f", {counted(len(full_fit.residuals), 'pose')}" if full_fit is not None else ""
+    poses = f", {format_count(len(full_fit.residuals), 'pose')}" if full_fit is not None else ""
     title = f"{calibration.robot.name}: {model.base} to {model.tip}{poses}"
     identifiable, fixed = identification.rank, len(identification.fixed_parameters)
     parts: list[str | Table] = [

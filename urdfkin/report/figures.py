@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urdfkin.report.words import of_quantity, quantities, quantity_name, units, worst
+from urdfkin.report.words import (
+    checks_of_quantity,
+    format_units,
+    quantities,
+    quantity_name,
+    worst,
+    worst_cell,
+)
 from urdfkin.validation.document import Chain, ReportedCheck, ReportedDHTable, ReportedModel, ReportedRobot
 from urdfkin.view.figure import FIRST, GRID, SECOND, TEXT, THIRD, inline_svg, label, new_figure, style
 
@@ -36,11 +43,10 @@ def distributions(robot: ReportedRobot, edges: Sequence[float], prefix: str) -> 
         axes = figure.add_subplot()
         right = _right(robot["checks"], edges)
         for row, name in enumerate(names):
-            _row(axes, len(names) - 1 - row, of_quantity(robot, name), np.asarray(edges), right)
+            _row(axes, len(names) - 1 - row, checks_of_quantity(robot, name), np.asarray(edges), right)
         _decorate(axes, names, right)
         descriptions = (
-            f"{quantity_name(name)}: worst {units(worst(c['worst'] for c in of_quantity(robot, name)))}"
-            for name in names
+            f"{quantity_name(name)}: worst {worst_cell(checks_of_quantity(robot, name))}" for name in names
         )
         return inline_svg(
             figure,
@@ -73,7 +79,7 @@ def _row(axes: Axes, base: int, checks: Sequence[ReportedCheck], edges: np.ndarr
     largest = worst(check["worst"] for check in checks)
     # A result beyond the range of the plot is drawn as a mark at the plot's right end.
     if largest is None or largest > right:
-        text = "✗ not finite" if largest is None else f"✗ {units(largest)} ▸"
+        text = "✗ not finite" if largest is None else f"✗ {format_units(largest)} ▸"
         place: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "center"}
         axes.annotate(text, (1.0, base + 0.13), fontsize=8, weight="bold", color=THIRD, zorder=6, **place)
     elif largest:

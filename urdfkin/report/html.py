@@ -24,19 +24,19 @@ from urdfkin.report.reading import moving_names
 from urdfkin.report.words import (
     VERDICTS,
     accuracy_words,
+    bound_ratio_of,
     check_name,
-    columns,
-    counted,
-    in_order,
-    percent,
-    pinocchio,
+    checks_in_order,
+    format_count,
+    format_ratio,
+    format_units,
+    pinocchio_version,
+    quantities_by_heading,
     second_oracle_cells,
     second_oracle_heads,
     second_oracle_title,
     second_reader_words,
-    share_of,
     summary,
-    units,
     verdict_counts,
     worst,
     worst_cell,
@@ -78,12 +78,12 @@ def environment() -> Environment:
         undefined=StrictUndefined,
     )
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
-    environment.filters["counted"] = counted
+    environment.filters["format_count"] = format_count
     environment.globals["install_remedy"] = install_remedy
     return environment
 
 
-def rendered(template: str, **values: Any) -> str:
+def render_template(template: str, **values: Any) -> str:
     return environment().get_template(template).render(style=as_is(asset("report.css")), **values)
 
 
@@ -139,14 +139,14 @@ def _details(robot: dict[str, Any], document: Document) -> str:
 
 
 def _page(document: Document, robots: list[dict[str, Any]], token: str = "", folder: str = "") -> str:
-    quantities = columns(document["robots"])
-    return rendered(
+    quantities = quantities_by_heading(document["robots"])
+    return render_template(
         "report.html.j2",
         document=document,
         outcome=outcome_of(document),
         summary=summary(document),
         when=when(document["started"]),
-        pinocchio=pinocchio(document),
+        pinocchio=pinocchio_version(document),
         compared=compared(),
         not_compared=not_compared(),
         totals=_totals(document),
@@ -181,7 +181,7 @@ def _totals(document: Document) -> dict[str, Any]:
         "results": sum(robot["results"] for robot in robots),
         "failed": sum(robot["failed"] for robot in robots),
         "worst": worst_cell(checks),
-        "share": percent(worst(map(share_of, robots))) if checks else "",
+        "share": format_ratio(worst(map(bound_ratio_of, robots))) if checks else "",
     }
 
 
@@ -196,9 +196,9 @@ def _model_verdict(document: Document) -> dict[str, Any]:
         for counts, bad in zip(found, unread, strict=True)
     ]
     worst_word = next((word for word in severities if word in worst_of_file), "")
-    affected, files = worst_of_file.count(worst_word), counted(len(found), "file")
+    affected, files = worst_of_file.count(worst_word), format_count(len(found), "file")
     total = sum(found, Counter[str]())
-    words = ", ".join(counted(total[word], word) for word in severities if total[word])
+    words = ", ".join(format_count(total[word], word) for word in severities if total[word])
     if not found:
         colour, title = "warn", "No model was read"
     elif any(unread):
@@ -234,8 +234,8 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
                 "tables": {kind: pages.chain_rows(chain, kind) for kind in ("standard", "modified")},
                 "agrees": chain_disagreement(chain) is None,
                 "metres": f"{chain['metres'] or 0.0:.2g}",
-                "worst": units(chain["worst"]),
-                "share": percent(chain["bound_ratio"]),
+                "worst": format_units(chain["worst"]),
+                "share": format_ratio(chain["bound_ratio"]),
             }
             for chain in robot["chains"]
         ],
@@ -247,7 +247,7 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
         "second_oracle_heads": second_oracle_heads(title) if title else [],
         "second_oracle_rows": [
             [check_name(check), *second_oracle_cells([check], title)]
-            for check in in_order(robot)
+            for check in checks_in_order(robot)
             if title and "second_oracle" in check
         ],
         "accuracy": pages.accuracy_rows(robot["accuracy"]) if robot["accuracy"] else [],
@@ -286,7 +286,7 @@ class NotebookView:
 
     def page(self) -> str:
         data: dict[str, Any] = {"source": self._name, "joints": moving_names(self._description), "chains": []}
-        return rendered(
+        return render_template(
             "cell.html.j2",
             data=data,
             robot={"index": 0, "scene": scene(self._description, []) | {"start": self._q}},
