@@ -97,7 +97,7 @@ def test_plots_pictures_and_tables_are_accessible() -> None:
 
 
 def test_a_page_without_matplotlib_states_that_plots_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(html_module, "installed", lambda: False)
+    monkeypatch.setattr(html_module, "has_matplotlib", lambda: False)
     text = as_html(arms())
     assert "pip install &#39;matplotlib&gt;=3.10.7&#39;" in text
     assert 'class="plot"' not in text

@@ -301,6 +301,7 @@ def _say_shard(report: ValidationReport, shard: str, store: Path | None) -> None
     results = sum(robot.results for robot in report.robots)
     say(
         f"shard {shard} of {store}: {format_count(len(report.robots), 'robot')}, {results:,} results"
-        f" compared, {sum(robot.failed for robot in report.robots):,} outside their bound, {report.seconds:.1f} s"
+        f" compared, {sum(robot.failed for robot in report.robots):,} outside their bound,"
+        f" {report.seconds:.1f} s"
     )
     say("next: run `urdfkin report merge DIR STORE...`, then `urdfkin report DIR`")

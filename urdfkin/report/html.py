@@ -45,7 +45,7 @@ from urdfkin.system.lazy_import import install_remedy
 from urdfkin.validation.document import Document, ReportedRobot, outcome_of
 from urdfkin.validation.robot_summary import chain_disagreement, describe
 from urdfkin.verify.quantities import compared, not_compared
-from urdfkin.view.figure import installed
+from urdfkin.view.figure import has_matplotlib
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -252,7 +252,7 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
         ],
         "accuracy": pages.accuracy_rows(robot["accuracy"]) if robot["accuracy"] else [],
         "accuracy_words": accuracy_words(robot["accuracy"]) if robot["accuracy"] else "",
-        "many": installed(),
+        "many": has_matplotlib(),
         "heat_heads": heads,
         "heat": heat,
         "plot": as_is(_plot(robot, index, document)),
@@ -260,7 +260,7 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
 
 
 def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
-    if not installed() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
+    if not has_matplotlib() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
         return ""
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 

@@ -36,7 +36,7 @@ _MIN_SCALE = 1e-9
 #: Two numbers count as equal if their difference is at most _EQUALITY_TOLERANCE * scale.
 _EQUALITY_TOLERANCE = 1e-9
 #: Row indices that exchange the linear and the angular rows of a six-vector.
-_HALVES_ORDER = [3, 4, 5, 0, 1, 2]
+_HALVES = [3, 4, 5, 0, 1, 2]
 _G = 9.81
 
 #: Inputs of a function: q, or q and v, or q, v and a.
@@ -86,9 +86,7 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
     single, double = list[tuple[float, str]](), list[tuple[float, str]]()
     swaps = mistakes.halves_mistake
     if swaps:
-        single.append(
-            (case.remainder(case.expected[:, _HALVES_ORDER]), f"{swaps}; {mistakes.halves_convention}")
-        )
+        single.append((case.remainder(case.expected[:, _HALVES]), f"{swaps}; {mistakes.halves_convention}"))
     for words, predict in mistakes.all(case):
         try:
             predicted = predict()
@@ -98,7 +96,7 @@ def diagnose(mistakes: Mistakes, case: Diagnosis) -> list[str]:
             continue
         single.append((case.remainder(predicted), words))
         if swaps:
-            double.append((case.remainder(predicted[:, _HALVES_ORDER]), f"{words}, and {swaps}"))
+            double.append((case.remainder(predicted[:, _HALVES]), f"{words}, and {swaps}"))
     for found in (single, list(_columns(mistakes, case)), double):
         best = min((rest for rest, _ in found), default=np.inf)
         if best <= EXPLANATION_TOLERANCE:
