@@ -90,7 +90,7 @@ def test_robots_after_the_breakdown_of_an_executor_are_not_verified(when_asked: 
     assert verdicts(report) == ["verified", "not verified", "not verified"]
     for robot in report.robots[1:]:
         assert "BrokenExecutor: a worker died" in str(robot.reason)
-    assert report.asked == 3
+    assert report.robots_requested == 3
 
 
 @pytest.mark.long
@@ -210,7 +210,7 @@ def test_an_interrupted_run_has_not_passed_even_where_every_robot_is_verified() 
     ],
 )
 def test_exit_code_1_means_only_a_disagreement(verdicts: list[str], interrupted: bool, code: int) -> None:
-    found = outcome(verdicts, asked=len(verdicts), interrupted=interrupted)
+    found = outcome(verdicts, robots_requested=len(verdicts), interrupted=interrupted)
     assert found.exit_code == code
     assert not found.passed
 

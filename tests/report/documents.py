@@ -61,7 +61,7 @@ def failing() -> Document:
     broken |= {"joints": [], "frames": [], "chains": [], "results": 0, "timings": None}
     document["robots"].append(broken)
     document["sha256"].append(None)
-    document |= {"asked": 3, "verdict": "disagrees"}
+    document |= {"robots_requested": 3, "verdict": "disagrees"}
     document["reason"] = "1 of 3 robots disagrees, 1 of 3 robots has bad input"
     return document
 

@@ -77,7 +77,7 @@ def test_growth_above_the_factor_and_above_a_single_rounding_is_a_regression(
 
 def test_a_failed_run_and_fewer_samples_are_regressions() -> None:
     new = arms()
-    new["asked"] = 3
+    new["robots_requested"] = 3
     line = "outcome: passed -> not passed, 1 of 3 robots without a report"
     assert (True, line) in words(arms(), new)
     assert compare(new, arms()).exit_code == 0

@@ -34,7 +34,7 @@ def as_junit(document: Document) -> bytes:
     """Return JUnit XML with a suite for each robot, and a case for each quantity and reference frame."""
     suites = [_suite(robot, document) for robot in document["robots"]]
     robots = document["robots"]
-    if document["interrupted"] or not robots or len(robots) != document.get("asked", len(robots)):
+    if document["interrupted"] or not robots or len(robots) != document.get("robots_requested", len(robots)):
         suites.insert(0, _whole_run(document))
     counts = {name: str(sum(int(suite.get(name, "0")) for suite in suites)) for name in _COUNTS}
     root = ET.Element("testsuites", {"name": "urdfkin validate", "time": _time(document["seconds"])} | counts)

@@ -106,22 +106,23 @@ def joint_rows(model: ReportedModel) -> list[dict[str, Any]]:
             "q": _coordinate(joint),
             "axis": axis_words(joint["axis"]) if joint["axis"] else "",
             **_limits(joint["limit"], joint["kind"]),
-            "kept": _remaining_range(joint),
+            "remaining_range": _remaining_range(joint),
         }
         for joint in model["joints"]
     ]
 
 
 def _remaining_range(joint: ReportedJoint) -> str:
-    kept = joint.get("kept")
-    if kept is None:
+    remaining = joint.get("remaining_range")
+    if remaining is None:
         return ""
-    if kept["lower"] is None or kept["upper"] is None:
-        names = ", ".join(kept["by"])
+    if remaining["lower"] is None or remaining["upper"] is None:
+        names = ", ".join(remaining["by"])
         return f"{joint['name']}: at most one value keeps its mimic joints within their limits ({names})."
     unit = "m" if joint["kind"] == "prismatic" else "rad"
-    ends = f"{range_words((kept['lower'], kept['upper']))} {unit}"
-    return f"{joint['name']}: its mimic joints are within limits only from {ends} ({', '.join(kept['by'])})."
+    ends = f"{range_words((remaining['lower'], remaining['upper']))} {unit}"
+    mimics = ", ".join(remaining["by"])
+    return f"{joint['name']}: its mimic joints are within limits only from {ends} ({mimics})."
 
 
 def _coordinate(joint: ReportedJoint) -> str:

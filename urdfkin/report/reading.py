@@ -132,8 +132,8 @@ def contradictions(document: Document) -> Iterator[str]:
     if not edges or any(a >= b for a, b in pairwise(edges)):
         yield "`histogram_edges` are not in ascending order"
         return
-    if document["asked"] < len(robots):
-        yield f"`asked` is {document['asked']}, but {len(robots)} robots have a report"
+    if document["robots_requested"] < len(robots):
+        yield f"`robots_requested` is {document['robots_requested']}, but {len(robots)} robots have a report"
     found = outcome_of(document)
     if document["verdict"] != found.verdict:
         yield f"`verdict` is {document['verdict']}, but {found.reason or 'every robot was verified'}"

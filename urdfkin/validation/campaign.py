@@ -165,7 +165,7 @@ def validate(
     reports = tuple(collector.reports())
     return ValidationReport(
         robots=reports,
-        asked=len(reports),
+        robots_requested=len(reports),
         samples=samples,
         seed=seed,
         started=started.isoformat(timespec="seconds"),
@@ -208,13 +208,13 @@ def read_stored_report(folder: str | os.PathLike[str]) -> ValidationReport:
     studies, all_studied = _studies(store, reports)
     return ValidationReport(
         robots=reports,
-        asked=len(reports),
+        robots_requested=len(reports),
         samples=manifest.samples,
         seed=manifest.seed,
         started=manifest.started,
         seconds=sum(robot.seconds for robot in reports),
         interrupted=progress.chunks_done < progress.chunks or not all_studied,
-        made_by=manifest.versions,
+        library_versions=manifest.versions,
         studies=studies,
     )
 

@@ -160,23 +160,24 @@ class ValidationReport(Displayable):
     """Report of a whole run.
 
     Attributes:
-        asked: Number of requested robots.
+        robots_requested: Number of requested robots.
         started: Start time, ISO 8601, UTC.
         seconds: Wall time.
         interrupted: Whether the run ended early. Finished results are included.
-        made_by: Versions of urdfkin and the oracles that computed the report; None: the installed versions.
+        library_versions: Versions of urdfkin and the oracles that computed the report;
+            None: the installed versions.
         studies: Results of the accuracy study, if requested: one for each compared robot; None if the study
             of a robot failed.
     """
 
     robots: tuple[RobotReport, ...]
-    asked: int
+    robots_requested: int
     samples: int
     seed: int
     started: str
     seconds: float
     interrupted: bool = False
-    made_by: dict[str, str] | None = None
+    library_versions: dict[str, str] | None = None
     studies: tuple[AccuracyStudy | None, ...] = ()
 
     def to_html(self) -> str:
@@ -201,7 +202,7 @@ class ValidationReport(Displayable):
         samples = f"{self.samples} samples of each robot, seed {self.seed}, in {self.seconds:.1f} s."
         reasons = [f"{robot.source}: {robot.reason}" for robot in self.robots if robot.reason]
         return TextDocument(
-            f"{verified} of {self.asked} robots verified", (Table(heads, rows), samples, *reasons)
+            f"{verified} of {self.robots_requested} robots verified", (Table(heads, rows), samples, *reasons)
         )
 
     @property
@@ -220,7 +221,7 @@ class ValidationReport(Displayable):
     @property
     def outcome(self) -> RunOutcome:
         """The outcome of the run, with the reason if it has not passed."""
-        return outcome((robot.verdict for robot in self.robots), self.asked, self.interrupted)
+        return outcome((robot.verdict for robot in self.robots), self.robots_requested, self.interrupted)
 
     @property
     def passed(self) -> bool:
@@ -240,7 +241,7 @@ class ValidationReport(Displayable):
         studies = iter(self.studies)  # Only compared robots have an accuracy result.
         document = {
             "schema": VALIDATION.name,
-            "versions": self.made_by or versions(robot.origin.oracle for robot in self.robots),
+            "versions": self.library_versions or versions(robot.origin.oracle for robot in self.robots),
             "sha256": [robot.summary.model and robot.summary.model["sha256"] for robot in self.robots],
             "verdict": self.outcome.verdict,
             "command": self.command,
@@ -249,7 +250,7 @@ class ValidationReport(Displayable):
             "seed": self.seed,
             "samples": self.samples,
             "histogram_edges": HISTOGRAM_EDGES,
-            "asked": self.asked,
+            "robots_requested": self.robots_requested,
             "interrupted": self.interrupted,
             "reason": self.outcome.reason,
             "robots": [

@@ -75,7 +75,7 @@ def _joint(robot: Robot, i: int, narrowed: dict[str, NarrowedRange]) -> dict[str
         "v": tree.v_index[i] if joint.kind.nv else None,
         "limit": joint.limit,
         "mimic": joint.mimic,
-        "kept": _remaining_range(narrowed.get(joint.name)),
+        "remaining_range": _remaining_range(narrowed.get(joint.name)),
         **({} if joint.lock is None else {"locked": joint.lock.value}),
     }
 
