@@ -138,7 +138,7 @@ def test_files_of_a_store_that_are_links_to_a_device_are_not_read(tmp_path: Path
     (chunk,) = tmp_path.glob("chunks/*/*.chunk")
     chunk.unlink()
     chunk.symlink_to("/dev/zero")
-    assert Store.open_read_only(tmp_path, messages.append).answer(0, 0) is None
+    assert Store.open_read_only(tmp_path, messages.append).read_answer(0, 0) is None
     assert "computed again" in messages[-1]
     words = "is damaged and is computed again: not a regular file: a character device"
     with pytest.warns(StoreWarning, match=words):
@@ -280,5 +280,5 @@ def test_files_that_a_mesh_names_are_read_only_if_they_are_regular_files_in_its_
         visual = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>'
         (folder / "r.urdf").write_text(f'<robot name="r"><link name="l">{visual}</link></robot>')
         (shape,) = shapes(urdfkin.load(folder / "r.urdf", verify=False))
-        assert scene.mesh(shape) is not None
+        assert scene.make_mesh(shape) is not None
     assert read == ["a.obj", "own.obj", "own.mtl"]

@@ -121,14 +121,14 @@ def test_a_robot_that_needs_too_much_memory_is_not_verified_and_pinocchio_builds
 @pytest.mark.long
 def test_the_needed_memory_grows_with_the_cube_of_nv_and_with_the_links() -> None:
     trees = [urdfkin.load(chain([limit()] * n, "revolute")).tree for n in (100, 200)]
-    needs = [memory.needed_bytes(tree, 28) for tree in trees]
+    needs = [memory.estimate_bytes(tree, 28) for tree in trees]
     assert needs[1] - needs[0] >= 64 * (200**3 - 100**3)
     assert needs[0] == 64 * 100**3 + 24_000 * 101 + 12 * min(32 * 2**20, 2 * 101 * 28 * 8 * 600)
     one_link = urdfkin.load('<robot name="r"><link name="l0"/></robot>').tree
-    assert memory.needed_bytes(one_link, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
+    assert memory.estimate_bytes(one_link, 28) == 24_000 + 12 * 2 * 28 * 8 * 16
     leaves = (f'<link name="e{i}"/>' + joint(f"e{i}", "fixed", "l100", f"e{i}") for i in range(1000))
     wide = chain([limit()] * 100, "revolute").replace("</robot>", "".join([*leaves, "</robot>"]))
-    assert memory.needed_bytes(urdfkin.load(wide).tree, 28) > needs[0] + 1000 * 16_000
+    assert memory.estimate_bytes(urdfkin.load(wide).tree, 28) > needs[0] + 1000 * 16_000
     memory.check(trees[0], 28, needs[0])
     memory.check(trees[0], 28, None)
     with pytest.raises(OracleError, match="not enough memory"):

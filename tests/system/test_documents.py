@@ -103,7 +103,7 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
     layout: DocumentKind[Any], entry: str, value: object, said: str
 ) -> None:
     with pytest.raises(InputError) as error:
-        layout.check_document(made(layout) | {entry: value}, "a.json")
+        layout.checked(made(layout) | {entry: value}, "a.json")
     assert str(error.value).startswith(f"a.json: does not conform to the layout {layout.name}: found $")
     assert said in str(error.value)
     assert error.value.remedy == f"write it again with: {layout.made_by}"
@@ -115,24 +115,24 @@ def test_a_wrong_header_is_refused_with_the_place_and_what_to_do(
 def test_a_wrong_document_type_and_an_unknown_version_are_different_errors(layout: DocumentKind[Any]) -> None:
     family, _, version = layout.name.rpartition("/")
     with pytest.raises(InputError, match=f"unknown version of the layout {family}.*reads version {version}:"):
-        layout.check_document({"schema": f"{family}/99"}, "a.json")
+        layout.checked({"schema": f"{family}/99"}, "a.json")
     others: list[Any] = [None, [], "text", {}, {"schema": None}, {"schema": "other/1"}, {"schema": {"a": 1}}]
     for data in others:
         with pytest.raises(InputError, match=f"not a file with the layout {layout.name}.*write one with: "):
-            layout.check_document(data, "a.json")
+            layout.checked(data, "a.json")
 
 
 @pytest.mark.parametrize("layout", [COMPARISON, HISTORY, SAME, CERTIFICATE], ids=attrgetter("name"))
 def test_an_unknown_entry_of_a_certificate_is_refused_with_its_place(layout: DocumentKind[Any]) -> None:
     with pytest.raises(InputError, match=r"found \$: unknown entry 'more'"):
-        layout.check_document(made(layout) | {"more": 1}, "a.json")
+        layout.checked(made(layout) | {"more": 1}, "a.json")
 
 
 def test_an_unknown_entry_at_any_depth_is_refused() -> None:
     document = made(SAME)
     document["remarks"][1]["words"] = "a sentence"
     with pytest.raises(InputError, match=r"found \$\.remarks\[1\]: unknown entry 'words'"):
-        SAME.check_document(document, "a.json")
+        SAME.checked(document, "a.json")
     assert not Draft202012Validator(SAME.schema()).is_valid(document)
 
 

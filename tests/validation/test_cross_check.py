@@ -114,7 +114,7 @@ def test_each_pair_of_libraries_has_its_own_bound(monkeypatch: pytest.MonkeyPatc
         bounds.append(bound)
         return compute_error_stats(ours, theirs, bound, *others)
 
-    monkeypatch.setattr(chunk, "cross_check", record_pairs)
+    monkeypatch.setattr(chunk, "make_cross_check", record_pairs)
     monkeypatch.setattr(chunk, "compute_error_stats", record_bounds)
     assert validate(arm(), samples=0, oracle="mujoco").passed
     assert len(pairs) == len(bounds) - 1 > 10  # only Pinocchio has data.J

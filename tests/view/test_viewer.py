@@ -82,7 +82,7 @@ def test_a_slider_moves_only_one_joint_and_the_results_are_checked(viewer: Viewe
 def shown(viewer: Viewer) -> list[float]:
     scale = np.pi / 180.0 if viewer.units.value == "degrees" else 1.0
     both = zip(viewer.sliders.rows, viewer.sliders.handles, strict=True)
-    return [handle.value * (scale if row.turns else 1.0) for row, handle in both]
+    return [handle.value * (scale if row.is_angle else 1.0) for row, handle in both]
 
 
 @pytest.mark.slow

@@ -79,7 +79,7 @@ def document(calibration: Calibration) -> TextDocument:
         parts.append(f"noise: {noise_text}, estimated from the residuals")
     for name, T in (("base", calibration.base), ("tool", calibration.tool)):
         if T is not None:
-            parts.append(f"{name}: {_written(T)}")
+            parts.append(f"{name}: {_pose_text(T)}")
     for line in list_warnings(calibration):
         parts.append(Strong(f"warning: {line}", "bold yellow"))
     return TextDocument(title, parts)
@@ -96,7 +96,7 @@ def _amount(value: float, unit: str) -> str:
     return length(value) if unit == "m" else angle(value) if unit == "rad" else f"{value:.3g}"
 
 
-def _written(T: FloatArray) -> str:
+def _pose_text(T: FloatArray) -> str:
     xyz, rpy = (" ".join(f"{x:.9g}" for x in three) for three in (T[:3, 3], rpy_of(T[:3, :3]) + 0.0))
     return f'xyz="{xyz}" rpy="{rpy}"'
 

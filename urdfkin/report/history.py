@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal, TypedDict, cast
 from urdfkin.errors import InputError, UrdfkinError
 from urdfkin.errors.display import Strong, Table, TextDocument
 from urdfkin.report.compare import ChangeEntry, ReportChange, compare, find_renamed_files, robots_by_source
-from urdfkin.report.html import render_template, when
+from urdfkin.report.html import format_date, render_template
 from urdfkin.report.reading import check_document, read_stored_document
 from urdfkin.report.words import VERDICTS, bound_ratio_of, format_count, format_ratio, format_units, worst
 from urdfkin.system.documents import Count, DocumentKind, Header, Sha256, parse_json, plain, says
@@ -407,7 +407,7 @@ def as_html(history: History, command: str | None = None) -> str:
         runs=history.runs,
         last=history.runs[-1],
         dates=[_date(run) for run in history.runs],
-        when=when(history.runs[-1]["started"]),
+        when=format_date(history.runs[-1]["started"]),
         charted=range(max(0, len(history.runs) - CHARTED_RUNS), len(history.runs)),
         stacks=_stacks(history),
         height=_height,

@@ -60,7 +60,7 @@ _OPEN = 1
 _FAILURES_OPEN = 20
 #: If a report has more robots than this number, only robots that are not verified have histograms.
 #: The reason is computing time: the histograms of one robot take a second.
-_DRAWN = 100
+_MAX_DRAWN = 100
 #: Maximum number of characters of details in one page; with more, each robot has a separate file.
 MOST = 5_000_000
 
@@ -145,7 +145,7 @@ def _page(document: Document, robots: list[dict[str, Any]], token: str = "", fol
         document=document,
         outcome=outcome_of(document),
         summary=summary(document),
-        when=when(document["started"]),
+        when=format_date(document["started"]),
         pinocchio=pinocchio_version(document),
         compared=compared(),
         not_compared=not_compared(),
@@ -260,12 +260,12 @@ def _robot(robot: ReportedRobot, index: int, document: Document) -> dict[str, An
 
 
 def _plot(robot: ReportedRobot, index: int, document: Document) -> str:
-    if not has_matplotlib() or (len(document["robots"]) > _DRAWN and robot["verdict"] == "verified"):
+    if not has_matplotlib() or (len(document["robots"]) > _MAX_DRAWN and robot["verdict"] == "verified"):
         return ""
     return distributions(robot, document["histogram_edges"], f"p{index}-")
 
 
-def when(started: str) -> str:
+def format_date(started: str) -> str:
     """Format an ISO date; return other texts unchanged."""
     try:
         moment = datetime.fromisoformat(started)

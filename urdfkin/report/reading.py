@@ -322,7 +322,7 @@ def read_stored_document(folder: Path) -> Document:
 
 
 def check_document(data: object, where: str) -> Document:
-    document = VALIDATION.check_document(data, where)
+    document = VALIDATION.checked(data, where)
     if against := list(islice(contradictions(document), _SHOWN + 1)):
         more = " ..." if len(against) > _SHOWN else ""
         raise InputError(

@@ -337,7 +337,7 @@ def as_html(
     started: datetime | None = None,
 ) -> str:
     """Return an HTML page with the answer; the template escapes all names."""
-    from urdfkin.report.html import render_template, when
+    from urdfkin.report.html import format_date, render_template
     from urdfkin.verify.oracles import versions
 
     moment = started or datetime.now(UTC)
@@ -352,7 +352,7 @@ def as_html(
         narrowed=sameness.narrowed,
         narrowed_head=NARROWED.capitalize(),
         started=moment.isoformat(timespec="seconds"),
-        when=when(moment.isoformat(timespec="seconds")),
+        when=format_date(moment.isoformat(timespec="seconds")),
         versions=versions(),
         command=command_of(robots, question, options),
         heads=HEADS,

@@ -38,7 +38,7 @@ _MOST_NAMES = 14
 _UNNAMED = "#9AA7B5"
 
 
-def _lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
+def _draw_lines(axes: Axes, t: FloatArray, rows: FloatArray, names: Sequence[str]) -> None:
     for k, name in enumerate(names):
         axes.plot(t, rows[:, k], label=name, **_line_style(k))
 
@@ -50,7 +50,7 @@ def _line_style(k: int) -> dict[str, Any]:
 
 def _make_xyz_panel(vector: Callable[[FrameMotion], FloatArray], label: str) -> Panel:
     def panel(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
-        _lines(axes, t, vector(x), ("x", "y", "z"))
+        _draw_lines(axes, t, vector(x), ("x", "y", "z"))
         axes.set_ylabel(label)
 
     return panel
@@ -67,7 +67,7 @@ def draw_parts(axes: Axes, x: FrameMotion, t: FloatArray) -> None:
     total = np.linalg.norm(x.acceleration[:, :3], axis=-1)
     used = [k for k in range(len(KINDS)) if sizes[:, k].any()]
     names = tuple(KINDS[k] for k in used)
-    _lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
+    _draw_lines(axes, t, np.column_stack([sizes[:, used], total]), (*names, "sum"))
     axes.set_ylabel("norms of the parts [m/s²]")
 
 
@@ -75,7 +75,7 @@ def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice,
     values = x.singular_values_of(rows)
     largest = values.max(initial=1.0)
     shown = np.where(values > EPS * largest, values, np.nan)
-    _lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
+    _draw_lines(axes, t, shown, [f"σ{k + 1}" for k in range(values.shape[1])])
     axes.set_yscale("log")
     axes.minorticks_off()
     lower, upper = axes.get_ylim()
@@ -87,7 +87,7 @@ def draw_singular_values(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice,
 
 
 def draw_manipulability(axes: Axes, x: FrameMotion, t: FloatArray, rows: slice, unit: str) -> None:
-    _lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
+    _draw_lines(axes, t, x.manipulability(rows)[:, np.newaxis], ("",))
     axes.set_ylabel(f"manipulability\n[{unit}]")
     axes.set_ylim(0.0, 1.08 * float(axes.dataLim.y1) or 1.0)
 
@@ -138,13 +138,15 @@ COORDINATES = tuple(_PER)
 def make_coordinate_panels(robot: Robot, trajectory: Trajectory, what: str) -> list[Panel]:
     units = np.array(configuration.units(robot.tree, what))
     return [
-        partial(_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64))
+        partial(
+            _draw_coordinates, robot, trajectory, what, unit, np.flatnonzero(units == unit).astype(np.int64)
+        )
         for unit in ("rad", "m", "")
         if (units == unit).any()
     ]
 
 
-def _coordinates(
+def _draw_coordinates(
     robot: Robot,
     trajectory: Trajectory,
     what: str,
@@ -165,7 +167,7 @@ def _coordinates(
     for i in others:
         count = f"{len(others)} {'others' if named else 'joints'}" if i == others[0] else ""
         axes.plot(t, values[:, i], color=_UNNAMED, linewidth=0.7, label=count)
-    _lines(
+    _draw_lines(
         axes, t, values[:, named],
         [names[i] if k < _MOST_NAMES else "" for k, i in enumerate(named)],
     )  # fmt: skip
@@ -214,7 +216,7 @@ _VELOCITIES_UNCHECKED = (
 
 def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Sequence[str] = ()) -> Figure:
     """Return a figure with the named panels of `COORDINATES` and `PANELS`, or with all panels by default."""
-    drawn = _panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
+    drawn = _select_panels(robot, trajectory, list(panels) or [*COORDINATES, *PANELS])
     columns = min(3 if len(drawn) > 8 else 2, len(drawn))
     rows = -(-len(drawn) // columns)
     height = _PANEL_HEIGHT * max(2, rows) + _TEXT_HEIGHT
@@ -249,7 +251,7 @@ def plot_motion(robot: Robot, x: FrameMotion, trajectory: Trajectory, panels: Se
     return figure
 
 
-def _panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
+def _select_panels(robot: Robot, trajectory: Trajectory, names: Sequence[str]) -> list[Panel]:
     found = list[Panel]()
     for name in names:
         if name in COORDINATES:
