@@ -392,4 +392,4 @@ def test_a_scheduler_that_is_lost_while_a_result_arrives_is_an_error() -> None:
     gone = Mock(status="finished", **{"result.side_effect": CommClosedError("reset by peer")})
     there: Any = Cluster(SimpleNamespace(status="running", scheduler=None))  # type: ignore[arg-type]
     with pytest.raises(ClusterError, match="connection to the scheduler is lost"):
-        there._found(gone, None, 1)
+        there._take_answer(gone, None, 1)

@@ -1,4 +1,4 @@
-"""A tally counts results outside their bound, contains the worst case, and can be added in any order."""
+"""Error statistics count results outside their bound, contain the worst case, and add in any order."""
 
 import math
 
@@ -22,7 +22,7 @@ FRAMES = ("a", "b", "c")
 
 
 def stats_of(units: np.ndarray, first: int = 0, names: tuple[str, ...] = FRAMES) -> ErrorStats:
-    """Return the tally of results with errors in eps; the bound is 10 eps."""
+    """Return the statistics of results with errors in eps; the bound is 10 eps."""
     ours = np.ones((*units.shape, 6))
     ours[..., 2] += units * EPS
     bound = Bound(np.ones_like(ours), np.full((*units.shape, 1), 10.0))

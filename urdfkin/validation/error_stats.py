@@ -1,8 +1,8 @@
 """Error statistics of a validation.
 
-The statistics of several chunks, processes and machines can be added. The addition of tallies is commutative
+The statistics of several chunks, processes and machines can be added. The addition is commutative
 and associative. Therefore, the sum does not depend on the division of the samples into chunks. If two worst
-cases are equally bad, the sum of two tallies keeps the case with the smaller sample number.
+cases are equally bad, the sum keeps the case with the smaller sample number.
 
 With a second oracle, `CrossCheck` compares three results. Each of the three pairs of libraries has its own
 bound. The bound on the difference between Pinocchio and the second oracle is the sum of the other two bounds.
@@ -157,7 +157,7 @@ class ErrorStats:
         bound_ratio: The largest ratio of a disagreement to its bound.
         histogram: (82,) number of results in each bin: below the first of `HISTOGRAM_EDGES`, between two
             adjacent edges, and above the last edge.
-        by_frame: The largest disagreement of each frame, in the robot's order.
+        worst_by_frame: The largest disagreement of each frame, in the robot's order.
         bounds: The smallest and the largest bound of all results, in eps * scale.
     """
 
